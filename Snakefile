@@ -7,7 +7,6 @@ from pathlib import Path
 
 from hobble.channels import channel_packages, display_modules
 from hobble.core.errors import HobbleError
-from hobble.measures.registry import names_of_modules
 from hobble.workflow import lifetime, lock_files, named_outputs
 from hobble.workflow.user_account import check_may_write, ensure_user_name
 from hobble.workflow.costs import stages

@@ -17,12 +17,12 @@ from pathlib import Path
 from time import perf_counter
 
 import numpy as np
+from stability import random_targets, stability
 
 from hobble.core.processors import processor_name
 from hobble.database.manifest import Manifest
-from hobble.evaluation.stability import random_targets, stability
-from hobble.measures.responsivity.run import measure_responsivity
-from hobble.measures.rollouts.run import measure_roll_outs
+from hobble.measures.responsivity_run import measure_responsivity
+from hobble.measures.rollouts_run import measure_roll_outs
 from hobble.models.load import load_network
 from hobble.models.network import Network
 from hobble.runtime.animation import ProceduralAnimation

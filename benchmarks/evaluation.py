@@ -17,8 +17,8 @@ from runtime import SKELETON, load_skeleton, random_network
 
 from hobble.channels.injury.crowd_severities import severity_inputs
 from hobble.core.processors import processor_name
-from hobble.evaluation.crowd import CrowdTarget, generate_walks
-from hobble.measures.rollouts.roll_outs import RollOutCrowd, RollOutInputs, RollOuts
+from hobble.measures.rollouts_run import RollOutCrowd, RollOutInputs, RollOuts
+from hobble.measures.walks import CrowdTarget, generate_walks
 from hobble.models.load import load_network
 from hobble.models.network import Network
 from hobble.models.pfnn.predictor import PfnnPredictor

@@ -29,8 +29,8 @@ import yaml
 
 from hobble.config.sections import Training
 from hobble.database.reader import Database
-from hobble.measures.responsivity.run import measure_responsivity
-from hobble.measures.rollouts.run import measure_roll_outs
+from hobble.measures.responsivity_run import measure_responsivity
+from hobble.measures.rollouts_run import measure_roll_outs
 from hobble.models.load import load_network
 from hobble.models.pfnn.options import PfnnOptions
 from hobble.runtime.options import Runtime

@@ -15,12 +15,13 @@ import argparse
 import csv
 from pathlib import Path
 
+from stability import stability
+
 from hobble.core.processors import processor_name
 from hobble.database.reader import Database
-from hobble.evaluation.stability import stability
-from hobble.measures.accuracy.run import measure_accuracy
-from hobble.measures.responsivity.run import measure_responsivity
-from hobble.measures.rollouts.run import measure_roll_outs
+from hobble.measures.accuracy_run import measure_accuracy
+from hobble.measures.responsivity_run import measure_responsivity
+from hobble.measures.rollouts_run import measure_roll_outs
 from hobble.models.load import load_network
 from hobble.runtime.options import Runtime
 from hobble.training.options import Training

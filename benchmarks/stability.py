@@ -11,12 +11,163 @@ from __future__ import annotations
 
 import argparse
 import sys
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TypedDict
+
+import numpy as np
 
 from hobble.core.errors import HobbleError
-from hobble.evaluation.stability import LIMITS, stability
+from hobble.core.quat import Array
+from hobble.measures.walks import feet_in_stance, foot_slide, largest_turn, skating
 from hobble.models.load import load_network
+from hobble.models.network import Network
 from hobble.models.pfnn.predictor import MODES
+from hobble.runtime.animation import ProceduralAnimation
+from hobble.runtime.feet import leg_joints, sole_heights
 from hobble.runtime.options import Runtime
+
+FPS = 60
+# kind of target -> (speed in cm a frame, whether to face a random direction, gait)
+KINDS: dict[str, tuple[float, bool, str]] = {
+    "walk": (2.5, False, "walk"),
+    "jog": (7.0, False, "jog"),
+    "crouch": (2.0, False, "crouch"),
+    "strafe": (2.2, True, "walk"),
+    "stop": (0.0, False, "walk"),
+    "turn": (0.0, True, "walk"),
+}
+# The motion is stable if all values are within these limits. `stability` explains the names.
+LIMITS = {
+    "hips_lowest_cm": 60.0,
+    "hips_highest_cm": 110.0,
+    "largest_turn_degrees": 60.0,
+    "foot_slide_cm": 2.0,
+}
+
+
+@dataclass(frozen=True)
+class SteadyTarget:
+    """A target that stays the same for `frames` frames. kind: a key of KINDS.
+
+    velocity: (2,) cm a frame. facing: (2,) direction, or None for no target of the facing.
+    """
+
+    kind: str
+    velocity: Array
+    facing: Array | None
+    gait: str
+    frames: int
+
+
+class WorstMotion(TypedDict):
+    """The worst or mean values of some frames. `stability` explains the keys. None: nothing to measure."""
+
+    frames: int
+    finite: bool
+    hips_lowest_cm: float
+    hips_highest_cm: float
+    largest_turn_degrees: float
+    foot_slide_cm: float | None
+    steps: int
+    foot_down_share: float
+    skating_cm: float | None
+    stable: bool
+
+
+class Stability(WorstMotion):
+    """The values of all frames together. kinds: kind of target -> values of the frames with this kind."""
+
+    minutes: float
+    kinds: dict[str, WorstMotion]
+
+
+def random_targets(minutes: float, seed: int = 1) -> Iterator[SteadyTarget]:
+    """Targets of random kinds in random directions, each for 2 to 8 seconds, `minutes` in total."""
+    rng = np.random.default_rng(seed)
+    left = int(minutes * 60 * FPS)
+    while left > 0:
+        kind = str(rng.choice(list(KINDS)))
+        frames = min(left, int(rng.integers(2 * FPS, 8 * FPS)))
+        going, looking = rng.uniform(-np.pi, np.pi, 2)
+        speed, faces, gait = KINDS[kind]
+        facing = np.array([np.sin(looking), np.cos(looking)]) if faces else None
+        yield SteadyTarget(kind, speed * np.array([np.sin(going), np.cos(going)]), facing, gait, frames)
+        left -= frames
+
+
+def stability(
+    network: Network, minutes: float = 10.0, seed: int = 1, runtime: Runtime | None = None
+) -> Stability:
+    """Let a character follow random targets for `minutes`. Returns the values of all frames and of each kind.
+
+    `frames`: number of frames. `finite`: whether all numbers are finite. `hips_lowest_cm`, `hips_highest_cm`:
+    smallest and largest height of the hips above the ground. `largest_turn_degrees`: largest turn of a joint
+    in one frame, in the world. `foot_slide_cm`: mean slide of a toe in a stance. `steps`: number of stances.
+    `foot_down_share`: share of the frames in which at least one foot stands. `skating_cm`: how far a toe
+    skates in a frame (`motion_measures.skating`), mean over feet and frames. `stable`: whether all values are
+    within LIMITS.
+    """
+    animation = ProceduralAnimation(network, **dict(runtime or Runtime()))
+    assert network.skeleton is not None
+    role = network.skeleton.role
+    toes = [role("left_toe"), role("right_toe")]
+    toe_height = float(sole_heights(network, leg_joints(network.skeleton))[1])
+    # For each kind: the measurements during each of its targets, as name -> array.
+    measurements: dict[str, list[dict[str, Array]]] = {kind: [] for kind in KINDS}
+    last = None  # rotations (1, J, 4) in the last frame of the target before
+    for target in random_targets(minutes, seed):
+        poses = [
+            animation.next_pose(target.velocity, target.facing, target.gait) for _ in range(target.frames)
+        ]
+        rotations = np.array([p.rotations for p in poses])
+        contacts = np.array([p.contacts for p in poses])
+        toe_positions = np.array([p.positions[toes] for p in poses])
+        above_ground = toe_positions - np.array([[0.0, p.root[1], 0.0] for p in poses])[:, None]
+        measurements[target.kind].append(
+            {
+                "finite": np.array([np.isfinite(p.positions).all() for p in poses]),
+                "hips": np.array([p.positions[role("hips"), 1] - p.root[1] for p in poses]),
+                "turn": np.array(
+                    [largest_turn(rotations if last is None else np.concatenate([last, rotations]))]
+                ),
+                "slide": foot_slide(toe_positions, contacts),
+                "down": np.asarray(feet_in_stance(contacts).any(axis=1)),
+                "skating": skating(above_ground, toe_height).ravel(),
+            }
+        )
+        last = rotations[-1:]
+    worst = _worst([of_target for of_kind in measurements.values() for of_target in of_kind])
+    return {
+        "minutes": minutes,
+        **worst,
+        "kinds": {kind: _worst(of_kind) for kind, of_kind in measurements.items() if of_kind},
+    }
+
+
+def _worst(measurements: list[dict[str, Array]]) -> WorstMotion:
+    """The worst or mean values over some targets. measurements: for each target, name -> measured values."""
+    joined = {key: np.concatenate([of_target[key] for of_target in measurements]) for key in measurements[0]}
+    out: WorstMotion = {
+        "frames": len(joined["hips"]),
+        "finite": bool(joined["finite"].all() and np.isfinite(joined["turn"]).all()),
+        "hips_lowest_cm": round(float(joined["hips"].min()), 2),
+        "hips_highest_cm": round(float(joined["hips"].max()), 2),
+        "largest_turn_degrees": round(float(joined["turn"].max()), 2),
+        "foot_slide_cm": round(float(joined["slide"].mean()), 3) if len(joined["slide"]) else None,
+        "steps": len(joined["slide"]),
+        "foot_down_share": round(float(joined["down"].mean()), 3),
+        "skating_cm": round(float(joined["skating"].mean()), 3) if len(joined["skating"]) else None,
+        "stable": False,
+    }
+    out["stable"] = (
+        out["finite"]
+        and out["hips_lowest_cm"] >= LIMITS["hips_lowest_cm"]
+        and out["hips_highest_cm"] <= LIMITS["hips_highest_cm"]
+        and out["largest_turn_degrees"] <= LIMITS["largest_turn_degrees"]
+        and (out["foot_slide_cm"] or 0.0) < LIMITS["foot_slide_cm"]
+    )
+    return out
 
 
 def main() -> int:

@@ -28,8 +28,7 @@ from pathlib import Path
 import numpy as np
 import yaml
 
-from hobble.measures.registry import MEASURES
-from hobble.measures.sample_options import SampleOptions
+from hobble.measures.measure import SampleOptions, all_measures
 from hobble.workflow.clip_batches import batch_count
 from hobble.workflow.costs import BATCH_RULES
 
@@ -37,7 +36,7 @@ ROOT = Path(__file__).resolve().parents[1]
 OF_BATCHES = {rule for rules in BATCH_RULES.values() for rule in rules}
 # Rules whose work grows with the motion, as far as one run can tell.
 GROWING = {*OF_BATCHES, "database_shard", "database_merge", "training", "recognition", "manners"}
-SAMPLED = {one.name for one in MEASURES if "sample_frames" in one.options.model_fields}
+SAMPLED = {one.name for one in all_measures() if "sample_frames" in one.options.model_fields}
 FPS = 60
 LINK, DELAY = 1.25e9, 30e-6  # bytes and seconds of a message between machines
 THREADS = 2  # of the training

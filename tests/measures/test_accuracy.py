@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from hobble.core.errors import HobbleError, InputError
-from hobble.evaluation.csv_tables import write_csv
-from hobble.measures.accuracy.run import (
+from hobble.core.files import write_csv
+from hobble.measures.accuracy_run import (
     QUANTILES,
     Errors,
     clip_errors,
@@ -173,7 +173,7 @@ def test_errors_do_not_depend_on_the_batch_size(weights, monkeypatch):
     network, rows = load_network(weights), make_rows("a", 50, 10, 5)
     whole = clip_errors(network, rows, [0, 1, 2]).to_dict()
     monkeypatch.setattr(
-        "hobble.measures.accuracy.run.pair_batches", lambda rows, layout: pair_batches(rows, layout, batch=7)
+        "hobble.measures.accuracy_run.pair_batches", lambda rows, layout: pair_batches(rows, layout, batch=7)
     )
     assert clip_errors(network, rows, [0, 1, 2]).to_dict() == pytest.approx(whole)
 

@@ -11,22 +11,23 @@ import numpy as np
 import pytest
 
 from hobble.channels import channel
-from hobble.evaluation.captured import Captured
-from hobble.measures.manners import left_out as module
-from hobble.measures.manners import page, run
-from hobble.measures.manners.left_out import SHRINKAGES, recognise_left_out
-from hobble.measures.manners.windows import (
+from hobble.measures import manners as page
+from hobble.measures import manners_run as module
+from hobble.measures.manners_run import (
     EFFECTS,
     NONE,
+    SHRINKAGES,
     STEP,
     USED,
     WINDOW,
     MannerWindow,
     WalkerInputs,
     captured_windows,
+    recognise_left_out,
 )
 from hobble.models.network import Network
 from hobble.report.parts import Paragraph
+from hobble.rows.captured import Captured
 from hobble.runtime.options import Runtime
 
 FRAMES = 300
@@ -73,7 +74,7 @@ def motion(both: Network) -> list[Captured]:
 def measure(network: Network, motion: Sequence[Captured], people: Mapping[str, str] | None = None) -> Any:
     splits = {one.clip: "train" for one in motion}
     who = people or {one.clip: one.clip for one in motion}
-    return run.measure_manners(network, motion, splits, who, Runtime())
+    return module.measure_manners(network, motion, splits, who, Runtime())
 
 
 def test_windows_with_an_injury_or_half_a_mood_are_left_out(both: Network) -> None:
@@ -153,7 +154,7 @@ def test_each_manner_is_tried_with_each_column_of_another_channel(
         lost = [broken in f.channels.get("injury", {}) for f in figures]
         return [real[None if gone else mood] for mood, gone in zip(moods, lost, strict=True)]
 
-    monkeypatch.setattr(run, "generated_windows", generated_windows)
+    monkeypatch.setattr(module, "generated_windows", generated_windows)
     [found] = measure(both, motion)["channels"]
     assert found["manners"] == ["old", "sad"]
     assert found["captured"]["right"] == 1.0
@@ -195,6 +196,6 @@ def test_a_network_walks_in_every_manner_and_mixture(both: Network, motion: list
 
 
 def test_missing_results_are_explained(hurtable, both: Network, motion: list[Captured]) -> None:
-    assert measure(hurtable, [])["reason"] == run.NO_MANNERS
-    assert measure(both, motion[:6:2])["reason"] == run.TOO_FEW
+    assert measure(hurtable, [])["reason"] == module.NO_MANNERS
+    assert measure(both, motion[:6:2])["reason"] == module.TOO_FEW
     assert page.section(measure(hurtable, []), SimpleNamespace(network={"skeleton": {}})).parts == []

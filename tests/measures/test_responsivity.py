@@ -10,13 +10,18 @@ from typing import Any
 import numpy as np
 import pytest
 
-from hobble.core.files import read_json, write_json
-from hobble.evaluation.csv_tables import write_csv
-from hobble.measures.inputs import MeasureInputs
-from hobble.measures.responsivity import Options, pieces, times
-from hobble.measures.responsivity import run as module
-from hobble.measures.responsivity.laps import lap_starts, turn_was_limited, walk_laps
-from hobble.measures.responsivity.run import lap_rows, measure_responsivity, parameter_counts
+from hobble.core.files import read_json, write_csv, write_json
+from hobble.measures import responsivity_run as module
+from hobble.measures.measure import MeasureInputs
+from hobble.measures.responsivity import Options, pieces
+from hobble.measures.responsivity_run import (
+    lap_rows,
+    lap_starts,
+    measure_responsivity,
+    parameter_counts,
+    turn_was_limited,
+    walk_laps,
+)
 from hobble.runtime.controller import STEPS
 from hobble.runtime.options import Runtime
 from hobble.runtime.waypoints import Waypoint
@@ -139,10 +144,10 @@ def test_a_lap_is_the_same_alone_and_in_a_crowd(network) -> None:
 def test_no_more_frames_are_timed_than_a_lap_may_take_or_its_part_of_all(
     steady, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(times, "TIMED_OF_LAP", 8)
-    monkeypatch.setattr(times, "TIMED_OF_ALL", 20)
+    monkeypatch.setattr(module, "TIMED_OF_LAP", 8)
+    monkeypatch.setattr(module, "TIMED_OF_ALL", 20)
     for laps, longest, expected in ((2, 100, 8), (4, 100, 5), (2, 3, 3)):
-        found = times.timed_frames(steady, RUNTIME, laps, longest, AHEAD)
+        found = module.timed_frames(steady, RUNTIME, laps, longest, AHEAD)
         assert [len(each) for each in found] == [expected] * laps
         assert (np.array(found) > 0).all()
 
@@ -228,7 +233,7 @@ def test_known_times_of_steps_give_known_medians() -> None:
     """Two frames: steps of 1 to 6 ms, and of twice that. The whole call takes 1 ms more."""
     steps = np.arange(1.0, 7.0)
     seconds = np.array([[*steps, 22.0], [*(2 * steps), 43.0]]) / 1000
-    found = times.milliseconds(seconds)
+    found = module.milliseconds(seconds)
     assert [found[step] for step in STEPS] == pytest.approx(1.5 * steps)
     assert [found["sd"][step] for step in STEPS] == pytest.approx(0.5 * steps)
     assert found["total"] == pytest.approx(31.5)

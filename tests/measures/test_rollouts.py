@@ -11,12 +11,9 @@ import numpy as np
 import pytest
 
 from hobble.core.errors import InputError
-from hobble.evaluation.motion_measures import in_root_coordinates
-from hobble.measures.inputs import MeasureInputs
-from hobble.measures.measure import Measure
-from hobble.measures.registry import MEASURES
-from hobble.measures.rollouts.roll_outs import RollOutInputs, inputs_of_clip
-from hobble.measures.rollouts.run import measure_roll_outs, roll_out_rows
+from hobble.measures.measure import Measure, MeasureInputs, all_measures
+from hobble.measures.rollouts_run import RollOutInputs, inputs_of_clip, measure_roll_outs, roll_out_rows
+from hobble.measures.walks import in_root_coordinates
 from hobble.models.network import Network
 from hobble.models.pfnn.predictor import PfnnPredictor
 from hobble.rows.clip_rows import ClipRows, save_clip_rows
@@ -202,9 +199,9 @@ def test_results_of_splits_are_means_of_their_clips_and_reproducible(
     assert rows[0]["clip"] is None
     json.dumps(result, allow_nan=False)
     # The same bits, however many poses and clips go at once.
-    monkeypatch.setattr("hobble.measures.rollouts.roll_outs.BATCH", 7)
+    monkeypatch.setattr("hobble.measures.rollouts_run.BATCH", 7)
     assert measure_roll_outs(weights, clips, splits, "injured", lengths=(1, 30)) == result
-    monkeypatch.setattr("hobble.measures.rollouts.run.AT_ONCE", 1)
+    monkeypatch.setattr("hobble.measures.rollouts_run.AT_ONCE", 1)
     assert measure_roll_outs(weights, clips, splits, "injured", lengths=(1, 30)) == result
 
 
@@ -225,15 +222,15 @@ def test_rows_of_another_layout_are_refused(hurtable: Network, network: Network,
         measure_roll_outs(tmp_path / "weights.npz", {"a": tmp_path / "a.npz"}, {"a": "train"}, "x")
 
 
-@pytest.mark.parametrize("measure", [m for m in MEASURES if m.package.startswith("hobble.channels.")])
+@pytest.mark.parametrize("measure", [m for m in all_measures() if m.channel])
 def test_a_channel_s_measure_does_not_apply_to_a_network_without_it(
     measure: Measure, make_network, tmp_path: Path
 ) -> None:
     """`holden` is measured on clips with severities, and ignores them."""
     save(tmp_path / "weights.npz", make_network())
-    files = {"weights": tmp_path / "weights.npz", "published": ROOT / "src/hobble/evaluation/published.yaml"}
+    files = {"weights": tmp_path / "weights.npz", "published": ROOT / "src/hobble/report/published.yaml"}
     inputs = MeasureInputs("plain", files, {"a": tmp_path / "unread.npz"}, {"a": "train"})
-    found = measure.import_module("run").run(inputs, measure.options())
+    found = measure.runner().run(inputs, measure.options())
     assert found.result["applies"] is False
     assert "network" in found.result["reason"]
 

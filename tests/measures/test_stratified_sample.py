@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 from hobble.core.errors import InputError
-from hobble.measures.accuracy import page
-from hobble.measures.accuracy.run import measure_accuracy
-from hobble.measures.rollouts.page import rollout_chart
-from hobble.measures.rollouts.run import measure_roll_outs
-from hobble.measures.stratified_sample import LEAST_EXCERPTS, Sample, Stratum, draw_sample
+from hobble.measures import accuracy as page
+from hobble.measures.accuracy_run import measure_accuracy
+from hobble.measures.rollouts import rollout_chart
+from hobble.measures.rollouts_run import measure_roll_outs
+from hobble.measures.sample import LEAST_EXCERPTS, Sample, Stratum, draw_sample
 from hobble.rows.clip_rows import save_clip_rows
 from hobble.rows.excerpts import LONGEST, Excerpt, ExcerptKind, cut_into_excerpts, load_excerpt
 from hobble.rows.layout import GAITS

@@ -7,10 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from hobble.core.quat import Array
-from hobble.measures.clip_parts import LoadedPart
-from hobble.measures.rollouts import run as module
-from hobble.measures.rollouts.roll_outs import RollOutCrowd, RollOutInputs, RollOuts
-from hobble.measures.rollouts.run import RollOutErrors
+from hobble.measures import rollouts_run as module
+from hobble.measures.rollouts_run import RollOutCrowd, RollOutErrors, RollOutInputs, RollOuts
+from hobble.measures.sample import LoadedPart
 from hobble.models.network import Predictor
 from hobble.rows.clip_rows import ClipRows
 

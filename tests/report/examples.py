@@ -10,6 +10,7 @@ import yaml
 
 from hobble.core.files import write_json, write_text
 from hobble.core.skeleton import Skeleton
+from hobble.measures.measure import all_measures
 from hobble.runtime.options import Runtime
 from tests.report.example_clips import clip_reports, terrain
 from tests.report.example_measurements import HELD_OUT, accuracy, costs, history, injury_sweep, responsivity
@@ -68,4 +69,5 @@ def write_all(
         "weights": str(folder / "weights.npz"),
         **paths,
         "terrain": grounds,
+        "measures": all_measures(),
     }

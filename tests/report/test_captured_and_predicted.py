@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from hobble.core.skeleton import Skeleton
-from hobble.evaluation.captured import headings, root_path
 from hobble.figure.mesh import body_mesh
 from hobble.models.network import Network
 from hobble.report.recorded_motion import UNIT, in_world
+from hobble.rows.captured import headings, root_path
 
 
 def positions(clip: dict[str, Any], table: str, joints: int) -> np.ndarray:

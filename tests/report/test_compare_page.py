@@ -13,15 +13,16 @@ import yaml
 
 from hobble.channels.injury.response.comparison_page import injury_table
 from hobble.core.skeleton import Skeleton
-from hobble.evaluation.compare_configurations import compare_configurations
-from hobble.evaluation.configuration_results import ConfigurationResults
-from hobble.measures.accuracy import comparison_page as of_accuracy
-from hobble.measures.responsivity import comparison_page as of_responsivity
+from hobble.measures import accuracy as of_accuracy
+from hobble.measures import responsivity as of_responsivity
+from hobble.measures.compare import ConfigurationResults, compare_configurations
+from hobble.measures.measure import all_measures
 from hobble.models.load import load_network
 from hobble.report import compare_page
 from hobble.report.character import playable_data, round_weights
 from hobble.report.compare_page import render_comparison
 from hobble.report.gather import PUBLISHED, ReportMaterial
+from hobble.report.templates import compared_by
 
 
 @pytest.fixture(scope="module")
@@ -98,7 +99,8 @@ def pair(
 def tab(
     compared: dict[str, Any], pair: dict[str, Any], script: str, tools: ModuleType, tmp_path_factory: Any
 ) -> Iterator[Any]:
-    yield from tools.opened(render_comparison(compared, pair, script), tmp_path_factory.mktemp("compared"))
+    page = render_comparison(compared, pair, script, measures=all_measures())
+    yield from tools.opened(page, tmp_path_factory.mktemp("compared"))
 
 
 def test_boxes_are_at_the_quantiles_with_published_means(compared: dict[str, Any]) -> None:
@@ -123,7 +125,7 @@ def test_training_is_drawn_over_passes_seconds_and_samples(
 
 
 def test_every_pair_is_in_the_table_and_the_map(compared: dict[str, Any]) -> None:
-    table, chart = compare_page.difference_table(compared), of_accuracy.difference_map(compared)
+    table, chart = of_accuracy.difference_table(compared), of_accuracy.difference_map(compared)
     assert table is not None
     assert chart is not None
     held_out = chart.options["held-out clips, sd of single frames"]
@@ -156,7 +158,9 @@ def test_frame_times_are_medians_and_measures_have_names(
     compared: dict[str, Any], material: ReportMaterial
 ) -> None:
     median = material.measurements["responsivity"]["milliseconds"]["spread"]["median"]
-    table = compare_page.configuration_table(compared)
+    table = compare_page.configuration_table(
+        compared, [c for each in compared_by(all_measures(), "compared_columns", compared) for c in each]
+    )
     column = [c.label for c in table.columns].index("ms per frame, median")
     assert [row[column] for row in table.rows] == [median, median]
     laps, fit = of_responsivity.lap_lines(compared), of_responsivity.fit_chart(compared)

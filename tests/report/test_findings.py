@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from hobble.measures.responsivity.page import track_figures
+from hobble.measures.responsivity import track_figures
 from hobble.report.data_section import TURN_EDGES
 from hobble.report.gather import ReportMaterial
 from hobble.report.page import hints, key_figures

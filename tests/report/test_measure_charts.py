@@ -7,9 +7,9 @@ import pytest
 from hobble.channels.injury.recognition.page import recognition_chart
 from hobble.channels.injury.response import page as injury_page
 from hobble.channels.injury.response import page_cases
-from hobble.measures.accuracy.page import caveat
-from hobble.measures.responsivity import lap_charts
-from hobble.measures.responsivity import page as responsivity_page
+from hobble.measures import responsivity as lap_charts
+from hobble.measures import responsivity as responsivity_page
+from hobble.measures.accuracy import caveat
 from hobble.report.gather import ReportMaterial
 from hobble.report.parts import ChartGroup, ChartPair, KeyFigure
 

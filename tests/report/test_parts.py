@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from hobble.measures.registry import MEASURES
+from hobble.measures.measure import all_measures
 from hobble.report.parts import (
     Chart,
     ChartGroup,
@@ -58,7 +58,7 @@ def test_a_pair_without_charts_is_left_out() -> None:
 
 @pytest.mark.parametrize("found", [{}, {"applies": False, "reason": "no such input"}])
 def test_a_measurement_that_found_nothing_leaves_no_section(found: dict[str, Any], material: Any) -> None:
-    nothing = replace(material, measurements={one.name: found for one in MEASURES})
+    nothing = replace(material, measurements={one.name: found for one in all_measures()})
     assert measured_sections(material) != []
     assert measured_sections(nothing) == []
 

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from hobble.core.errors import InputError
+from hobble.core.files import read_numbers
 from hobble.core.skeleton import Skeleton
-from hobble.evaluation.csv_tables import read_numbers
-from hobble.measures.accuracy import page as accuracy_page
+from hobble.measures import accuracy as accuracy_page
 from hobble.report import data_section, sections
 from hobble.report.gather import ReportMaterial, describe_network
 from hobble.report.parts import Chart

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from hobble.core import quat
-from hobble.evaluation.motion_measures import foot_slide, largest_turn
+from hobble.measures.walks import foot_slide, largest_turn
 from hobble.models.load import load_network
 from hobble.models.network import Network
 from hobble.runtime import ProceduralAnimation

@@ -11,7 +11,7 @@ import pytest
 import torch
 
 from hobble.database.reader import Database
-from hobble.measures.rollouts.roll_outs import RollOutInputs
+from hobble.measures.rollouts_run import RollOutInputs
 from hobble.models.pfnn.fused import FusedPfnnStep
 from hobble.models.pfnn.step import PfnnStep
 from hobble.models.pfnn.trainable import untrained_network

@@ -1,20 +1,21 @@
-"""A new measurement needs a folder and one line in the list."""
+"""A new measurement needs two files, and no existing file changes."""
 
 from __future__ import annotations
 
 import csv
 import json
-import re
-from pathlib import Path
 
 import pytest
 
 pytestmark = pytest.mark.workflow
 
-DECLARATION = '''"""How high the hips of the captured figure are."""
+HIPS = '''"""How high the hips of the captured figure are."""
 
 from hobble.core.section import Positive, Section
+from hobble.measures.compare import ComparisonAddition
 from hobble.measures.measure import Cost, Measure
+from hobble.report.parts import Column, Hint, KeyFigure, OverviewColumn, Table
+from hobble.report.parts import PageSection, Paragraph, SectionPart
 
 
 class Options(Section):
@@ -25,31 +26,11 @@ class Options(Section):
 
 MEASURE = Measure(
     name="hips",
-    package=__name__,
+    module=__name__,
     inputs=("clips", "skeleton", "accuracy"),
     options=Options,
     cost=Cost(mb_per_1000_frames=10, least_minutes=1),
 )
-'''
-RUN = """from hobble.rows.clip_rows import load_clip_rows
-from hobble.evaluation.captured import captured_stretches
-from hobble.measures.inputs import MeasureInputs, Outcome
-from hobble.measures.hips import Options
-
-
-def run(inputs: MeasureInputs, options: Options) -> Outcome:
-    joint = list(inputs.skeleton["joints"]).index(inputs.skeleton["roles"]["hips"])
-    rows = []
-    for clip, path in inputs.clips.items():
-        parts = captured_stretches(load_clip_rows(path))
-        heights = [h for part in parts for h in part.local[:: options.every, joint, 1]]
-        rows.append({"clip": clip, "frames": len(heights), "highest": round(float(max(heights)), 3)})
-    known = [entry["clip"] for entry in inputs.results_of("accuracy")["clips"]]
-    return Outcome({"every": options.every, "clips": rows, "known": known}, {"clips": rows}, "<hips>")
-"""
-PAGE = """from hobble.report.parts import PageSection, Paragraph, SectionPart
-from hobble.report.parts import Hint, KeyFigure
-from hobble.report.parts import Column, Table
 
 
 def section(found, material):
@@ -65,8 +46,6 @@ def figures(found, material):
 
 def hints(found, material):
     yield Hint("note", "The hips were looked at.", f"In {len(found['clips'])} clips.")
-"""
-COMPARISON = """from hobble.evaluation.comparison_rows import ComparisonAddition
 
 
 def compared(all_measured, published):
@@ -76,45 +55,37 @@ def compared(all_measured, published):
 
 def tables(compared):
     return {"hips": compared["hips"]}
-"""
-COMPARISON_PAGE = """from hobble.report.parts import OverviewColumn
-from hobble.report.parts import PageSection, Paragraph, SectionPart
-from hobble.report.parts import Column
 
 
-def columns(compared):
+def compared_columns(compared):
     values = {entry["configuration"]: entry["highest"] for entry in compared["hips"]}
     yield OverviewColumn(25, Column.number("highest hips, cm", 4), values)
 
 
-def section(compared):
+def compared_section(compared):
     return PageSection("hips", [SectionPart(0, Paragraph("Hips of all."))], order=15)
+'''
+RUN = """from hobble.measures.measure import MeasureInputs, Outcome
+from hobble.rows.captured import captured_stretches
+from hobble.rows.clip_rows import load_clip_rows
+
+
+def run(inputs: MeasureInputs, options) -> Outcome:
+    joint = list(inputs.skeleton["joints"]).index(inputs.skeleton["roles"]["hips"])
+    rows = []
+    for clip, path in inputs.clips.items():
+        parts = captured_stretches(load_clip_rows(path))
+        heights = [h for part in parts for h in part.local[:: options.every, joint, 1]]
+        rows.append({"clip": clip, "frames": len(heights), "highest": round(float(max(heights)), 3)})
+    known = [entry["clip"] for entry in inputs.results_of("accuracy")["clips"]]
+    return Outcome({"every": options.every, "clips": rows, "known": known}, {"clips": rows}, "<hips>")
 """
-PARTS = {
-    "__init__": DECLARATION,
-    "run": RUN,
-    "page": PAGE,
-    "comparison": COMPARISON,
-    "comparison_page": COMPARISON_PAGE,
-}
-
-
-def add(package: Path) -> None:
-    """The new folder, and the list, the only existing file that changes."""
-    folder = package / "measures" / "hips"
-    folder.mkdir()
-    for name, text in PARTS.items():
-        (folder / f"{name}.py").write_text(text)
-    listed = package / "measures" / "registry.py"
-    text = listed.read_text()
-    text, imported = re.subn(r"(from hobble\.measures import .*)", r"\1, hips", text, count=1)
-    text, entered = re.subn(r"( +)accuracy\.MEASURE,\n", r"\g<0>\1hips.MEASURE,\n", text, count=1)
-    assert imported == entered == 1
-    listed.write_text(text)
 
 
 def test_a_new_measurement_is_run_shown_and_compared_and_nothing_else_is_measured_again(copied) -> None:
-    add(copied.own_source())
+    folder = copied.own_source() / "measures"
+    (folder / "hips.py").write_text(HIPS)
+    (folder / "hips_run.py").write_text(RUN)
     copied.edit("config/test.yaml", "evaluation:", "evaluation:\n  every: 2")
     target = "results/test/report.html"
     assert copied.planned(target) == {"measure": 1, "configuration": 1, "pipeline_summary": 1, "report": 1}

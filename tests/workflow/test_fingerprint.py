@@ -7,8 +7,7 @@ from pathlib import Path
 import pytest
 
 from hobble.channels import CHANNEL_NAMES
-from hobble.measures.measure import Measure
-from hobble.measures.registry import MEASURES
+from hobble.measures.measure import Measure, all_measures
 from hobble.workflow import fingerprint as fp
 from hobble.workflow.costs import DATASET_STAGES
 
@@ -134,7 +133,7 @@ def test_infrastructure_modules_exist_and_have_a_reason(root: Path) -> None:
 
 
 def test_no_stage_imports_a_later_one(root: Path) -> None:
-    order = [*DATASET_STAGES, "training", "runtime", "evaluation", "report"]
+    order = [*DATASET_STAGES, "training", "runtime", "report", "measures"]
     order.insert(order.index("database"), "rows")
     order.insert(order.index("training"), "character")
     order.insert(order.index("channels"), "gait")  # how a walk is measured; no rule is its own
@@ -152,14 +151,13 @@ def test_no_stage_imports_a_later_one(root: Path) -> None:
                 assert used not in order[rank + 1 :], f"{module.name} of {stage} imports {used}"
 
 
-@pytest.mark.parametrize("measure", MEASURES, ids=lambda measure: measure.name)
-def test_a_measurement_depends_neither_on_the_page_nor_on_the_list(root: Path, measure: Measure) -> None:
+@pytest.mark.parametrize("measure", all_measures(), ids=lambda measure: measure.name)
+def test_a_measurement_depends_neither_on_the_page_nor_on_other_measurements(
+    root: Path, measure: Measure
+) -> None:
     """Otherwise a new measurement or another text on a page would run all measurements again."""
-    files = fp.imported_files(
-        root / "workflow/scripts/measure.py", root / "src", [measure.module_name("run")]
-    )
-    used = {path.relative_to(root / "src/hobble").as_posix() for path in files}
-    assert "measures/registry.py" not in used
-    assert not [path for path in used if path.startswith("report/")]
-    folder = (root / "src" / measure.package.replace(".", "/")).relative_to(root / "src/hobble").as_posix()
-    assert f"{folder}/run.py" in used
+    files = fp.imported_files(root / "workflow/scripts/measure.py", root / "src", [measure.run_module])
+    used = {".".join(path.relative_to(root / "src").with_suffix("").parts) for path in files}
+    assert measure.run_module in used
+    assert not [name for name in used if name.startswith("hobble.report.")]
+    assert not used & {module for one in all_measures() for module in one.shown_modules}

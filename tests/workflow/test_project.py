@@ -120,9 +120,12 @@ def test_a_comparison_reads_the_files_of_its_configurations(complete: Path) -> N
     base = complete
     project = Project(base, {"compare": ["one", "hurt"]})
     check_targets(project, ["results/compare/compare.json"])
-    assert project.comparison.input_files()["accuracy"] == [
-        f"results/{n}/evaluation/accuracy.json" for n in ("one", "hurt")
+    assert project.comparison.input_files()["measurements"] == [
+        file for name in ("one", "hurt") for file in project.measurements.result_files(name)
     ]
+    injuries = [f"results/{name}/evaluation/injury.json" for name in ("one", "hurt")]
+    made = [file in project.comparison.input_files()["measurements"] for file in injuries]
+    assert made == [False, True], "only where the network has the channel"
     assert Project(base, {"compare": "one,hurt"}).comparison.names() == ["one", "hurt"]
     (base / "config/read.yaml").write_text("extends: one\nnetwork_of: one\n")
     read = Project(base, {"compare": ["read"]}).comparison.input_files()

@@ -23,7 +23,7 @@ rule measure:
         ),
     params:
         configuration=lambda w: w.configuration,
-        package=lambda w: measurements.package_of(w.measure),
+        module=lambda w: measurements.module_of(w.measure),
         splits=lambda w: measurements.splits(w.configuration, w.measure),
         people=lambda w: measurements.people(w.configuration, w.measure),
         runtime=lambda w: measurements.runtime(w.configuration, w.measure),
@@ -56,7 +56,7 @@ rule measure_piece:
     params:
         configuration=lambda w: w.configuration,
         piece=lambda w: w.piece,
-        package=lambda w: measurements.package_of(w.measure),
+        module=lambda w: measurements.module_of(w.measure),
         splits=lambda w: measurements.splits(w.configuration, w.measure),
         people=lambda w: measurements.people(w.configuration, w.measure),
         runtime=lambda w: measurements.runtime(w.configuration, w.measure),
@@ -85,7 +85,6 @@ rule compare:
         runtime=10,
     params:
         configurations=lambda w: comparison.names(),
-        files=lambda w: sorted(comparison.input_files()),
-        code=package.code("compare", *names_of_modules("comparison")),
+        code=package.code("compare", *measurements.shown_modules()),
     script:
         "../scripts/compare.py"

@@ -60,7 +60,7 @@ rule pipeline_summary:
     """The cost of each stage: seconds and memory from its benchmark files, bytes from its output files."""
     input:
         # The script does not read these inputs. They only make this rule run after the jobs whose costs it sums up.
-        expand(rules.measure.output.json, measure=MEASURES, allow_missing=True),
+        lambda w: measurements.result_files(w.configuration),
         rules.generate.output.scenarios,
     output:
         json="results/{configuration}/pipeline.json",
@@ -80,9 +80,7 @@ rule pipeline_summary:
 rule report:
     """The report of a configuration as one HTML file."""
     input:
-        measurements=expand(
-            rules.measure.output.json, measure=MEASURES, allow_missing=True
-        ),
+        measurements=lambda w: measurements.result_files(w.configuration),
         pipeline=rules.pipeline_summary.output.json,
         scenarios=rules.generate.output.scenarios,
         configuration=rules.configuration.output.yaml,
@@ -133,7 +131,7 @@ rule report:
         code=lambda w: package.code(
             "report",
             configurations.model_package(w.configuration),
-            *names_of_modules("page"),
+            *measurements.shown_modules(),
             *display_modules(),
         ),
     script:
@@ -159,7 +157,7 @@ rule report_compare:
         runtime=10,
     params:
         configurations=lambda w: comparison.names(),
-        code=package.code("report_compare", *names_of_modules("comparison_page")),
+        code=package.code("report_compare", *measurements.shown_modules()),
     script:
         "../scripts/report_compare.py"
 

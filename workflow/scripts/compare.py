@@ -4,18 +4,18 @@ from pathlib import Path
 
 import yaml
 
-from hobble.core.files import write_json
-from hobble.evaluation.compare_configurations import compare_configurations
-from hobble.evaluation.comparison_csv import comparison_tables
-from hobble.evaluation.configuration_results import read_results
-from hobble.evaluation.csv_tables import write_tables
+from hobble.core.files import write_json, write_tables
+from hobble.measures.compare import compare_configurations, comparison_tables, read_results
 from hobble.workflow.job import job
 
 with job(snakemake):
     files = snakemake.input
     results = [
-        read_results(name, {key: files[key][i] for key in snakemake.params.files})
-        for i, name in enumerate(snakemake.params.configurations)
+        # Its measurements are the files results/<name>/evaluation/<measure>.json.
+        read_results(name, *paths, [f for f in files.measurements if Path(f).parts[-3] == name])
+        for name, *paths in zip(
+            snakemake.params.configurations, files.configuration, files.pipeline, files.history, strict=True
+        )
     ]
     published = yaml.safe_load(Path(files.published).read_text(encoding="utf-8"))
     comparison = compare_configurations(results, published)

@@ -7,6 +7,5 @@ from hobble.workflow.measure_job import inputs_of_job, measure_of
 with job(snakemake):
     measure = measure_of(snakemake)
     options = measure.options.model_validate(snakemake.params.options)
-    module = measure.import_module("run")  # run.py in the package of the measurement
-    result = module.run_piece(inputs_of_job(snakemake), options, snakemake.params.piece)
+    result = measure.runner().run_piece(inputs_of_job(snakemake), options, snakemake.params.piece)
     write_json(snakemake.output.json, result)

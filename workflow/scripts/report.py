@@ -3,6 +3,7 @@
 from pathlib import Path
 
 from hobble.core.files import write_text
+from hobble.measures.measure import all_measures
 from hobble.models.load import load_network
 from hobble.report.character import opening_walk, playable_with_recogniser
 from hobble.report.gather import gather
@@ -28,6 +29,7 @@ with job(snakemake):
         channels=files.channels,
         terrain=files.terrain,
         rows=files.rows,
+        measures=all_measures(),
     )
     description = material.network
     walks = packed_scenes(files.scenarios, description["skeleton"], description["channels"])

@@ -5,6 +5,7 @@ from pathlib import Path
 import yaml
 
 from hobble.core.files import read_json, write_text
+from hobble.measures.measure import all_measures
 from hobble.models.load import load_network
 from hobble.report.character import has_weights, playable_with_recogniser, rounding_error
 from hobble.report.compare_page import render_comparison
@@ -25,5 +26,5 @@ with job(snakemake):
                 errors[name] = rounding_error(network, runtime)
         seen.add(weights)
     bundle = Path(files.bundle).read_text(encoding="utf-8")
-    page = render_comparison(read_json(files.compared), characters, bundle, errors)
+    page = render_comparison(read_json(files.compared), characters, bundle, errors, all_measures())
     write_text(snakemake.output.html, page)

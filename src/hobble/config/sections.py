@@ -5,6 +5,8 @@ section that the stage reads, with keys, defaults, units and ranges. Sections ar
 plans its jobs, and each job gets its section as an instance of this class.
 """
 
+from typing import TYPE_CHECKING
+
 from hobble.core.section import (
     Finite,
     Gait,
@@ -17,9 +19,9 @@ from hobble.core.section import (
     Share,
 )
 from hobble.database.options import DatabaseOptions
-from hobble.evaluation.options import Evaluation
 from hobble.hurt.options import Hurt
 from hobble.labels.options import LabelOptions
+from hobble.measures.measure import all_measures, joined_options
 from hobble.motion.options import Download, MotionOptions
 from hobble.report import ReportOptions
 from hobble.runtime.options import Runtime
@@ -55,3 +57,8 @@ __all__ = [
 # Names of the configurations that are compared in results/compare/, unless --config compare=... names others:
 # the published networks, and the character that can be hurt.
 COMPARED = ("holden", "holden-xl", "holden-xt", "ava", "ava-m", "injured")
+
+if TYPE_CHECKING:  # a type checker cannot follow the class that is made below
+    Evaluation = Section
+else:
+    Evaluation = joined_options([measure.options for measure in all_measures()])

@@ -1,4 +1,4 @@
-"""Writes files completely or not at all, and reads JSON, npz and npy files that may be damaged.
+"""Writes files completely or not at all, and reads JSON, CSV, npz and npy files that may be damaged.
 
 A file is written under a temporary name and then renamed.
 """
@@ -8,19 +8,25 @@ from __future__ import annotations
 import contextlib
 import errno
 import glob
+import io
 import json
 import os
 import struct
 import zipfile
 import zlib
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import IO, Any
+from typing import IO, TYPE_CHECKING, Any
 
 import numpy as np
 
 from hobble.core.errors import HobbleError, InputError
 from hobble.core.untrusted import check_regular, printable, read_text
+
+if TYPE_CHECKING:
+    import pandas
+
+Json = Mapping[str, Any]  # what a JSON file holds
 
 # The compressed arrays of a file may together unpack to at most this. Hobble itself does not compress arrays.
 MAX_INFLATED_BYTES = 1 << 30
@@ -246,3 +252,62 @@ def check_header(file: IO[bytes], size: int) -> None:
         count *= length
     if dtype.hasobject or min(shape, default=0) < 0 or count * dtype.itemsize != size - file.tell():
         raise ValueError("an array has another size than its header says, or holds Python objects")
+
+
+def data_frame(rows: Sequence[Mapping[str, Any]]) -> pandas.DataFrame:
+    """A data frame with a row for each mapping of `rows`. Columns are in the order in which they first occur.
+
+    Values keep their types. An integer does not become a float if its column has no value in another row.
+    """
+    import pandas  # here, because the import takes 0.3 s and most jobs write no table
+
+    columns = list(dict.fromkeys(key for row in rows for key in row))
+    return pandas.DataFrame(
+        [[row.get(key) for key in columns] for row in rows], columns=columns, dtype=object
+    )
+
+
+def write_csv(path: str | Path, rows: Sequence[Mapping[str, Any]]) -> None:
+    """Write a CSV file with a header and a line for each row. Without rows, the file is empty.
+
+    A field is empty if its value is missing, None or NaN.
+    """
+    write_text(path, data_frame(rows).to_csv(index=False, lineterminator="\n") if rows else "")
+
+
+def write_tables(folder: str | Path, tables: Mapping[str, Sequence[Mapping[str, Any]]]) -> None:
+    """Write each table to <folder>/<name>.csv. Creates the folder. tables: name -> rows."""
+    Path(folder).mkdir(parents=True, exist_ok=True)
+    for name, rows in tables.items():
+        write_csv(Path(folder) / f"{name}.csv", rows)
+
+
+def read_numbers(path: str | Path) -> dict[str, list[float | None]]:
+    """Read a CSV file of numbers, such as history.csv, as column -> values.
+
+    The value of an empty, NaN or infinite cell is None. Raises InputError, which names the column and quotes
+    the cell, if a cell is not a number.
+    """
+    import pandas
+
+    try:
+        table = pandas.read_csv(
+            io.StringIO(read_text(path)), dtype=str, keep_default_na=False, index_col=False
+        )
+    except (pandas.errors.EmptyDataError, pandas.errors.ParserError) as error:
+        raise InputError(
+            path, f"not a table of numbers ({error})", fix="Delete the file and run again."
+        ) from None
+    return {str(name): [_number(path, str(name), text) for text in table[name]] for name in table.columns}
+
+
+def _number(path: str | Path, column: str, text: Any) -> float | None:
+    """The number in a cell; None if it is empty, NaN or infinite. text: NaN if the line has too few cells."""
+    if not isinstance(text, str) or not text.strip():
+        return None
+    try:
+        value = float(text)
+    except ValueError:
+        problem = f"column {column} holds {text!r:.80}, which is not a number"
+        raise InputError(path, problem, fix="Delete the file and run again.") from None
+    return value if abs(value) < float("inf") else None

@@ -1,33 +1,84 @@
-"""The description of a measurement, which the workflow reads when it plans its jobs.
+"""What a measurement is, what it is given and what it returns.
 
-A measurement is a package. Its `__init__` holds `MEASURE`, a `Measure`. It must not import anything slow,
-because planning imports it. The other modules of the package are found by name:
+The module `hobble.measures.<name>` holds MEASURE and may define these functions, all optional:
 
-- `run.py`: its function `run(inputs, options)` measures and returns an `Outcome` (see
-  `hobble.measures.inputs`). A long measurement may be split into pieces, which run as jobs of their own:
-  `run_piece(inputs, options, piece) -> Json` measures one piece, and `run` puts their results together;
-- `page.py`, if the report shows the measurement: how it shows it (see `hobble.report.templates`);
-- `comparison.py`, if the measurement is part of the comparison of several configurations: what it adds to
-  compare.json (see `hobble.evaluation.compare_configurations`);
-- `comparison_page.py`, if the page of this comparison shows the measurement: how it shows it (see
-  `hobble.report.templates`).
+- `section(found, material) -> PageSection`: its part of the report,
+- `figures(found, material) -> Iterable[KeyFigure]`: key figures for the top of the report,
+- `hints(found, material) -> Iterable[Hint]`: advice that follows from its numbers,
+- `compared(all_measured, published) -> ComparisonAddition`: what it adds to compare.json,
+- `tables(compared) -> Mapping[str, Sequence[Row]]`: CSV tables of the comparison, name -> rows,
+- `compared_section(compared) -> PageSection`: its part of the comparison page,
+- `compared_columns(compared) -> Iterable[OverviewColumn]`: columns of the table of configurations there,
+- `compared_verdicts(compared) -> Iterable[Verdict]`: sentences on which configuration is best.
+
+`found` is the measurement's JSON ({} if it was not run), `material` has all results of the configuration
+(`hobble.report.gather.ReportMaterial`), `compared` is the content of compare.json, and `all_measured` has the
+results of each configuration (`hobble.measures.compare`).
+
+The module `hobble.measures.<name>_run` has `run(inputs, options) -> Outcome`. A long measurement may be split
+into pieces, which run as jobs of their own: `run_piece(inputs, options, piece) -> Json` measures one piece,
+and `run` puts their results together.
 """
 
 from __future__ import annotations
 
+import functools
 import importlib
 import importlib.util
-from collections.abc import Sequence
-from dataclasses import dataclass
+import pkgutil
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
 from types import ModuleType
-from typing import Any, Protocol
+from typing import Any, Literal, Protocol
 
+import yaml
+from pydantic import Field, create_model
+
+from hobble import channels
+from hobble.core.errors import HobbleError
+from hobble.core.files import Json, read_json
 from hobble.core.section import Section
+from hobble.core.untrusted import read_yaml
 from hobble.runtime.options import Runtime
+
+Row = Mapping[str, object]  # a row of a CSV table: column -> number, text or None
 
 # Names of inputs: the network, the rows of the clips, summaries of these rows, the skeleton, and published
 # results. A measurement may also read the JSON of another measurement. This input has the name of the other.
 INPUTS = ("weights", "clips", "summaries", "skeleton", "published")
+SPLITS = ("train", "held_out")
+# The functions of old packages of measurements -> the module of the package in which they are.
+OLD_PARTS = {
+    "section": "page",
+    "figures": "page",
+    "hints": "page",
+    "compared": "comparison",
+    "tables": "comparison",
+    "compared_section": "comparison_page",
+    "compared_columns": "comparison_page",
+    "compared_verdicts": "comparison_page",
+}
+
+
+class SampleOptions(Section):
+    """The configuration key that all measurements of clips have (see `hobble.measures.sample`)."""
+
+    sample_frames: int = Field(
+        500_000,
+        gt=0,
+        description="about how many frames are measured at most; if the clips have more, a sample of "
+        "excerpts is drawn, so that each split, gait, speed and channel is in it",
+    )
+
+
+class JointOptions(Section):
+    """The option `joints`, which all measurements of joint positions have."""
+
+    joints: Literal["all", "equivalent"] = Field(
+        "all",
+        description="`equivalent`: only the joints that have a counterpart on the skeleton holden31",
+    )
 
 
 @dataclass(frozen=True)
@@ -64,30 +115,189 @@ class Pieces(Protocol):
 class Measure:
     """A measurement. Its JSON file and its folder of tables have its `name`, too.
 
-    package: full name of its package (`__name__`). inputs: what it reads, as names of INPUTS or of other
-    measurements. options: the model of its keys in a configuration's section `evaluation`. runtime: the keys
-    of the section `runtime` that it depends on. pieces: for a measurement that is split, the function that
-    returns the names of its pieces. people: whether it has to know who walks in which clip. cost: what its
-    job requests on a cluster.
+    module: full name of the module that holds it (`__name__`). inputs: what it reads, as names of INPUTS or
+    of other measurements. options: the model of its keys in a configuration's section `evaluation`. runtime:
+    the keys of the section `runtime` that it depends on. channel: it is only made for configurations with
+    this channel; "": for all. pieces: for a measurement that is split, the function that returns the names of
+    its pieces. people: whether it has to know who walks in which clip. cost: what its job requests on a
+    cluster.
     """
 
     name: str
-    package: str
+    module: str
     inputs: tuple[str, ...]
     options: type[Section] = Section
     runtime: tuple[str, ...] = ()
+    channel: str = ""
     pieces: Pieces | None = None
     people: bool = False
     cost: Cost = Cost()
 
-    def has_module(self, part: str) -> bool:
-        """Whether its package has a module named `part`, such as `page`."""
-        return importlib.util.find_spec(self.module_name(part)) is not None
+    @property
+    def is_package(self) -> bool:
+        """Whether it still has the old form, a package in a channel's folder."""
+        return self.module.startswith("hobble.channels.")
 
-    def module_name(self, part: str) -> str:
-        """Full name of the module `part` of its package."""
-        return f"{self.package}.{part}"
+    @property
+    def run_module(self) -> str:
+        """Full name of the module that measures."""
+        return f"{self.module}.run" if self.is_package else f"{self.module}_run"
 
-    def import_module(self, part: str) -> ModuleType | None:
-        """The module `part` of its package, imported; None if there is none."""
-        return importlib.import_module(self.module_name(part)) if self.has_module(part) else None
+    @property
+    def shown_modules(self) -> list[str]:
+        """Full names of the modules that show it and compare it."""
+        if not self.is_package:
+            return [self.module]
+        parts = [f"{self.module}.{part}" for part in dict.fromkeys(OLD_PARTS.values())]
+        return [part for part in parts if importlib.util.find_spec(part) is not None]
+
+    def runner(self) -> ModuleType:
+        """The module with `run` and, if there are pieces, `run_piece`."""
+        return importlib.import_module(self.run_module)
+
+    def function(self, name: str) -> Callable[..., Any] | None:
+        """One of the optional functions (see the top of this file); None if it does not have it."""
+        if not self.is_package:
+            return getattr(importlib.import_module(self.module), name, None)
+        part = f"{self.module}.{OLD_PARTS[name]}"
+        found = importlib.import_module(part) if part in self.shown_modules else None
+        return getattr(found, name.removeprefix("compared_"), None)
+
+
+@functools.cache
+def all_measures() -> tuple[Measure, ...]:
+    """All measurements, sorted by name: each module of this folder beside which there is a `<name>_run.py`.
+
+    They are imported here, so that the job of one measurement does not depend on the others' code.
+    """
+    package = __name__.rpartition(".")[0]
+    here = {module.name for module in pkgutil.iter_modules(importlib.import_module(package).__path__)}
+    names = sorted(name for name in here if f"{name}_run" in here)
+    found = [importlib.import_module(f"{package}.{name}").MEASURE for name in names]
+    for name in channels.CHANNEL_NAMES:
+        module = f"hobble.channels.{name}.measures"
+        if importlib.util.find_spec(module) is not None:
+            found += importlib.import_module(module).MEASURES
+    return tuple(found)
+
+
+def measure_named(name: str) -> Measure:
+    """The measurement with this name. Raises StopIteration if there is none."""
+    return next(entry for entry in all_measures() if entry.name == name)
+
+
+def functions(name: str) -> Iterator[tuple[str, Callable[..., Any]]]:
+    """(name of a measurement, its function `name`), for each measurement that has this function."""
+    for measure in all_measures():
+        if (function := measure.function(name)) is not None:
+            yield measure.name, function
+
+
+def joined_options(sections: Sequence[type[Section]]) -> type[Section]:
+    """A section class that has the keys of all `sections`.
+
+    Raises TypeError if two of the classes define the same key, unless they inherit it from the same base.
+    """
+    defined_in: dict[str, type] = {}  # key -> the class that defines it
+    for section in sections:
+        for key in section.model_fields:
+            # The last class in the order of inheritance: an inherited key counts as the base's.
+            definer = [c for c in section.__mro__ if key in getattr(c, "model_fields", {})][-1]
+            if defined_in.setdefault(key, definer) is not definer:
+                first, second = defined_in[key].__module__, definer.__module__
+                raise TypeError(f"{key} is a key of {first} and of {second}: rename one of them")
+    unique = list(dict.fromkeys(sections))
+    # Leave out a class from which another inherits. Python refuses it as a base in front of that other class.
+    bases = [s for s in unique if not any(other is not s and issubclass(other, s) for other in unique)]
+    # Reversed, because pydantic puts the fields of the last base first.
+    return create_model("Evaluation", __base__=tuple(bases[::-1]) or Section, __doc__="The measurements.")
+
+
+@dataclass(frozen=True)
+class MeasureInputs:
+    """The inputs of a measurement of one configuration. Those that its `Measure` does not ask for are empty.
+
+    configuration: its name. files: name of an input -> its file, such as the network or the JSON of another
+    measurement. clips: clip -> its file of rows. splits: clip -> "train" or "held_out". people: clip -> the
+    person who walks in it. If the person is not known, the clip, its mirror and the hurt clips made from it
+    count as one more person. summaries: the `hobble.rows.summary` file of each clip. runtime: the values of
+    the keys in `Measure.runtime`; the other keys have defaults. pieces: if the measurement was split into
+    pieces that ran as jobs of their own, name of a piece -> its JSON file.
+    """
+
+    configuration: str
+    files: Mapping[str, Path] = field(default_factory=dict, repr=False)
+    clips: Mapping[str, Path] = field(default_factory=dict, repr=False)
+    splits: Mapping[str, str] = field(default_factory=dict, repr=False)
+    people: Mapping[str, str] = field(default_factory=dict, repr=False)
+    summaries: Sequence[Path] = field(default=(), repr=False)
+    runtime: Runtime = field(default_factory=Runtime)
+    pieces: Mapping[str, Path] = field(default_factory=dict, repr=False)
+
+    def file(self, name: str) -> Path:
+        """The file of the input `name`. Raises HobbleError if the measurement's `inputs` do not list it."""
+        if name not in self.files:
+            raise HobbleError(
+                f"A measurement reads the input {name!r}, which its `Measure` does not list. "
+                "Add it to `inputs`."
+            )
+        return self.files[name]
+
+    @property
+    def weights(self) -> Path:
+        """The network's file."""
+        return self.file("weights")
+
+    @property
+    def skeleton(self) -> Json:
+        """The data set's skeleton: the content of config/skeletons/<name>.yaml."""
+        return read_yaml(self.file("skeleton")) or {}
+
+    @property
+    def published(self) -> Json:
+        """The content of published.yaml: published results with which ours are compared."""
+        return yaml.safe_load(self.file("published").read_text(encoding="utf-8"))
+
+    def measured_pieces(self) -> dict[str, Json]:
+        """Name of a piece -> its result, for each piece that ran as a job of its own."""
+        return {name: read_json(path) for name, path in self.pieces.items()}
+
+    def results_of(self, name: str) -> Json:
+        """The content of the JSON file of another measurement."""
+        return read_json(self.file(name))
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """The output of a measurement.
+
+    result: the content of <measure>.json. tables: name -> rows of <measure>/<name>.csv. log_line: a line for
+    the log.
+    """
+
+    result: Json = field(repr=False)
+    tables: Mapping[str, Sequence[Row]] = field(default_factory=dict, repr=False)
+    log_line: str = ""
+
+
+def sample_sentence(found: Json) -> str:
+    """A sentence that says which part of the clips was read; empty if all clips were read.
+
+    found: a measurement's JSON.
+    """
+    words = sample_in_words(found)
+    return f" Only a part of the clips was read: {words}." if words else ""
+
+
+def sample_in_words(found: Json) -> str:
+    """The size of the sample in words, as a part of a sentence; empty if all clips were measured.
+
+    found: a measurement's JSON.
+    """
+    sample = found.get("sample")
+    if not sample:
+        return ""
+    return (
+        f"{sample['excerpts']:,} of {sample['of_excerpts']:,} excerpts of at most 20 s, from "
+        f"{sample['clips']:,} of {sample['of']:,} clips, drawn by gait, speed, channel and split"
+    )

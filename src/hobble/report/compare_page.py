@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from hobble.figure.pack import packed_body
@@ -23,6 +23,7 @@ from hobble.report.parts import (
     format_bytes,
     format_duration,
     format_number,
+    join_sections,
     line_trace,
     log_axis,
 )
@@ -31,9 +32,7 @@ from hobble.report.sections import log_range
 from hobble.report.templates import (
     FOLDER,
     chart_specs,
-    compared_columns,
-    compared_sections,
-    compared_verdicts,
+    compared_by,
     load_template,
     mark_safe,
     page_style,
@@ -49,6 +48,7 @@ def render_comparison(
     playables: Mapping[str, Mapping[str, Any]] | None = None,
     bundle: str = "",
     errors: Mapping[str, float] | None = None,
+    measures: Sequence[Any] = (),
 ) -> str:
     """The comparison as one HTML document.
 
@@ -56,19 +56,21 @@ def render_comparison(
     moves in the page, from `playable_data` in `hobble.report.character`. If these characters do not all fit
     into the page, the weights of all of them are rounded to 8 bits. Characters that still do not fit are left
     out. bundle: all scripts of the page as one script. errors: configuration -> mean distance in cm by which
-    rounding the weights moves a predicted joint.
+    rounding the weights moves a predicted joint. measures: all measurements, for what they show.
     """
     errors = errors or {}
+    columns = compared_by(measures, "compared_columns", compared)
+    verdicts = [v for each in compared_by(measures, "compared_verdicts", compared) for v in each]
     sections: dict[str, dict[str, Any]] = {
         "overview": {
-            "verdicts": compared_verdicts(compared),
-            "table": configuration_table(compared),
+            "verdicts": sorted(verdicts, key=lambda verdict: verdict.order),
+            "table": configuration_table(compared, [column for each in columns for column in each]),
             "published": published_table(compared),
         },
         "training": {"curves": training_curves(compared)},
         "stages": {"charts": stage_charts(compared)},
     }
-    measurements = compared_sections(compared)
+    measurements = join_sections(compared_by(measures, "compared_section", compared))
     names = configuration_names(compared)
     charts = chart_specs([sections, measurements])
     # Configurations with the same skeleton share a body. Its key is in the entry `body` of a character.
@@ -203,23 +205,10 @@ LONGER_NAMES = {
     "database": "database, on disk",
     "weights of 50 phases": "weights of 50 phases, as the code of Holden et al. stores them",
 }
-# Columns of the table of pairs of configurations: (key in compare.json, heading). "one" and "other" are the
-# two configurations of a pair. "sd of frames" is the standard deviation over single frames. "sd of means" is
-# that of the means of clips, or, for frame times, of the means of laps on the test track.
-PAIR_COLUMNS = (
-    ("mean_a", "mean, one"),
-    ("sd_a", "sd of frames, one"),
-    ("sd_of_means_a", "sd of means, one"),
-    ("mean_b", "mean, other"),
-    ("sd_b", "sd of frames, other"),
-    ("sd_of_means_b", "sd of means, other"),
-    ("difference", "eq. 3.2, frames"),
-    ("difference_of_means", "eq. 3.2, means"),
-)
 
 
-def configuration_table(compared: Compared) -> Table:
-    """A row for each configuration: its settings and the main results of its measurements."""
+def configuration_table(compared: Compared, measured: Sequence[OverviewColumn]) -> Table:
+    """A row for each configuration: its settings, and the columns `measured` of its measurements."""
     entries = {entry["configuration"]: entry for entry in compared["configurations"]}
 
     def by_name(key: str) -> dict[str, Any]:
@@ -228,7 +217,7 @@ def configuration_table(compared: Compared) -> Table:
 
     channel_names = {name: ", ".join(channels) or "none" for name, channels in by_name("channels").items()}
     columns = [
-        *compared_columns(compared),
+        *measured,
         OverviewColumn(50, Column("channels"), channel_names),
         OverviewColumn(60, Column("data set"), by_name("dataset")),
         OverviewColumn(80, Column.count("layers"), by_name("hidden_layers")),
@@ -239,26 +228,6 @@ def configuration_table(compared: Compared) -> Table:
     rows = [[name, *(column.values.get(name) for column in columns)] for name in entries]
     heads = [Column("configuration"), *(column.column for column in columns)]
     return Table("compare-configurations", heads, rows, "The configurations")
-
-
-def difference_table(compared: Compared) -> Table | None:
-    """Errors and frame times of each pair of configurations, and their difference; None without pairs.
-
-    By eq. 3.2 of Segerstedt (2021), the difference of two means is divided by the mean of their standard
-    deviations. One column has the result for deviations over single frames, another for those over means of
-    clips or laps.
-    """
-    pairs = [("error", r) for r in compared["difference"]]
-    pairs += [("mean ms a frame", r) for r in compared["milliseconds"].get("difference", ())]
-    rows = [
-        [r["a"], r["b"], f"{what}, {r['over'].replace('_', ' ')}", *(r.get(key) for key, _ in PAIR_COLUMNS)]
-        for what, r in pairs
-    ]
-    if not rows:
-        return None
-    columns = [Column("one"), Column("other"), Column("measured")]
-    columns += [Column.number(label) for _, label in PAIR_COLUMNS]
-    return Table("compare-difference", columns, rows, "Differences between all pairs")
 
 
 def published_table(compared: Compared) -> Table:

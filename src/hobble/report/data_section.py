@@ -13,12 +13,11 @@ from hobble.channels import channel
 from hobble.channels.shown import shown_names
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
-from hobble.measures.stratified_sample import shuffle_key
 from hobble.motion.check_retarget import MOST_DIFFERENCE, most_different
 from hobble.report.gather import ReportMaterial
 from hobble.report.parts import Chart, Column, Table, Trace, axis, format_bytes
 from hobble.rows.clip_rows import row_count
-from hobble.rows.excerpts import Excerpt, cut_into_excerpts, load_excerpt
+from hobble.rows.excerpts import Excerpt, cut_into_excerpts, load_excerpt, shuffle_key
 from hobble.rows.layout import GAITS
 
 MOST_SHOWN = 150  # at most this many clips have label curves, a row in the table and views of their ground

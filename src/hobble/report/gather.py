@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from hobble.core.files import read_json
+from hobble.core.files import Json, read_json, read_numbers
 from hobble.core.untrusted import read_yaml
-from hobble.evaluation.csv_tables import read_numbers
-from hobble.evaluation.pipeline_results import Pipeline
-from hobble.measures.inputs import Json
 from hobble.models.load import load_network
+from hobble.report.pipeline_results import Pipeline
 
-PUBLISHED = Path(__file__).parents[1] / "evaluation" / "published.yaml"
+PUBLISHED = Path(__file__).with_name("published.yaml")
 # Columns of the training history. Each further column has the held-out error of one block of the network's
 # output Y. A block is a group of columns of Y, such as the joint positions.
 GENERAL_COLUMNS = ("pass", "section", "samples", "seconds", "train_mse", "held_out_mse")
@@ -31,6 +29,7 @@ class ReportMaterial:
     network: from `describe_network`. motion: the report on each clip's motion. labels: the report on each
     clip's labels, in the same order. channels: a report for each clip and channel. terrain_files,
     row_files: paths of the files with the clips' terrain fits and rows. published: content of published.yaml.
+    measures: all measurements, for what they show (`hobble.report.templates`).
     """
 
     name: str
@@ -48,6 +47,7 @@ class ReportMaterial:
     terrain_files: list[str] = field(repr=False)
     row_files: list[str] = field(repr=False)
     published: Mapping[str, Any] = field(repr=False)
+    measures: Sequence[Any] = field(default=(), repr=False)
 
     def split_of(self, clip: str) -> str:
         """The split of a clip, "train" or "held_out"."""
@@ -84,8 +84,9 @@ def gather(
     channels: Iterable[str],
     terrain: Iterable[str] = (),
     rows: Iterable[str] = (),
+    measures: Sequence[Any] = (),
 ) -> ReportMaterial:
-    """Read the files of a report. All arguments after `splits` are paths.
+    """Read the files of a report. All arguments after `splits` are paths, but `measures`.
 
     Raises InputError, which names the file, if one cannot be read.
     """
@@ -105,6 +106,7 @@ def gather(
         terrain_files=list(terrain),
         row_files=list(rows),
         published=read_yaml(PUBLISHED),
+        measures=measures,
     )
 
 

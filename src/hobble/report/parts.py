@@ -286,7 +286,7 @@ def with_order(order: int, hints: Iterable[Hint]) -> Iterator[Hint]:
 def citation(row: Mapping[str, Any], sources: Mapping[str, str]) -> str:
     """Source and table of a published number. If its publication also gives another value, this is added.
 
-    row: the number's entry in `hobble/evaluation/published.yaml`. sources: key of a source -> its authors and
+    row: the number's entry in `hobble/report/published.yaml`. sources: key of a source -> its authors and
     year.
 
     >>> citation({"source": "a", "table": "5.2", "other_figure": "3 in Appendix A"}, {"a": "Author (2021)"})

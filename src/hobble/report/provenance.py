@@ -14,12 +14,12 @@ from pathlib import Path
 from typing import Any
 
 from hobble.core.errors import InputError
+from hobble.core.files import read_numbers
 from hobble.core.processors import processor_name
 from hobble.database.manifest import FILE as MANIFEST
 from hobble.database.manifest import Manifest
 from hobble.database.sizes import Sizes, database_sizes
-from hobble.evaluation.csv_tables import read_numbers
-from hobble.evaluation.pipeline_results import JobTotal, Machine, Pipeline, StageTotal
+from hobble.report.pipeline_results import JobTotal, Machine, Pipeline, StageTotal
 from hobble.workflow.kept_files import recorded_seconds
 
 WEB = Path(__file__).parent / "web"  # the page's scripts

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import importlib
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -17,9 +16,7 @@ from hobble.report.parts import (
     ChartPair,
     Hint,
     KeyFigure,
-    OverviewColumn,
     PageSection,
-    Verdict,
     format_bytes,
     format_duration,
     format_number,
@@ -83,50 +80,29 @@ def mark_safe(name: str, text: str) -> Markup:
 
 def measured_sections(material: ReportMaterial) -> list[PageSection]:
     """The sections of the report that show measurements."""
-    return join_sections(
-        show(material.results_of(name), material) for name, show in _functions("page", "section")
-    )
+    return join_sections(_of_each(material, "section"))
 
 
 def measured_figures(material: ReportMaterial) -> list[KeyFigure]:
     """The key figures that measurements have for the top of the report."""
-    return [
-        f for name, show in _functions("page", "figures") for f in show(material.results_of(name), material)
-    ]
+    return [figure for shown in _of_each(material, "figures") for figure in shown]
 
 
 def measured_hints(material: ReportMaterial) -> list[Hint]:
     """The advice that follows from the numbers of the measurements."""
-    return [
-        h for name, show in _functions("page", "hints") for h in show(material.results_of(name), material)
-    ]
+    return [hint for shown in _of_each(material, "hints") for hint in shown]
 
 
-def compared_sections(compared: Json) -> list[PageSection]:
-    """The sections of the comparison page that show measurements."""
-    return join_sections(show(compared) for _, show in _functions("comparison_page", "section"))
+def _of_each(material: ReportMaterial, name: str) -> Iterator[Any]:
+    """What the function `name` of each measurement returns."""
+    for measure in material.measures:
+        if (show := measure.function(name)) is not None:
+            yield show(material.results_of(measure.name), material)
 
 
-def compared_verdicts(compared: Json) -> list[Verdict]:
-    """Sentences on which configuration is best in some respect, in the order of the page."""
-    verdicts = [
-        verdict for _, show in _functions("comparison_page", "verdicts") for verdict in show(compared)
-    ]
-    return sorted(verdicts, key=lambda verdict: verdict.order)
+def compared_by(measures: Iterable[Any], name: str, compared: Json) -> list[Any]:
+    """What the function `name` of each measurement returns for compare.json.
 
-
-def compared_columns(compared: Json) -> list[OverviewColumn]:
-    """The columns that measurements add to the table of configurations. They are not sorted yet."""
-    return [column for _, show in _functions("comparison_page", "columns") for column in show(compared)]
-
-
-def _functions(module: str, name: str) -> Iterator[tuple[str, Callable[..., Any]]]:
-    """Find the function `name` in the modules of this name of all measurements.
-
-    module: "page" or "comparison_page". Yields (name of the measurement, function). A measurement without
-    the module or the function is left out.
+    measures: of the type `hobble.measures.measure.Measure`, which says what functions there are.
     """
-    # By name, because measurements import this package.
-    for measure in importlib.import_module("hobble.measures.registry").MEASURES:
-        if (function := getattr(measure.import_module(module), name, None)) is not None:
-            yield measure.name, function
+    return [show(compared) for measure in measures if (show := measure.function(name)) is not None]

@@ -6,6 +6,7 @@ equal length. A short clip is one excerpt.
 
 from __future__ import annotations
 
+import hashlib
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
@@ -102,3 +103,8 @@ def load_excerpt(path: str | Path, excerpt: Excerpt, before: int = 0, after: int
             path, f"does not have as many rows as its summary says ({excerpt.clip_rows})", fix=DELETE_IT
         )
     return rows
+
+
+def shuffle_key(name: str) -> bytes:
+    """A key for sorting names. The order looks random, but a new name does not change that of the others."""
+    return hashlib.sha256(name.encode()).digest()

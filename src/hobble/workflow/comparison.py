@@ -6,7 +6,7 @@ from typing import Any
 
 from hobble.core.errors import HobbleError
 from hobble.workflow.configurations import Configurations
-from hobble.workflow.measurements import NAMES, result_file
+from hobble.workflow.measurements import Measurements
 
 COMPARE = "compare"  # name of a folder in results/, and of a key of --config
 
@@ -17,8 +17,8 @@ class ComparedConfigurations:
     value: what the command line says after `compare=`, not yet checked.
     """
 
-    def __init__(self, configurations: Configurations, value: Any) -> None:
-        self.configurations, self._value = configurations, value
+    def __init__(self, configurations: Configurations, measurements: Measurements, value: Any) -> None:
+        self.configurations, self.measurements, self._value = configurations, measurements, value
 
     def names(self) -> list[str]:
         """The names of the configurations. Raises HobbleError if the value is not a list of names."""
@@ -32,14 +32,15 @@ class ComparedConfigurations:
         return list(names)
 
     def input_files(self) -> dict[str, list[str]]:
-        """Input files of the comparison: kind of file or name of a measurement -> paths.
+        """Input files of the comparison: kind of file -> paths.
 
-        Each list has one path for each compared configuration, in the order of `names`.
+        Each list has one path for each compared configuration, in the order of `names`. Only "measurements"
+        has all results of all of them.
         """
         names = self.names()
         return {
             "configuration": [f"results/{name}/configuration.yaml" for name in names],
             "pipeline": [f"results/{name}/pipeline.json" for name in names],
             "history": [self.configurations.network(name, "history.csv") for name in names],
-            **{measure: [result_file(name, measure) for name in names] for measure in NAMES},
+            "measurements": [file for name in names for file in self.measurements.result_files(name)],
         }

@@ -9,8 +9,7 @@ import importlib
 from pathlib import Path
 from typing import Any
 
-from hobble.measures.inputs import MeasureInputs
-from hobble.measures.measure import Measure
+from hobble.measures.measure import Measure, MeasureInputs
 from hobble.runtime.options import Runtime
 
 LIST_INPUTS = ("clips", "summaries", "pieces")  # names of the inputs that may have several files
@@ -19,10 +18,10 @@ LIST_INPUTS = ("clips", "summaries", "pieces")  # names of the inputs that may h
 def measure_of(job: Any) -> Measure:
     """The job's measurement. job: the object that Snakemake gives to scripts.
 
-    Only this measurement's package is imported. A job runs again if code that its script imports changes. So
+    Only this measurement's module is imported. A job runs again if code that its script imports changes. So
     if the script imported all measurements, each new one would make all others run again.
     """
-    return importlib.import_module(job.params.package).MEASURE
+    return importlib.import_module(job.params.module).MEASURE
 
 
 def inputs_of_job(job: Any) -> MeasureInputs:

@@ -7,13 +7,13 @@ from __future__ import annotations
 
 from typing import Any
 
-from hobble.measures.registry import MEASURES, measure_named
+from hobble.measures.measure import all_measures, measure_named
 from hobble.runtime.options import Runtime
 from hobble.workflow.clips import Clips, original
 from hobble.workflow.configurations import Configurations
 from hobble.workflow.package import Package
 
-NAMES = tuple(each.name for each in MEASURES)  # the names of all measurements
+NAMES = tuple(each.name for each in all_measures())  # the names of all measurements
 
 
 def piece_file(configuration: str, name: str, piece: str) -> str:
@@ -34,6 +34,15 @@ class Measurements:
 
     def __init__(self, configurations: Configurations, clips: Clips, package: Package) -> None:
         self.configurations, self.clips, self.package = configurations, clips, package
+
+    def result_files(self, configuration: str) -> list[str]:
+        """Paths of the JSON files of all measurements that are made for the configuration."""
+        channels = ("", *self.configurations.channels(configuration))
+        return [result_file(configuration, one.name) for one in all_measures() if one.channel in channels]
+
+    def shown_modules(self) -> list[str]:
+        """Full names of the modules that show and compare measurements."""
+        return [module for one in all_measures() for module in one.shown_modules]
 
     def inputs(self, configuration: str, name: str) -> dict[str, str | list[str]]:
         """Name of each input of the measurement -> its file or files."""
@@ -93,9 +102,9 @@ class Measurements:
         keys = measure_named(name).runtime
         return self.configurations.section(configuration, "runtime", *keys) if keys else {}
 
-    def package_of(self, name: str) -> str:
-        """Full name of the measurement's Python package."""
-        return measure_named(name).package
+    def module_of(self, name: str) -> str:
+        """Full name of the Python module that holds the measurement."""
+        return measure_named(name).module
 
     def code(self, name: str, *modules: str, script: str = "measure") -> str:
         """Hash of the code of the measurement `name`.
@@ -103,4 +112,4 @@ class Measurements:
         modules: full names of modules that the code imports dynamically. script: name of the rule's script,
         without .py.
         """
-        return self.package.code(script, measure_named(name).module_name("run"), *modules)
+        return self.package.code(script, measure_named(name).run_module, *modules)

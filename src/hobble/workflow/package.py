@@ -34,7 +34,7 @@ class Package:
         """
         kinds = {".j2", ".css", ".js", ".yaml"}
         files = [str(path) for path in (self.folder / "report").iterdir() if path.suffix in kinds]
-        return sorted([*files, self.published_file()])
+        return sorted(files)
 
     def web_files(self, suffix: str) -> list[str]:
         """Paths of the report's files with a suffix: ".js" for scripts, ".json" for lists of npm packages."""
@@ -43,4 +43,4 @@ class Package:
 
     def published_file(self) -> str:
         """Path of the published results, such as errors and times, with which the report compares ours."""
-        return str(self.folder / "evaluation" / "published.yaml")
+        return str(self.folder / "report" / "published.yaml")

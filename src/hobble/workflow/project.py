@@ -43,9 +43,11 @@ class Project:
         self.batches = Batches(self.clips)
         self.datasets = Datasets(self.catalogue, self.clips)
         self.configurations = Configurations(self.catalogue, self.datasets)
-        self.comparison = ComparedConfigurations(self.configurations, config.get(COMPARE, list(COMPARED)))
         self.package = Package(base)
         self.measurements = Measurements(self.configurations, self.clips, self.package)
+        self.comparison = ComparedConfigurations(
+            self.configurations, self.measurements, config.get(COMPARE, list(COMPARED))
+        )
 
 
 def _mocap_folder(value: Any) -> Path:

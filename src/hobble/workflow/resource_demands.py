@@ -15,7 +15,7 @@ import re
 from pathlib import Path
 
 from hobble.channels import channel
-from hobble.measures.registry import measure_named
+from hobble.measures.measure import measure_named
 from hobble.models import model_of_kind
 from hobble.models.model import TrainedModel
 from hobble.rows.layout import RowLayout

@@ -19,9 +19,9 @@ from hobble.channels.injury.recognition.run import (
 )
 from hobble.core import quat
 from hobble.core.skeleton import Skeleton, forward_kinematics
-from hobble.evaluation.captured import Captured
-from hobble.evaluation.gait_features import gait_features
 from hobble.gait.discriminant import learn
+from hobble.measures.walks import gait_features
+from hobble.rows.captured import Captured
 from hobble.runtime.options import Runtime
 
 RUNTIME = Runtime(steering=1.0)

@@ -16,10 +16,8 @@ from hobble.channels.injury.crowd_severities import severity_inputs
 from hobble.channels.injury.response.cases import divided_severities, into_a_jog, second_injuries
 from hobble.channels.injury.response.run import GAITS, injury_response, largest_accelerations
 from hobble.channels.injury.response.sweep import SEVERITIES, sweeps
-from hobble.evaluation.captured import Captured
-from hobble.evaluation.crowd import SPEEDS, CrowdTarget, generate_walks
-from hobble.evaluation.pose_distance import mean_cycle, settling_seconds
-from hobble.evaluation.spearman import spearman
+from hobble.measures.walks import SPEEDS, CrowdTarget, generate_walks, mean_cycle, settling_seconds, spearman
+from hobble.rows.captured import Captured
 from hobble.runtime.options import Runtime
 
 RUNTIME = Runtime(steering=1.0)

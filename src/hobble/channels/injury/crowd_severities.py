@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from hobble.core.quat import Array
-from hobble.evaluation.crowd import channel_values
+from hobble.measures.walks import channel_values
 from hobble.models.network import Network
 
 INJURY = "injury"  # name of the channel

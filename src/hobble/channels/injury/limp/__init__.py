@@ -8,8 +8,7 @@ from __future__ import annotations
 from pydantic import Field
 
 from hobble.core.section import PositiveFloat
-from hobble.measures.measure import Cost, Measure
-from hobble.measures.sample_options import SampleOptions
+from hobble.measures.measure import Cost, Measure, SampleOptions
 from hobble.runtime.options import Runtime
 
 
@@ -21,7 +20,8 @@ class Options(SampleOptions):
 
 MEASURE = Measure(
     name="limp",
-    package=__name__,
+    module=__name__,
+    channel="injury",
     inputs=("weights", "clips", "summaries"),
     options=Options,
     runtime=tuple(Runtime.model_fields),

@@ -15,12 +15,12 @@ import numpy as np
 from hobble.channels.injury.crowd_severities import INJURY
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
-from hobble.evaluation.captured import captured_stretches, rotate_by_yaw
-from hobble.evaluation.crowd import FPS
 from hobble.gait.cycles import WalkCycles, join_walks, measure_cycles
 from hobble.gait.people import read_people
 from hobble.gait.profile import Profile, profile_of_walk
-from hobble.measures.clip_parts import ClipPart
+from hobble.measures.sample import ClipPart
+from hobble.measures.walks import FPS
+from hobble.rows.captured import captured_stretches, rotate_by_yaw
 from hobble.rows.clip_rows import ClipRows
 
 # A hurt version is a copy of a healthy clip that `hobble.hurt` made limp. Its name ends like this:

@@ -12,9 +12,9 @@ import numpy as np
 
 from hobble.channels.injury.crowd_severities import severity_inputs
 from hobble.core.quat import Array
-from hobble.evaluation.crowd import FPS, channel_values
 from hobble.gait.cycles import WalkCycles, measure_cycles
 from hobble.gait.profile import Profile, profile_of_walk
+from hobble.measures.walks import FPS, channel_values
 from hobble.models.network import Network
 from hobble.runtime.animation import ProceduralAnimation
 from hobble.runtime.options import Runtime

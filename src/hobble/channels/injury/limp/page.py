@@ -7,8 +7,8 @@ from typing import Any
 
 from hobble.channels.injury.response.page import with_spoken_links
 from hobble.channels.shown import shown_names
-from hobble.measures.clip_parts import sample_sentence
-from hobble.measures.inputs import Json
+from hobble.core.files import Json
+from hobble.measures.measure import sample_sentence
 from hobble.report.gather import ReportMaterial
 from hobble.report.parts import (
     Chart,

@@ -27,7 +27,6 @@ from hobble.channels.injury.limp.crowd_walks import FigureWalk, walk_figures
 from hobble.channels.injury.limp.with_other_channel import limps_together, named_together
 from hobble.core.errors import HobbleError
 from hobble.core.skeleton import Skeleton
-from hobble.evaluation.spearman import spearman
 from hobble.gait.comparison import compare_walk
 from hobble.gait.effect_sizes import EFFECTS, effects_of_people, measure_effects
 from hobble.gait.features import features
@@ -35,8 +34,9 @@ from hobble.gait.people import read_people
 from hobble.gait.profile import Profile, profile_of_walk
 from hobble.gait.recogniser import RIGHT, SIDES, examples_of_people
 from hobble.hurt.body_parts import part_of_link
-from hobble.measures.clip_parts import clip_parts, sample_to_measure, with_sample
-from hobble.measures.inputs import MeasureInputs, Outcome
+from hobble.measures.measure import MeasureInputs, Outcome
+from hobble.measures.sample import clip_parts, sample_to_measure, with_sample
+from hobble.measures.walks import spearman
 from hobble.models.load import load_network
 from hobble.models.network import Network
 from hobble.runtime.options import Runtime

@@ -1,12 +1,12 @@
 """Measures whether a classifier that learns from captured clips recognises hurt parts in generated walks."""
 
-from hobble.measures.measure import Cost, Measure
-from hobble.measures.sample_options import SampleOptions
+from hobble.measures.measure import Cost, Measure, SampleOptions
 from hobble.runtime.options import Runtime
 
 MEASURE = Measure(
     name="recognition",
-    package=__name__,
+    module=__name__,
+    channel="injury",
     inputs=("weights", "clips", "summaries", "published"),
     options=SampleOptions,
     runtime=tuple(Runtime.model_fields),

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from hobble.channels.injury.recognition.run import confusion_rows
-from hobble.evaluation.comparison_rows import ComparisonAddition, PublishedRow, published_row
-from hobble.evaluation.configuration_results import ConfigurationResults
-from hobble.measures.inputs import Json, Row
+from hobble.core.files import Json
+from hobble.measures.compare import ComparisonAddition, ConfigurationResults, PublishedRow, published_row
+from hobble.measures.measure import Row
 
 NAME = "recognition"  # name of the measurement
 

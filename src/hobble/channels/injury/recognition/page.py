@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from hobble.measures.clip_parts import sample_sentence
-from hobble.measures.inputs import Json
+from hobble.core.files import Json
+from hobble.measures.measure import sample_sentence
 from hobble.report.gather import ReportMaterial
 from hobble.report.parts import Chart, PageSection, SectionPart, Trace
 

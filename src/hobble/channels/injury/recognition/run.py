@@ -20,16 +20,14 @@ from hobble.channels.injury.limp.captured_limps import HURT_VERSION
 from hobble.channels.injury.recognition.results import RecognisedWindows, Recognition
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
-from hobble.evaluation.captured import Captured
-from hobble.evaluation.crowd import FPS, CrowdTarget, generate_walks
-from hobble.evaluation.gait_features import gait_features
 from hobble.gait.discriminant import Discriminant, learn
 from hobble.hurt.body_parts import part_of_link
-from hobble.measures.clip_parts import captured_motion, sample_to_measure, with_sample
-from hobble.measures.inputs import MeasureInputs, Outcome, Row
-from hobble.measures.sample_options import SampleOptions
+from hobble.measures.measure import MeasureInputs, Outcome, Row, SampleOptions
+from hobble.measures.sample import captured_motion, sample_to_measure, with_sample
+from hobble.measures.walks import FPS, CrowdTarget, gait_features, generate_walks
 from hobble.models.load import load_network
 from hobble.models.network import Network
+from hobble.rows.captured import Captured
 from hobble.runtime.options import Runtime
 
 INJURY = "injury"  # name of the channel
@@ -56,7 +54,7 @@ class InjuryWindow:
 
     clip: name of the captured clip or generated walk. hurt: the window's class, which is HEALTHY or the names
     of the links that hurt, joined by " and ". severity: the highest severity in the window. values: name ->
-    value of the features of `hobble.evaluation.gait_features`. quarter: from 0 to 3, the quarter of a
+    value of the features of `hobble.measures.walks.gait_features`. quarter: from 0 to 3, the quarter of a
     captured stretch in which the window lies; 0 in a generated walk.
     """
 

@@ -5,8 +5,7 @@ from __future__ import annotations
 from pydantic import Field
 
 from hobble.core.section import PositiveFloat
-from hobble.measures.measure import Cost, Measure
-from hobble.measures.sample_options import SampleOptions
+from hobble.measures.measure import Cost, Measure, SampleOptions
 from hobble.runtime.options import Runtime
 
 
@@ -19,7 +18,8 @@ class Options(SampleOptions):
 
 MEASURE = Measure(
     name="injury",
-    package=__name__,
+    module=__name__,
+    channel="injury",
     # The network, the rows of the clips, and summaries of these rows.
     inputs=("weights", "clips", "summaries"),
     options=Options,

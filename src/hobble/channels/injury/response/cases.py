@@ -19,11 +19,17 @@ from hobble.channels.injury.response.results import Divided, IntoAJog, SecondInj
 from hobble.channels.injury.response.sweep import WALK_IN
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
-from hobble.evaluation.crowd import FPS, CrowdTarget, Walks, generate_walks
-from hobble.evaluation.motion_measures import gait_measures
-from hobble.evaluation.pose_distance import distance_to_cycle, mean_cycle
-from hobble.evaluation.spearman import spearman
 from hobble.hurt.body_parts import part_of_link
+from hobble.measures.walks import (
+    FPS,
+    CrowdTarget,
+    Walks,
+    distance_to_cycle,
+    gait_measures,
+    generate_walks,
+    mean_cycle,
+    spearman,
+)
 from hobble.models.network import Network
 from hobble.runtime.options import Runtime
 

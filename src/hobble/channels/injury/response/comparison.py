@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from hobble.evaluation.comparison_rows import ComparisonAddition
-from hobble.evaluation.configuration_results import ConfigurationResults
-from hobble.measures.inputs import Json
+from hobble.core.files import Json
+from hobble.measures.compare import ComparisonAddition, ConfigurationResults
 
 NAME = "injury"  # the measurement
 COMPARED_KEYS = ("applies", "reason", "summary")  # of injury.json

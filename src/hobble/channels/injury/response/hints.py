@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from hobble.measures.inputs import Json
+from hobble.core.files import Json
 from hobble.report.parts import Hint, format_number
 
 

@@ -12,7 +12,7 @@ from typing import Any
 from hobble.channels.injury.response import page_cases as cases
 from hobble.channels.injury.response.hints import injury_hints
 from hobble.channels.shown import shown_names
-from hobble.measures.inputs import Json
+from hobble.core.files import Json
 from hobble.report.gather import ReportMaterial
 from hobble.report.parts import (
     Chart,

@@ -16,7 +16,7 @@ class SweepRow(TypedDict):
 
     gait: "walk" or "jog". direction: "rising" or "falling" severity.
 
-    Measures from `hobble.evaluation.motion_measures.gait_measures`: speed in cm/s; stance as a share of the
+    Measures from `hobble.measures.walks.gait_measures`: speed in cm/s; stance as a share of the
     frames; steps and hip_height in cm; knee and arm, how far each bends or swings, in degrees; lean of the
     trunk in degrees. An asymmetry is left minus right, divided by their mean.
 

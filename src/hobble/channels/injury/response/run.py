@@ -15,12 +15,12 @@ from hobble.channels.injury.response import Options
 from hobble.channels.injury.response.cases import divided_severities, into_a_jog, second_injuries
 from hobble.channels.injury.response.results import InjuryResponse, LinkResponse, Summary, SweepRow
 from hobble.channels.injury.response.sweep import SEVERITIES, sweeps
-from hobble.evaluation.captured import Captured
-from hobble.evaluation.crowd import SPEEDS
-from hobble.measures.clip_parts import captured_motion, sample_to_measure, with_sample
-from hobble.measures.inputs import MeasureInputs, Outcome, Row
+from hobble.measures.measure import MeasureInputs, Outcome, Row
+from hobble.measures.sample import captured_motion, sample_to_measure, with_sample
+from hobble.measures.walks import SPEEDS
 from hobble.models.load import load_network
 from hobble.models.network import Network
+from hobble.rows.captured import Captured
 from hobble.runtime.options import Runtime
 
 INJURY = "injury"  # name of the channel

@@ -17,10 +17,18 @@ import numpy as np
 from hobble.channels.injury.crowd_severities import severity_inputs
 from hobble.channels.injury.response.results import Response, SweepRow
 from hobble.core.skeleton import Skeleton
-from hobble.evaluation.crowd import FPS, CrowdTarget, Walks, generate_walks
-from hobble.evaluation.motion_measures import gait_measures
-from hobble.evaluation.pose_distance import cycle_frames, distance_to_cycle, mean_cycle, settling_seconds
-from hobble.evaluation.spearman import spearman
+from hobble.measures.walks import (
+    FPS,
+    CrowdTarget,
+    Walks,
+    cycle_frames,
+    distance_to_cycle,
+    gait_measures,
+    generate_walks,
+    mean_cycle,
+    settling_seconds,
+    spearman,
+)
 from hobble.models.network import Network
 from hobble.runtime.options import Runtime
 

@@ -15,8 +15,7 @@ import numpy as np
 
 from hobble.channels.injury.study.answers import FilmAnswer, ShownFilm, Study
 from hobble.channels.injury.study.films import without_side
-from hobble.core.files import write_text
-from hobble.evaluation.csv_tables import write_csv
+from hobble.core.files import write_csv, write_text
 
 NUMERALS = ("III", "IV", "V", "VI", "VII", "VIII", "IX", "X", "XI", "XII", "XIII", "XIV", "XV", "XVI")
 ALL = "all"  # stands for the number or the kind of a film in a row for several films or for all kinds

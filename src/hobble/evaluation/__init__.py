@@ -1,1 +1,0 @@
-"""The `evaluation` stage: what measurements share, and the comparison of configurations."""

@@ -1,0 +1,717 @@
+"""How well the network predicts the next frame, on training and held-out clips.
+
+The relative error of a joint (eq. 3.1 of Segerstedt 2021) is the distance between its predicted and its
+captured position, divided by its distance from the root. JSON files have it as a fraction, pages show it in
+%. `found` is the content of accuracy.json, or {} if accuracy was not measured.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from hobble.report.gather import ReportMaterial
+
+from collections.abc import Iterator, Sequence
+from itertools import combinations, product
+from typing import Any
+
+import numpy as np
+
+from hobble.core.files import Json
+from hobble.measures.compare import (
+    ComparisonAddition,
+    ConfigurationResults,
+    DifferenceOf,
+    PublishedRow,
+    compare_series,
+    published_row,
+)
+from hobble.measures.measure import SPLITS, Cost, JointOptions, Measure, Row, SampleOptions, sample_in_words
+from hobble.report.parts import SPLITS as SPLIT_LABELS
+from hobble.report.parts import (
+    Chart,
+    Column,
+    Compared,
+    Hint,
+    KeyFigure,
+    OverviewColumn,
+    PageSection,
+    Paragraph,
+    SectionPart,
+    Table,
+    TemplatePart,
+    Trace,
+    axis,
+    citation,
+    configuration_colours,
+    configuration_names,
+    dot_trace,
+    format_duration,
+    format_number,
+    reference_line,
+    with_order,
+)
+
+
+class Options(JointOptions, SampleOptions):
+    """The keys of this measurement in a configuration's section `evaluation`."""
+
+
+MEASURE = Measure(
+    name="accuracy",
+    module=__name__,
+    inputs=("weights", "clips", "summaries", "skeleton"),
+    options=Options,
+    # For each thousand frames: 12 MB and 0.2 s. At least 10 minutes.
+    cost=Cost(mb_per_1000_frames=12, seconds_per_1000_frames=0.2, least_minutes=10),
+)
+
+
+INTRODUCTION = (
+    "The network gets its input from a frame of a clip and predicts the next frame. The error is measured on "
+    "every frame that belongs to a gait cycle. Captured motion means the motion of the clip, also if it was "
+    "generated."
+)
+# Ending of a clip's name -> a sentence that explains it. Otherwise readers may take the number in _hurt1 for
+# a severity. Another ending may follow, as in walk_hurt1_mirror.
+ENDINGS = {
+    "_hurt1": " A clip whose name ends in _hurt1 is the first hurt version of a healthy clip; the number is "
+    "not its severity.",
+    "_mirror": " A clip whose name ends in _mirror is mirrored.",
+}
+COLOURS = {"train": "@muted", "held_out": "@accent"}  # split -> its colour in the charts
+NAMES = {"train": "training", "held_out": "held out"}  # split -> its name on the page
+# The keys of the 5th to 95th percentile of the error in accuracy.json.
+QUANTILES = ("p05", "p25", "p50", "p75", "p95")
+# Columns of the table of clips.
+CLIP_COLUMNS = ("clip", "split", "frames", "mean", "sd", "position_error_cm", *QUANTILES)
+
+
+def _rows(found: Json) -> list[dict[str, Any]]:
+    """The entries of the clips that were measured: held-out clips first, each split by rising error."""
+    rows = [row for row in found.get("clips", ()) if row.get("mean") is not None]
+    return sorted(rows, key=lambda row: (row["split"] != "held_out", row["mean"]))
+
+
+def _height(count: int) -> int:
+    """The height in pixels of a chart with a row for each of `count` clips."""
+    return max(260, 110 + 21 * count)
+
+
+def clip_bars(found: Json, material: ReportMaterial) -> Chart | None:
+    """A bar with the mean relative error of each clip, and a line at the published mean.
+
+    A whisker on each bar shows the standard deviation. None if no clip was measured.
+    """
+    rows = _rows(found)[::-1]  # plotly puts the first clip at the bottom
+    if not rows:
+        return None
+    traces = []
+    for split in ("held_out", "train"):
+        chosen = [row for row in rows if row["split"] == split]
+        traces.append(
+            {
+                "type": "bar",
+                "orientation": "h",
+                "name": NAMES[split],
+                "y": [row["clip"] for row in chosen],
+                "x": [100 * row["mean"] for row in chosen],
+                "error_x": {
+                    "type": "data",
+                    "symmetric": False,
+                    "array": [100 * (row.get("sd") or 0) for row in chosen],
+                    "arrayminus": [0 for _ in chosen],
+                    "color": "@faint",
+                    "thickness": 1,
+                    "width": 2,
+                },
+                "marker": {"color": COLOURS[split]},
+                "hovertemplate": "%{y}: %{x:.2f} %<extra></extra>",
+            }
+        )
+    shapes, notes = [], []
+    published = material.published_entry("accuracy")
+    if published:
+        shape, note = reference_line(100 * published["mean"], f"{published['label']}, published")
+        shapes, notes = [shape], [note]
+    order = [row["clip"] for row in rows]
+    return Chart(
+        "accuracy-clips",
+        "Error of each clip",
+        "The error of a joint is the distance between its predicted and its captured position, divided by "
+        "its distance from the root (eq. 3.1 of Segerstedt). Bars are means over frames and joints. Whiskers "
+        "are one standard deviation long."
+        + (
+            " Held-out clips come first: the network was not trained on them."
+            if any(row["split"] == "held_out" for row in rows)
+            else ""
+        ),
+        traces,
+        {
+            "xaxis": axis("relative error, %", rangemode="tozero"),
+            "yaxis": {"categoryorder": "array", "categoryarray": order, "automargin": True},
+            "shapes": shapes,
+            "annotations": notes,
+            "bargap": 0.35,
+            "barmode": "overlay",
+        },
+        height=_height(len(rows)),
+    )
+
+
+def clip_boxes(found: Json) -> Chart | None:
+    """A box for each clip: quantiles of its error over frames and joints. None if no clip has quantiles."""
+    rows = [row for row in _rows(found)[::-1] if quantiles(row)]  # plotly puts the first clip at the bottom
+    if not rows:
+        return None
+    traces = []
+    for split in ("held_out", "train"):
+        chosen = [row for row in rows if row["split"] == split]
+        if not chosen:
+            continue
+        values = [[100 * v for v in quantiles(row)] for row in chosen]  # type: ignore[union-attr]
+        low, q1, median, q3, high = (list(column) for column in zip(*values, strict=True))
+        traces.append(
+            {
+                "type": "box",
+                "orientation": "h",
+                "name": NAMES[split],
+                "y": [row["clip"] for row in chosen],
+                "lowerfence": low,
+                "q1": q1,
+                "median": median,
+                "q3": q3,
+                "upperfence": high,
+                "mean": [100 * row["mean"] for row in chosen],
+                "marker": {"color": COLOURS[split]},
+                "line": {"width": 1.4, "color": COLOURS[split] if split == "held_out" else "@faint"},
+                "fillcolor": "@accent-wash" if split == "held_out" else "@sunken",
+            }
+        )
+    return Chart(
+        "accuracy-boxes",
+        "Spread within each clip",
+        "Each box holds the middle half of the errors of a clip. The solid line in it is the median, "
+        "the dotted line the mean. Whiskers reach from the 5th to the 95th percentile. A box near zero with "
+        "a long whisker means that the clip is easy except for a few moments.",
+        traces,
+        {
+            "xaxis": axis("relative error, %", rangemode="tozero"),
+            "yaxis": {
+                "categoryorder": "array",
+                "categoryarray": [r["clip"] for r in rows],
+                "automargin": True,
+            },
+            "boxmode": "overlay",
+        },
+        height=_height(len(rows)),
+    )
+
+
+def quantiles(row: dict[str, Any]) -> list[float] | None:
+    """The 5th, 25th, 50th, 75th and 95th percentile of the relative error; None if one is missing.
+
+    row: the errors of a clip or a split, as in accuracy.json.
+    """
+    values = [row[key] for key in QUANTILES if row.get(key) is not None]
+    return values if len(values) == len(QUANTILES) else None
+
+
+def accuracy_table(found: Json, name: str) -> Table:
+    """A row for each clip that was measured: its number of frames and its errors. name: the configuration."""
+    columns = [
+        Column("clip"),
+        Column("split", lambda value: NAMES.get(value, value)),
+        Column.count("frames"),
+        Column.number("mean"),
+        Column.number("sd"),
+        Column.number("position error, cm"),
+    ]
+    rows = [
+        [r["clip"], r["split"], r.get("frames"), r["mean"], r.get("sd"), r.get("position_error_cm")]
+        for r in _rows(found)
+    ]
+    return Table(f"{name}-accuracy", columns, rows)
+
+
+def published_table(found: Json, material: ReportMaterial) -> Table:
+    """The errors of our network on both splits, followed by the published means."""
+    rows: list[list[Any]] = []
+    for split in ("held_out", "train"):
+        part = found.get(split) or {}
+        if part.get("mean") is not None:
+            what = f"{material.name}, {NAMES[split]} clips"
+            rows.append([what, part["mean"], part.get("sd"), part.get("position_error_cm"), "this report"])
+    sources = material.published["sources"]
+    for entry in material.published["accuracy"]:
+        rows.append([entry["label"], entry["mean"], None, None, citation(entry, sources)])
+    columns = [
+        Column("network"),
+        Column.number("mean error, as a fraction"),
+        Column.number("sd"),
+        Column.number("position error, cm"),
+        Column("source", kind="long"),
+    ]
+    return Table(f"{material.name}-published", columns, rows, "Comparison with published results")
+
+
+def section(found: Json, material: ReportMaterial) -> PageSection:
+    """Charts, tables, and a view of captured and predicted motion. Empty without measured clips."""
+    if not found.get("clips"):
+        return PageSection("accuracy", [])
+    # The first argument of each part is its place in the section, from 0 (top) to 100 (end).
+    return PageSection(
+        "accuracy",
+        [
+            SectionPart(0, Paragraph(INTRODUCTION + explain_endings(found) + describe_sample(found))),
+            SectionPart(9, Paragraph(caveat(found, material))),
+            SectionPart(10, published_table(found, material), open=True, short=True),
+            SectionPart(20, clip_bars(found, material), tall=True),
+            SectionPart(30, clip_boxes(found), tall=True),
+            SectionPart(60, accuracy_table(found, material.name)),
+            SectionPart(90, TemplatePart("captured.html.j2")),
+        ],
+        title="Accuracy",
+        order=10,
+        long=True,
+    )
+
+
+def explain_endings(found: Json) -> str:
+    """A sentence for each of the ENDINGS that a measured clip has; empty if there is none."""
+    clips = [row["clip"] for row in _rows(found)]
+    return "".join(text for ending, text in ENDINGS.items() if any(ending in clip for clip in clips))
+
+
+def caveat(found: Json, material: ReportMaterial) -> str:
+    """A paragraph: why these errors must not be compared with the published ones."""
+    # The number of measured frames, at 60 a second. Only gait cycles are measured, so the clips are longer.
+    frames = sum((found.get(split) or {}).get("frames") or 0 for split in ("held_out", "train"))
+    return (
+        "Do not compare these errors with the published ones as if the clips were the same. Ours are "
+        f"measured on {format_duration(frames / 60)} of gait cycles in the data set {material.dataset}, the "
+        "published ones on 80 clips of Holden et al. (2017). A small error may only mean that the clips are "
+        "easy to predict."
+    )
+
+
+def describe_sample(found: Json) -> str:
+    """Which part of the clips was measured, with confidence intervals; empty if all clips were measured."""
+    if not found.get("sample"):
+        return ""
+    means = [
+        f"{NAMES[split]} {100 * found[split]['mean']:.2f} ± {100 * found[split]['interval']['mean']:.2f} %"
+        for split in ("held_out", "train")
+        if (found.get(split) or {}).get("interval")
+    ]
+    return (
+        f" Measured on {sample_in_words(found)}, and weighted to represent all clips. 95 % confidence "
+        f"intervals of the means over all frames of all clips: {', '.join(means)}."
+    )
+
+
+def figures(found: Json, material: ReportMaterial) -> Iterator[KeyFigure]:
+    """The key figures: the error on each split that was measured."""
+    for at, split, label in (
+        (10, "held_out", "Error on held-out clips"),
+        (11, "train", "Error on training clips"),
+    ):
+        part = found.get(split)
+        if part and part.get("mean") is not None:
+            error = part.get("position_error_cm")
+            note = "of a joint's distance from the root"
+            note += f"; {_centimetres(error, split, material)}" if error is not None else ""
+            published = material.published_entry("accuracy") if split == "held_out" else None
+            if published:
+                mean = 100 * published["mean"]
+                note += f"; published for {published['label']}: {mean:.2f} %, on other clips"
+            yield KeyFigure(label, f"{100 * part['mean']:.2f}", "%", note, at)
+
+
+def _centimetres(error: float, split: str, material: ReportMaterial) -> str:
+    """The mean position error in words: of the predicted joints, and of the joints as the runtime draws them.
+
+    The runtime draws a joint halfway between its predicted position and its old position plus the predicted
+    velocity. This error is left out if the measurement `rollouts` has no roll-outs of one frame.
+
+    error: the error of the predicted joints, cm.
+    """
+    lengths = {entry["length"]: entry for entry in material.results_of("rollouts").get("lengths", ())}
+    drawn = (lengths.get(1, {}).get(split) or {}).get("position_error_cm")
+    if drawn is None:
+        return f"{format_number(error)} cm per joint on average"
+    drawn_text = f"{format_number(drawn)} cm as drawn (explained under Accuracy)"
+    return f"{format_number(error)} cm per joint as predicted; {drawn_text}"
+
+
+def hints(found: Json, material: ReportMaterial) -> Iterator[Hint]:
+    """How well the network generalises, and which clip has the largest error."""
+    # Places of hints (`Hint.order`): under 20 for advice on the data, 30 for advice on the network.
+    held_out = (found.get("held_out") or {}).get("mean")
+    yield from with_order(10 if held_out is None else 30, _generalisation(found))
+    yield from with_order(12, _worst_clip(found))
+
+
+def _generalisation(found: Json) -> Iterator[Hint]:
+    """A hint that compares the errors on held-out and training clips."""
+    train, held_out = (found.get(split) or {} for split in ("train", "held_out"))
+    if held_out.get("mean") is None:
+        yield Hint(
+            "warn",
+            "No clips were held out.",
+            "So the errors on this page do not show how well the network predicts new clips. List a few "
+            "clips under held_out in the data set.",
+        )
+        return
+    if not train.get("mean"):
+        return
+    ratio = held_out["mean"] / train["mean"]
+    if ratio > 1.5:
+        yield Hint(
+            "warn",
+            f"The error on held-out clips is {ratio:.1f} times the error on training clips.",
+            "The network overfits. Add more varied clips (speeds, turns, performers) before you make the "
+            "network larger or train it longer.",
+        )
+    elif ratio < 1.2:
+        yield Hint(
+            "good",
+            f"The error on held-out clips is {ratio:.2f} times the error on training clips, so the network "
+            "does not overfit.",
+            "A larger network may do better.",
+        )
+    else:
+        yield Hint(
+            "fact",
+            f"The error on held-out clips is {ratio:.2f} times the error on training clips.",
+            "That is usual.",
+        )
+
+
+def _worst_clip(found: Json) -> Iterator[Hint]:
+    """A hint on the clip with the largest error, if that is far above the median of all clips."""
+    rows = [row for row in found.get("clips", ()) if row.get("mean") is not None]
+    if len(rows) < 4:
+        return
+    median = float(np.median([row["mean"] for row in rows]))
+    worst = max(rows, key=lambda row: row["mean"])
+    if worst["mean"] > 1.8 * median:
+        # The section Labels does not show mirrored clips.
+        source = worst["clip"].removesuffix("_mirror")
+        whose = "its labels" if source == worst["clip"] else f"the labels of {source}, which it mirrors,"
+        yield Hint(
+            "note",
+            f"{worst['clip']} has the largest error,",
+            f"{worst['mean'] / median:.1f} times the median over all clips. "
+            f"Check {whose} in the section Labels.",
+        )
+
+
+NAME = "accuracy"  # name of the measurement
+# split -> its name in texts for users
+SPLIT_NAMES = {"train": "training", "held_out": "held-out"}
+
+
+def compared(all_measured: Sequence[ConfigurationResults], published: Json) -> ComparisonAddition:
+    """The errors of each configuration, the difference of each pair, and the published errors beside ours.
+
+    all_measured: the results of each configuration. published: the content of published.yaml.
+    """
+    return ComparisonAddition(
+        entries=[{"dataset": m.dataset, **m.results_of(NAME), "configuration": m.name} for m in all_measured],
+        about={m.name: {"joints": m.results_of(NAME)["joints"]} for m in all_measured},
+        differences=accuracy_differences(all_measured),
+        against_published=[
+            *_published_splits(all_measured, published),
+            *_published_clips(all_measured, published),
+        ],
+    )
+
+
+def tables(compared: Json) -> dict[str, list[Row]]:
+    """Name -> rows of a CSV table: the errors of every clip in every configuration.
+
+    compared: the content of compare.json.
+    """
+    rows: list[Row] = [
+        {"configuration": entry["configuration"], **row}
+        for entry in compared[NAME]
+        for row in ({key: clip.get(key) for key in CLIP_COLUMNS} for clip in entry["clips"])
+    ]
+    return {NAME: rows}
+
+
+def accuracy_differences(all_measured: Sequence[ConfigurationResults]) -> list[DifferenceOf]:
+    """The difference between the errors of each two configurations, by eq. 3.2 of Segerstedt 2021.
+
+    There is a row for each split and each clip on which both configurations were measured. `over` is the name
+    of this split or clip.
+    """
+    out: list[DifferenceOf] = []
+    for a, b in combinations(all_measured, 2):
+        errors_a, errors_b = ({**_errors_of_splits(m), **_errors_of_clips(m)} for m in (a, b))
+        for over in errors_a:
+            if over in errors_b and errors_a[over]["frames"] and errors_b[over]["frames"]:
+                differences = compare_series(errors_a[over], errors_b[over])
+                out.append({"a": a.name, "b": b.name, "over": over, **differences})
+    return out
+
+
+def _errors_of_splits(results: ConfigurationResults) -> dict[str, Json]:
+    """Split -> its errors over all frames, with the mean errors of its clips under `means`."""
+    found = results.results_of(NAME)
+    return {split: {**found[split], "means": clip_means(found, split)} for split in SPLITS}
+
+
+def clip_means(found: Json, split: str) -> list[float]:
+    """The mean error of each clip of a split that has one. found: the content of accuracy.json."""
+    return [c["mean"] for c in found["clips"] if c["split"] == split and c["mean"] is not None]
+
+
+def _published_splits(all_measured: Sequence[ConfigurationResults], published: Json) -> list[PublishedRow]:
+    """Published errors of each configuration, beside our errors on each split."""
+    by_name = {m.name: m for m in all_measured}
+    out = []
+    for row in published["accuracy"]:
+        results = by_name.get(row["configuration"])
+        for split in SPLITS:
+            ours = results.results_of(NAME)[split]["mean_of_clips"] if results else None
+            out.append(published_row(f"relative error, {SPLIT_NAMES[split]} clips", row, row["mean"], ours))
+            if "sd" in row:
+                # The standard deviation (sd) was printed in the text of the publication, not in its table.
+                in_text = {**row, "table": None}
+                means = clip_means(results.results_of(NAME), split) if results else []
+                sd = float(np.std(means)) if len(means) > 1 else None
+                what = f"standard deviation of the means of {SPLIT_NAMES[split]} clips"
+                out.append(published_row(what, in_text, row["sd"], sd))
+    return out
+
+
+def _published_clips(all_measured: Sequence[ConfigurationResults], published: Json) -> list[PublishedRow]:
+    """Published errors of single clips, beside the errors of each configuration on the same clips.
+
+    The files of the clips that Holden et al. (2017) released have names that end in _000; the published names
+    do not. Segerstedt (2021) published the errors of two networks: "segerstedt" is his own, "release" is the
+    network that Holden et al. released.
+    """
+    out = []
+    for row in published["clips"]:
+        for results in all_measured:
+            for clip in results.results_of(NAME)["clips"]:
+                if clip["clip"].removesuffix("_000") == row["clip"]:
+                    for source in ("segerstedt", "release"):
+                        entry = {"configuration": results.name, "source": source}
+                        what = f"relative error, {clip['clip']}"
+                        out.append(published_row(what, entry, row[source], clip["mean"]))
+    return out
+
+
+def _errors_of_clips(results: ConfigurationResults) -> dict[str, Json]:
+    """Clip -> its errors over all frames."""
+    return {entry["clip"]: entry for entry in results.results_of(NAME)["clips"]}
+
+
+# Columns of the table of pairs of configurations: (key in compare.json, heading). "one" and "other" are the
+# two configurations of a pair. "sd of frames" is the standard deviation over single frames. "sd of means" is
+# that of the means of clips, or, for frame times, of the means of laps on the test track.
+PAIR_COLUMNS = (
+    ("mean_a", "mean, one"),
+    ("sd_a", "sd of frames, one"),
+    ("sd_of_means_a", "sd of means, one"),
+    ("mean_b", "mean, other"),
+    ("sd_b", "sd of frames, other"),
+    ("sd_of_means_b", "sd of means, other"),
+    ("difference", "eq. 3.2, frames"),
+    ("difference_of_means", "eq. 3.2, means"),
+)
+# The difference between two configurations is the difference of their mean errors, divided by standard
+# deviations (sd; eq. 3.2 of Segerstedt 2021). compare.json has it twice, with different standard deviations.
+# Key of the difference -> what it is divided by, for the menu of the chart.
+DEVIATIONS = {"difference_of_means": "sd of the means of clips", "difference": "sd of single frames"}
+
+
+def compared_section(compared: Compared) -> PageSection:
+    """The spread of the errors, differences between configurations, and errors of single clips."""
+    # The first argument of each part is its place in the section, from 0 (top) to 100 (end).
+    return PageSection(
+        "accuracy",
+        [
+            SectionPart(10, error_boxes(compared)),
+            SectionPart(30, difference_map(compared)),
+            SectionPart(40, difference_table(compared)),
+            SectionPart(50, clip_dots(compared), tall=True),
+        ],
+        title="Accuracy",
+        order=10,
+        long=True,
+    )
+
+
+def compared_columns(compared: Compared) -> Iterator[OverviewColumn]:
+    """Columns for the table of configurations: the error on each split, and the number of measured joints."""
+    entries = {entry["configuration"]: entry for entry in compared["accuracy"]}
+    for at, split, label in ((10, "held_out", "held-out error"), (20, "train", "training error")):
+        values = {name: entry[split]["mean"] for name, entry in entries.items()}
+        yield OverviewColumn(at, Column(label, _percent, "n"), values)
+    yield OverviewColumn(
+        70, Column.count("joints"), {name: entry["joints"] for name, entry in entries.items()}
+    )
+
+
+def error_boxes(compared: Compared) -> Chart | None:
+    """A box for each configuration: the spread of its error over all frames of a split. A menu selects it."""
+    options: dict[str, list[Trace]] = {}
+    for split, label in SPLIT_LABELS.items():
+        traces: list[Trace] = []
+        for entry in compared["accuracy"]:
+            percentiles = quantiles(entry[split])
+            if percentiles is None:
+                continue
+            # In %. Each is a list, because plotly draws a box for each entry.
+            low, q1, median, q3, high = ([100 * value] for value in percentiles)
+            colour = configuration_colours(compared)[entry["configuration"]]
+            traces.append(
+                {
+                    "type": "box",
+                    "name": entry["configuration"],
+                    "x": [entry["configuration"]],
+                    "lowerfence": low,
+                    "q1": q1,
+                    "median": median,
+                    "q3": q3,
+                    "upperfence": high,
+                    "mean": [100 * entry[split]["mean"]],
+                    "boxmean": True,
+                    "marker": {"color": colour},
+                    "line": {"width": 1.6, "color": colour},
+                }
+            )
+        if traces:
+            options[label] = traces
+    published = [
+        row
+        for row in compared["published"]["accuracy"]
+        if row["configuration"] in configuration_names(compared)
+    ]
+    if not options:
+        return None
+    for traces in options.values():
+        if published:
+            traces.append(
+                {
+                    "type": "scatter",
+                    "mode": "markers",
+                    "name": "published mean",
+                    "x": [row["configuration"] for row in published],
+                    "y": [100 * row["mean"] for row in published],
+                    "marker": {"symbol": "diamond-open", "size": 10, "color": "@ink"},
+                    "hovertemplate": "%{x}: %{y:.2f} % published<extra></extra>",
+                }
+            )
+    return Chart(
+        "compare-boxes",
+        "Spread of the error",
+        "Each box holds the middle half of the relative errors of all frames (eq. 3.1 of Segerstedt). The "
+        "solid line is the median, the dashed line the mean. Whiskers reach from the 5th to the 95th "
+        "percentile. Diamonds are published means, measured on other data.",
+        layout={"yaxis": axis("relative error, %", rangemode="tozero"), "showlegend": False},
+        height=400,
+        choose="Clips",
+        options=options,
+    )
+
+
+def difference_table(compared: Compared) -> Table | None:
+    """Errors and frame times of each pair of configurations, and their difference; None without pairs.
+
+    By eq. 3.2 of Segerstedt (2021), the difference of two means is divided by the mean of their standard
+    deviations. One column has the result for deviations over single frames, another for those over means of
+    clips or laps.
+    """
+    pairs = [("error", r) for r in compared["difference"]]
+    pairs += [("mean ms a frame", r) for r in compared["milliseconds"].get("difference", ())]
+    rows = [
+        [r["a"], r["b"], f"{what}, {r['over'].replace('_', ' ')}", *(r.get(key) for key, _ in PAIR_COLUMNS)]
+        for what, r in pairs
+    ]
+    if not rows:
+        return None
+    columns = [Column("one"), Column("other"), Column("measured")]
+    columns += [Column.number(label) for _, label in PAIR_COLUMNS]
+    return Table("compare-difference", columns, rows, "Differences between all pairs")
+
+
+def clip_dots(compared: Compared) -> Chart | None:
+    """The mean error of every clip, a dot for each configuration."""
+    clips = {(row["split"], row["clip"]) for entry in compared["accuracy"] for row in entry["clips"]}
+    # Plotly puts the first clip at the bottom, so held-out clips come last.
+    order = [clip for _, clip in sorted(clips, key=lambda pair: (pair[0] == "held_out", pair[1]))]
+    if not order:
+        return None
+    traces = []
+    for entry in compared["accuracy"]:
+        rows = [row for row in entry["clips"] if row.get("mean") is not None]
+        traces.append(
+            dot_trace(
+                entry["configuration"],
+                [100 * row["mean"] for row in rows],
+                [row["clip"] for row in rows],
+                configuration_colours(compared)[entry["configuration"]],
+                "%{y}: %{x:.2f} %",
+            )
+        )
+    layout = {
+        "xaxis": axis("relative error, %", rangemode="tozero"),
+        "yaxis": {"categoryorder": "array", "categoryarray": order, "automargin": True, "type": "category"},
+    }
+    caption = "Each row is a clip, with one dot for each configuration. Held-out clips are at the top."
+    return Chart("compare-clips", "Error of each clip", caption, traces, layout, 130 + 19 * len(order))
+
+
+def difference_map(compared: Compared) -> Chart | None:
+    """The difference of each two configurations. A menu selects the split and the kind of deviation."""
+    configurations, options = configuration_names(compared), {}
+    for (split, label), (key, kind) in product(SPLIT_LABELS.items(), DEVIATIONS.items()):
+        values = {(r["a"], r["b"]): r[key] for r in compared["difference"] if r["over"] == split}
+        if all(value is None for value in values.values()):
+            continue
+        # compare.json has each pair in one order only, (a, b) or (b, a).
+        cells = [[values.get((a, b), values.get((b, a))) for b in configurations] for a in configurations]
+        options[f"{label}, {kind}"] = [
+            {
+                "type": "heatmap",
+                "x": configurations,
+                "y": configurations,
+                "z": cells,
+                "colorscale": [[0, "@sunken"], [1, "@accent"]],
+                "zmin": 0,
+                "texttemplate": "%{z:.2f}",
+                "xgap": 3,
+                "ygap": 3,
+                "showscale": False,
+                "hovertemplate": "%{y} and %{x}: %{z:.3f}<extra></extra>",
+            }
+        ]
+    if not options:
+        return None
+    layout = {
+        "xaxis": {"type": "category"},
+        "yaxis": {"type": "category", "autorange": "reversed", "automargin": True},
+    }
+    return Chart(
+        "compare-difference",
+        "Difference between two configurations",
+        "Eq. 3.2 of Segerstedt: twice the difference of the two means, divided by the sum of the two "
+        "standard deviations. Segerstedt uses the standard deviation of the clips' means. The standard "
+        "deviation of single frames is several times as large. A value of 1 says that the means are one "
+        "standard deviation apart. Our rule of thumb: differences under 0.2 are too small to matter.",
+        layout=layout,
+        height=max(240, 90 + 42 * len(configurations)),
+        choose="Clips and deviation",
+        options=options,
+    )
+
+
+def _percent(value: Any) -> str:
+    return f"{100 * float(value):.2f} %"

@@ -1,0 +1,331 @@
+"""Compares any number of configurations with each other and with published results."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Literal, TypedDict
+
+import numpy as np
+import yaml
+
+from hobble.core.files import Json, read_json, read_numbers
+from hobble.measures.measure import Row, functions
+from hobble.models import network_options
+
+
+def difference_in_sds(mean_a: float, sd_a: float, mean_b: float, sd_b: float) -> float | None:
+    """The difference of two means, in units of the mean of both standard deviations.
+
+    This is 2 |mean_a - mean_b| / (sd_a + sd_b), equation 3.2 of Segerstedt 2021. None if both standard
+    deviations are 0.
+
+    >>> difference_in_sds(3.0, 0.5, 1.0, 1.5)
+    2.0
+    """
+    deviations = sd_a + sd_b
+    return 2 * abs(mean_a - mean_b) / deviations if deviations > 0 else None
+
+
+class StraightLine(TypedDict):
+    """The line y = intercept + slope x. points: number of points. r2: coefficient of determination.
+
+    Unknown values are None.
+    """
+
+    slope: float | None
+    intercept: float | None
+    r2: float | None
+    points: int
+
+
+def fit_line(x: Sequence[float], y: Sequence[float]) -> StraightLine | None:
+    """The least-squares line through the points (x, y); None if x has fewer than two different values.
+
+    `r2` is None if all y are equal.
+    """
+    if len(set(x)) < 2:
+        return None
+    slope, intercept = np.polyfit(np.asarray(x, float), np.asarray(y, float), 1)
+    rest = np.asarray(y) - (intercept + slope * np.asarray(x, float))
+    spread = float(np.sum((np.asarray(y) - np.mean(y)) ** 2))
+    r2 = 1 - float(np.sum(rest**2)) / spread if spread > 0 else None
+    return {"slope": float(slope), "intercept": float(intercept), "r2": r2, "points": len(x)}
+
+
+@dataclass(frozen=True)
+class ConfigurationResults:
+    """The results of one configuration.
+
+    name: the configuration's name. resolved: the content of its configuration.yaml: all keys of the
+    configuration and of its data set, also those with default values. measurements: name of a measurement ->
+    the content of its JSON file. pipeline: the content of pipeline.json: time, memory and size of each stage
+    of the workflow. history: the content of history.csv, column -> a value for each pass of the training,
+    None for an empty field.
+    """
+
+    name: str
+    resolved: Json = field(repr=False)
+    measurements: Mapping[str, Json] = field(repr=False)
+    pipeline: Json = field(repr=False)
+    history: Mapping[str, list[float | None]] = field(repr=False)
+
+    def results_of(self, measure: str) -> Json:
+        """The content of the JSON file of a measurement; `applies` is false if it was not made."""
+        return self.measurements.get(measure, {"applies": False})
+
+    @property
+    def dataset(self) -> str:
+        """The name of the configuration's data set."""
+        return self.resolved["configuration"]["dataset"]
+
+    def stage_value(self, stage: str, key: Literal["seconds", "bytes"]) -> float | None:
+        """The value `key` of a stage in pipeline.json; None if it does not list the stage."""
+        return next((s[key] for s in self.pipeline["stages"] if s["stage"] == stage), None)
+
+
+def read_results(
+    name: str, configuration: str, pipeline: str, history: str, measurements: Sequence[str]
+) -> ConfigurationResults:
+    """Read one configuration's results. All arguments but its name are paths.
+
+    Raises InputError, which names the file, if a JSON file or the history cannot be read.
+    """
+    resolved = yaml.safe_load(Path(configuration).read_text(encoding="utf-8"))
+    by_name = {Path(path).stem: read_json(path) for path in measurements}
+    return ConfigurationResults(name, resolved, by_name, read_json(pipeline), read_numbers(history))
+
+
+@dataclass(frozen=True)
+class ComparisonAddition:
+    """What one measurement adds to compare.json.
+
+    entries: the results of each configuration, under the measurement's name. about: configuration -> entries
+    to add to its description. differences: rows such as `DifferenceOf`. against_published: rows from
+    `published_row`. milliseconds: what was measured with a clock, key -> rows. `difference` and
+    `against_published` are such keys, and a measurement may have others.
+    """
+
+    entries: Sequence[Json] = field(default=(), repr=False)
+    about: Mapping[str, Json] = field(default_factory=dict, repr=False)
+    differences: Sequence[Row] = field(default=(), repr=False)
+    against_published: Sequence[Row] = field(default=(), repr=False)
+    milliseconds: Mapping[str, Sequence[Row]] = field(default_factory=dict, repr=False)
+
+
+class Difference(TypedDict):
+    """Means and standard deviations (sd) of two series a and b, and their difference. See `compare_series`.
+
+    mean_a, sd_a, mean_b, sd_b: over single frames. sd_of_means_a, sd_of_means_b: standard deviation of the
+    means of single clips or laps.
+    """
+
+    mean_a: float
+    sd_a: float
+    mean_b: float
+    sd_b: float
+    difference: float | None
+    sd_of_means_a: float | None
+    sd_of_means_b: float | None
+    difference_of_means: float | None
+
+
+class DifferenceOf(Difference):
+    """The difference of two configurations, named `a` and `b`.
+
+    over: what was compared: a split, a clip or a phase mode (how the network looks up the phase).
+    """
+
+    a: str
+    b: str
+    over: str
+
+
+class PublishedRow(TypedDict):
+    """A published number next to ours. See `published_row`."""
+
+    measure: str
+    configuration: str
+    unit: str
+    published: float
+    ours: float | None
+    source: str
+    table: str | None
+    other_figure: str | None
+
+
+def compare_series(a: Json, b: Json) -> Difference:
+    """Means and standard deviations of two series, and their difference by eq. 3.2 of Segerstedt 2021.
+
+    a, b: have `mean` and `sd` over single frames, and may have `means`, the mean of each clip or lap.
+    `difference` is |mean_a - mean_b| in units of the average sd. `difference_of_means` is the same for the
+    means and the sd of `means`, as in the publication. It is None if a or b has fewer than two means.
+    """
+    means_of_both = [np.asarray(series.get("means", ()), float) for series in (a, b)]
+    sds = [float(values.std()) if len(values) > 1 else None for values in means_of_both]
+    difference_of_means = None
+    if sds[0] is not None and sds[1] is not None:
+        mean_a, mean_b = (float(values.mean()) for values in means_of_both)
+        difference_of_means = difference_in_sds(mean_a, sds[0], mean_b, sds[1])
+    return {
+        "mean_a": a["mean"],
+        "sd_a": a["sd"],
+        "mean_b": b["mean"],
+        "sd_b": b["sd"],
+        "difference": difference_in_sds(a["mean"], a["sd"], b["mean"], b["sd"]),
+        "sd_of_means_a": sds[0],
+        "sd_of_means_b": sds[1],
+        "difference_of_means": difference_of_means,
+    }
+
+
+def published_row(measure: str, row: Json, theirs: float, ours: float | None, unit: str = "") -> PublishedRow:
+    """A published number (`theirs`) next to ours, which is None if it was not measured.
+
+    measure: what was measured, in words. row: the entry of published.yaml. It has `configuration` and
+    `source`. It may have `table`, the number of the table that printed the value, and `other_figure`, a text
+    with a different value from the same publication.
+    """
+    return {
+        "measure": measure,
+        "configuration": row["configuration"],
+        "unit": unit,
+        "published": theirs,
+        "ours": ours,
+        "source": row["source"],
+        "table": row.get("table"),
+        "other_figure": row.get("other_figure"),
+    }
+
+
+def compare_configurations(all_measured: Sequence[ConfigurationResults], published: Json) -> Json:
+    """The content of compare.json. Configurations are in the order of `all_measured`.
+
+    published: the content of published.yaml. Keys of the result: `configurations`: a description of each.
+    `training`: the history of each training. `stages`: time, memory and size of each stage of the workflow.
+    The name of each measurement: its results. `difference`: how much each two configurations differ (eq. 3.2
+    of Segerstedt 2021). `against_published`: published numbers next to ours. `published`: all published
+    numbers. `milliseconds`: what was measured with a clock, with its own `difference` and
+    `against_published`.
+    """
+    by_measure = {name: compared(all_measured, published) for name, compared in functions("compared")}
+    times = ComparisonAddition(milliseconds={"against_published": stage_times(all_measured, published)})
+    additions = [*by_measure.values(), times]
+    clock_keys = dict.fromkeys(
+        key for added in additions for key in added.milliseconds
+    )  # each once, in order
+    return {
+        "configurations": [describe_configuration(m, by_measure.values()) for m in all_measured],
+        **{name: list(added.entries) for name, added in by_measure.items()},
+        "training": [{"configuration": m.name, **m.history} for m in all_measured],
+        "stages": [
+            {"configuration": m.name, **{k: v for k, v in stage.items() if k != "rules"}}
+            for m in all_measured
+            for stage in m.pipeline["stages"]
+        ],
+        "difference": [row for added in by_measure.values() for row in added.differences],
+        "against_published": [
+            *(row for added in by_measure.values() for row in added.against_published),
+            *stage_sizes(all_measured, published),
+        ],
+        "milliseconds": {
+            key: [row for added in additions for row in added.milliseconds.get(key, ())] for key in clock_keys
+        },
+        "published": dict(published),
+    }
+
+
+def describe_configuration(results: ConfigurationResults, additions: Iterable[ComparisonAddition]) -> Json:
+    """A configuration's entry in compare.json: data set, network, training, and what measurements add."""
+    configuration = results.resolved["configuration"]
+    hidden = network_options(configuration["network"]).hidden
+    about = {key: value for added in additions for key, value in added.about.get(results.name, {}).items()}
+    return {
+        "configuration": results.name,
+        "dataset": results.dataset,
+        "network_of": configuration.get("network_of"),
+        "channels": list(configuration.get("channels") or ()),
+        "hidden_layers": len(hidden) or None,
+        "units": max(hidden, default=None),
+        # Motion matching has no layers and is not trained, even if the section `training` has passes.
+        "passes": configuration["training"]["passes"] if hidden else None,
+        **about,
+    }
+
+
+def stage_sizes(all_measured: Sequence[ConfigurationResults], published: Json) -> list[PublishedRow]:
+    """Published sizes of the database and of the terrain patches, next to ours. Sizes are in bytes."""
+    by_name = {m.name: m for m in all_measured}
+    out = []
+    for row in published["stages"]:
+        m = by_name.get(row["configuration"])
+        if row["stage"] == "database":
+            database = m.pipeline.get("database") if m else None
+            ours: float | None = database["bytes"] if database else None
+            out.append(published_row("database", row, row["bytes"], ours, "bytes"))
+        elif row["stage"] == "terrain":
+            ours = m.stage_value("terrain", "bytes") if m else None
+            out.append(published_row("patches", row, row["bytes"], ours, "bytes"))
+    return out
+
+
+def stage_times(all_measured: Sequence[ConfigurationResults], published: Json) -> list[PublishedRow]:
+    """Published times of whole stages of the workflow, in seconds, next to ours."""
+    by_name = {m.name: m for m in all_measured}
+    out = []
+    for row in published["stages"]:
+        m = by_name.get(row["configuration"])
+        ours = m.stage_value(row["stage"], "seconds") if m else None
+        out.append(published_row(f"{row['stage']}, time", row, row["seconds"], ours, "s"))
+    return out
+
+
+def comparison_tables(compared: Json) -> dict[str, Sequence[Row]]:
+    """Table name -> rows, from the content of compare.json. The rows of a table have the same keys."""
+    measure_tables = {
+        name: rows for _, make_tables in functions("tables") for name, rows in make_tables(compared).items()
+    }
+    return {
+        "configurations": [flatten(row) for row in compared["configurations"]],
+        **measure_tables,
+        "training": _training(compared),
+        "stages": list(compared["stages"]),
+        "difference": [
+            {"measure": measure, **row}
+            for measure, rows in (
+                ("relative error", compared["difference"]),
+                ("milliseconds a frame", compared["milliseconds"].get("difference", ())),
+            )
+            for row in rows
+        ],
+        "published": [*compared["against_published"], *compared["milliseconds"]["against_published"]],
+    }
+
+
+def flatten(row: Row) -> Row:
+    """The row without mappings as values: the entry `b` of a mapping under the key `a` gets the key `a_b`."""
+    out: dict[str, object] = {}
+    for key, value in row.items():
+        if isinstance(value, Mapping):
+            out |= {f"{key}_{inner}": v for inner, v in value.items()}
+        else:
+            out[key] = value
+    return out
+
+
+def _training(compared: Json) -> list[Row]:
+    """A row for each pass of each training. A value that the training did not record is None."""
+    rows: list[Row] = []
+    columns = list(dict.fromkeys(key for entry in compared["training"] for key in entry))
+    for entry in compared["training"]:
+        for i in range(len(entry.get("pass", ()))):
+            rows.append(
+                {
+                    column: entry[column]
+                    if column == "configuration"
+                    else entry.get(column, [None] * (i + 1))[i]
+                    for column in columns
+                }
+            )
+    return rows

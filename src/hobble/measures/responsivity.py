@@ -1,0 +1,862 @@
+"""Laps of a waypoint track: the time of a frame, and how closely the character follows the track.
+
+The laps are repeated in each phase mode. A phase mode is a way to evaluate the network, such as cubic
+interpolation over the phase.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from hobble.report.gather import ReportMaterial
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import combinations
+from typing import Annotated, Any, TypedDict
+
+import numpy as np
+from pydantic import Field
+
+from hobble.core.files import Json
+from hobble.core.section import PhaseMode, Positive, Section
+from hobble.measures.compare import (
+    ComparisonAddition,
+    ConfigurationResults,
+    DifferenceOf,
+    PublishedRow,
+    StraightLine,
+    compare_series,
+    fit_line,
+    flatten,
+    published_row,
+)
+from hobble.measures.measure import Cost, Measure, Row
+from hobble.report.parts import (
+    Chart,
+    Column,
+    Compared,
+    Hint,
+    KeyFigure,
+    KeyFigures,
+    OverviewColumn,
+    PageSection,
+    Paragraph,
+    SectionPart,
+    Table,
+    Trace,
+    Verdict,
+    axis,
+    citation,
+    configuration_colours,
+    configuration_names,
+    dot_trace,
+    format_bytes,
+    format_number,
+    line_trace,
+    reference_line,
+    verdict_on_lowest,
+    with_order,
+)
+from hobble.runtime.options import Runtime
+
+
+class Options(Section):
+    """The keys of this measurement in a configuration's section `evaluation`."""
+
+    laps: Positive = Field(19, description="laps in the phase mode of the section `runtime`")
+    laps_other_modes: Positive = Field(
+        3, description="at most this many laps in each other phase mode; a small number saves time"
+    )
+    lap_seconds: Annotated[float, Field(ge=1, allow_inf_nan=False)] = Field(
+        400.0, description="seconds after which a lap is stopped"
+    )
+    modes: tuple[PhaseMode, ...] = Field(
+        ("constant", "linear", "cubic"),
+        description="phase modes to measure in addition to the one in the section `runtime`",
+    )
+
+
+def pieces(options: Options, runtime: Runtime, modes: Sequence[str]) -> tuple[str, ...]:
+    """The names of this measurement's pieces. Each piece is the laps in one phase mode, named after the mode.
+
+    modes: all phase modes of the network. If there is only one, it is the only piece.
+    """
+    return tuple(dict.fromkeys((*options.modes, runtime.mode))) if len(modes) > 1 else tuple(modes)
+
+
+MEASURE = Measure(
+    name="responsivity",
+    module=__name__,
+    inputs=("weights",),
+    options=Options,
+    runtime=tuple(Runtime.model_fields),
+    pieces=pieces,
+    cost=Cost(memory_mb=200, least_minutes=60),
+)
+
+
+# The steps of a frame, in order -> their colours. `hobble.runtime.controller` says what each step does.
+STEPS = {
+    "prepare": "@g0",
+    "input": "@g3",
+    "insert": "@g5",
+    "predict": "@accent",
+    "output": "@g2",
+    "update": "@muted",
+}
+
+OFF_TRACK = 100.0  # cm from the line between two waypoints; places farther away are marked in the chart
+
+
+def lap_steps(lap: dict[str, Any]) -> dict[str, float]:
+    """Step of a frame -> its mean milliseconds per frame in one lap.
+
+    If the lap only has the time of a whole frame, the key is "frame".
+    """
+    times = lap.get("milliseconds")
+    if isinstance(times, dict):
+        return {k: v for k, v in times.items() if k not in ("total", "sd") and isinstance(v, (int, float))}
+    return {"frame": times} if isinstance(times, (int, float)) else {}
+
+
+def step_order(step: str) -> int:
+    """A sort key: steps of a frame have the order of STEPS, and unknown steps come last."""
+    return list(STEPS).index(step) if step in STEPS else len(STEPS)
+
+
+def lap_chart(found: Json, material: ReportMaterial) -> Chart | None:
+    """Milliseconds per frame of each step, stacked, lap by lap, for each phase mode."""
+    options = {}
+    for entry in found.get("modes") or [found]:
+        traces = _lap_bars(entry)
+        if traces:
+            options[f"{entry.get('mode', 'the')} phase"] = traces
+    if not options:
+        return None
+    # The configured phase mode comes first, because the chart begins with the first option.
+    configured = f"{found.get('mode', 'the')} phase"
+    options = {name: options[name] for name in sorted(options, key=lambda name: name != configured)}
+    shapes, notes = [], []
+    published = material.published_entry("responsivity")
+    if published:
+        shape, note = reference_line(
+            published["milliseconds"], f"{published['label']}: published mean", vertical=False
+        )
+        shapes, notes = [shape], [note]
+    lap_counts = [max(len(trace["x"]) for trace in traces) for traces in options.values()]
+    laps = max(lap_counts)
+    fewer_laps = (
+        f" In the other phase modes there are only {min(lap_counts)} laps, to save time."
+        if min(lap_counts) < laps
+        else ""
+    )
+    return Chart(
+        "laps",
+        "Milliseconds per frame, lap by lap",
+        "Each bar is one lap of the track. Its segments are the stages of computing a frame, averaged over "
+        "the first seconds of the lap. Prepare: the target, the path and the ground; input: collect the "
+        "network's input; insert: standardise this input; predict: evaluate the network; output: turn its "
+        "output into a pose; update: move on by a frame. A diamond is the median time of a whole frame. If "
+        "another program delays a few frames, the bar becomes higher, but the diamond hardly moves. At 60 "
+        "Hz, a frame may take 16.7 ms." + fewer_laps,
+        layout={
+            "barmode": "stack",
+            "xaxis": axis("lap", dtick=1 if laps < 25 else None),
+            "yaxis": axis("ms per frame", rangemode="tozero"),
+            "shapes": shapes,
+            "annotations": notes,
+        },
+        choose="Phase mode" if len(options) > 1 else None,
+        options=options,
+    )
+
+
+def track_chart(found: Json) -> Chart | None:
+    """The track from above, the stored paths of laps, and the places where they are far from the track."""
+    track, runs = found.get("track") or {}, found.get("runs") or []
+    if not runs or not track.get("x"):
+        return None
+    labels = [f"{i}, {gait}" for i, gait in enumerate(track["gaits"])]
+    closed_x, closed_z = [*track["x"], track["x"][0]], [*track["z"], track["z"][0]]
+    traces = [line_trace("track", closed_x, closed_z, "@faint", dash="dash", width=1.2, hoverinfo="skip")]
+    for run in runs:
+        name = "laps" if run is runs[0] else f"lap {run['lap']}"
+        shown = {"legendgroup": "runs", "showlegend": run is runs[0]}
+        traces.append(line_trace(name, run["x"], run["z"], "@accent", width=1.5, hoverinfo="skip", **shown))
+    places = [
+        (x, z, cm, run["lap"])
+        for run in runs
+        for x, z, cm in zip(run["x"], run["z"], run["off_cm"], strict=True)
+    ]
+    off_track = [place for place in places if place[2] > OFF_TRACK]
+    if off_track:
+        traces.append(_off_track_markers(off_track))
+    traces.append(
+        {
+            "type": "scatter",
+            "mode": "markers+text",
+            "name": "waypoints",
+            "x": track["x"],
+            "y": track["z"],
+            "text": labels,
+            "textposition": "top center",
+            "textfont": {"size": 11, "color": "@soft"},
+            "marker": {"symbol": "circle-open", "size": 12, "color": "@ink"},
+            "hoverinfo": "skip",
+        }
+    )
+    largest = max(place[2] for place in places)
+    where = f"Places more than {OFF_TRACK:.0f} cm from the track are red. " if off_track else ""
+    return Chart(
+        "track",
+        "The track, and the path of the character",
+        "From above. Dashed lines join the waypoints. The label of a waypoint is its number and the gait on "
+        "the way to it. A waypoint is reached when the character is within a metre of it. Solid lines are "
+        "the paths of the first laps. "
+        f"{where}On these laps, the largest distance from the track was {largest:.0f} cm.",
+        traces,
+        {
+            "xaxis": axis("x, m", constrain="domain", zeroline=False),
+            "yaxis": axis("z, m", scaleanchor="x", autorange="reversed", zeroline=False),
+        },
+        height=520,
+    )
+
+
+def _off_track_markers(places: list[tuple[float, float, float, int]]) -> Trace:
+    """Markers at places far from the track. places: (x and z in m, distance from the track in cm, lap)."""
+    return {
+        "type": "scatter",
+        "mode": "markers",
+        "name": f"more than {OFF_TRACK:.0f} cm off",
+        "x": [x for x, *_ in places],
+        "y": [z for _, z, *_ in places],
+        "customdata": [[cm, lap] for *_, cm, lap in places],
+        "marker": {"size": 6, "color": "@hurt-high"},
+        "hovertemplate": "lap %{customdata[1]}: %{customdata[0]:.0f} cm off<extra></extra>",
+    }
+
+
+def _lap_bars(entry: dict[str, Any]) -> list[Trace]:
+    """Stacked bars of the steps' mean times in each lap, and diamonds at the medians.
+
+    entry: the results of one phase mode.
+    """
+    laps = entry.get("laps")
+    laps = [lap for lap in laps if lap_steps(lap)] if isinstance(laps, list) else []
+    if not laps:
+        return []
+    numbers = [lap.get("lap", i + 1) for i, lap in enumerate(laps)]
+    bars: list[Trace] = [
+        {
+            "type": "bar",
+            "name": step,
+            "x": numbers,
+            "y": [lap_steps(lap).get(step) for lap in laps],
+            "marker": {"color": STEPS.get(step, "@g0")},
+            "hovertemplate": "lap %{x}: %{y:.3f} ms<extra>%{fullData.name}</extra>",
+        }
+        for step in sorted(lap_steps(laps[0]), key=step_order)
+    ]
+    medians = [lap_median(lap) for lap in laps]
+    if all(value is None for value in medians):
+        return bars
+    dots: Trace = {
+        "type": "scatter",
+        "mode": "markers",
+        "name": "median",
+        "x": numbers,
+        "y": medians,
+        "marker": {"symbol": "diamond", "size": 8, "color": "@ink"},
+        "hovertemplate": "lap %{x}: %{y:.3f} ms<extra>%{fullData.name}</extra>",
+    }
+    return [*bars, dots]
+
+
+def lap_median(lap: dict[str, Any]) -> float | None:
+    """Median time of a whole frame in one lap, ms; None if it is not known."""
+    times = lap.get("milliseconds")
+    return (times.get("spread") or {}).get("median") if isinstance(times, dict) else None
+
+
+FEWEST_STEPS = 10  # if the character takes fewer steps, the mean foot slide is not shown
+FRAME_BUDGET_MS = 1000 / 60  # the time that a frame may take at 60 Hz
+FLIP_DEGREES = 60  # if a joint turns by more than this in one frame, it flips visibly
+# Columns of the table of laps, by the keys of `LapWalk` in hobble.measures.responsivity.results.
+LAP_COLUMNS = {
+    "lap": Column.count("lap"),
+    "finished": Column("finished", lambda finished: "yes" if finished else "no"),
+    "waypoints_reached": Column.count("waypoints reached"),
+    "seconds": Column.number("seconds", 4),
+    "frames": Column.count("frames"),
+    "path_distance_cm": Column.number("mean distance from the track, cm"),
+    "path_overshoot_cm": Column.number("largest distance from the track, cm"),
+    "steps": Column.count("steps"),
+    "foot_slide_cm": Column.number("mean foot slide of a step, cm"),
+    "predicted_turn_degrees": Column.number("largest turn of a joint in a frame as predicted, °"),
+    "largest_turn_degrees": Column.number("largest turn of a joint in a frame as drawn, °"),
+    "turns_held_back": Column.count("frames in which a turn was limited"),
+}
+TRACK = "The character is steered around a track of six waypoints: it walks, side-steps, jogs and crouches."
+
+
+def section(found: Json, material: ReportMaterial) -> PageSection:
+    """The track, the times of the laps, the published times, and a table of the laps."""
+    figures_of_track = track_figures(found)
+    return PageSection(
+        "speed",
+        [
+            SectionPart(0, Paragraph(TRACK) if figures_of_track else None),
+            SectionPart(10, KeyFigures(figures_of_track) if figures_of_track else None),
+            SectionPart(15, track_chart(found)),
+            SectionPart(20, lap_chart(found, material)),
+            SectionPart(30, speed_table(found, material), open=True, short=True),
+            SectionPart(60, lap_table(found, material.name)),
+        ],
+        title="Steering and time per frame",
+        order=30,
+        nav="Steering and time",
+    )
+
+
+def figures(found: Json, material: ReportMaterial) -> Iterator[KeyFigure]:
+    """A key figure for the top of the report: the time of a frame."""
+    milliseconds = frame_milliseconds(found)
+    if milliseconds is not None:
+        published = material.published_entry("responsivity")
+        note = (
+            f"median; one core can run {format_number(FRAME_BUDGET_MS / milliseconds, 3)} characters at 60 Hz"
+        )
+        if published:
+            mean = format_number(frame_mean(found), 2)
+            note += f"; mean {mean} ms, published mean {published['milliseconds']} ms"
+        yield KeyFigure("Time per frame", format_number(milliseconds, 2), "ms", note, 20)
+
+
+def hints(found: Json, material: ReportMaterial) -> Iterator[Hint]:
+    """Whether a frame fits into 1/60 s, and whether the character followed the track."""
+    yield from with_order(60, _speed_hints(found))
+    yield from with_order(40, _track_hints(found))
+
+
+def lap_table(found: Json, name: str) -> Table | None:
+    """A row per lap: how it went, the mean time of each step of a frame, and the median time of a frame."""
+    laps = found.get("laps")
+    if not isinstance(laps, list) or not laps:
+        return None
+    lap_columns = {key: column for key, column in LAP_COLUMNS.items() if key in laps[0]}
+    frame_steps = sorted(lap_steps(laps[0]), key=step_order)
+    columns = [*lap_columns.values(), *(Column.number(f"{step}, mean ms") for step in frame_steps)]
+    columns.append(Column.number("whole frame, median ms"))
+    rows = [
+        [
+            None if key == "foot_slide_cm" and _too_few_steps(lap.get("steps")) else lap.get(key)
+            for key in lap_columns
+        ]
+        + [lap_steps(lap).get(step) for step in frame_steps]
+        + [lap_median(lap)]
+        for lap in laps
+    ]
+    return Table(f"{name}-responsivity", columns, rows)
+
+
+def _too_few_steps(steps: int | None) -> bool:
+    """Whether the character took too few steps for a mean foot slide."""
+    return steps is not None and steps < FEWEST_STEPS
+
+
+def track_figures(found: Json) -> list[KeyFigure]:
+    """Key figures: how well the character followed the track."""
+    if not isinstance(found.get("laps"), list):
+        return []
+    spread = (found.get("milliseconds") or {}).get("spread") or {}
+    reached = f"{found.get('waypoints_reached')} of {found.get('waypoints')}"
+    steps = sum(lap.get("steps") or 0 for lap in found["laps"])
+    slide = None if _too_few_steps(steps) else found.get("foot_slide_cm")
+    slide_note = f"mean slide of a toe during a stance, averaged over the laps ({steps:,} steps)"
+    laps = f"{found.get('laps_finished')} of {len(found['laps'])} laps finished"
+    return [
+        KeyFigure("Waypoints reached", reached, "", laps),
+        KeyFigure(
+            "Largest distance from the track",
+            format_number(found.get("path_overshoot_cm")),
+            "cm",
+            "the largest of all laps",
+        ),
+        KeyFigure("Foot slide", format_number(slide), "cm" if slide is not None else "", slide_note),
+        _turn_figure(found),
+        KeyFigure("Slow frames", format_number(spread.get("p99")), "ms", "1 % of the frames are slower"),
+    ]
+
+
+def _turn_figure(found: Json) -> KeyFigure:
+    """The largest turn of a joint in one frame: as predicted, and as drawn after the runtime's limit."""
+    drawn, predicted = (
+        format_number(found.get(key)) for key in ("largest_turn_degrees", "predicted_turn_degrees")
+    )
+    from hobble.runtime.network_rows import FASTEST_TURN  # here, because planning need not load numba
+
+    limit = f"{np.degrees(FASTEST_TURN):.0f}°"
+    if found.get("predicted_turn_degrees") is None:
+        return KeyFigure(
+            "Largest turn of a joint", drawn, "°", f"in one frame, as drawn; the runtime limits it to {limit}"
+        )
+    frames = sum(lap.get("frames") or 0 for lap in found["laps"])
+    limited_frames = f"{found['turns_held_back']:,} of {frames:,} frames"
+    note = f"of a joint in one frame, as predicted; the runtime limited it to {limit} in {limited_frames}; "
+    note += f"after the feet were put on the ground, the largest turn was {drawn}°"
+    return KeyFigure("Largest predicted turn", predicted, "°", note)
+
+
+def speed_table(found: Json, material: ReportMaterial) -> Table | None:
+    """A table of milliseconds per frame: our median and mean, followed by the published means."""
+    ours = frame_milliseconds(found)
+    if ours is None:
+        return None
+    sources = material.published["sources"]
+    mode = found.get("mode")
+    rows: list[list[Any]] = [
+        [
+            f"{material.name}, {mode} phase" if mode else material.name,
+            ours,
+            frame_mean(found),
+            "this report",
+        ]
+    ]
+    for entry in material.published["responsivity"]:
+        rows.append([entry["label"], None, entry["milliseconds"], citation(entry, sources)])
+    for entry in material.published["modes"]:
+        rows.append(
+            [
+                f"prediction alone, {entry['mode']} phase",
+                None,
+                entry["milliseconds"],
+                citation(entry, sources),
+            ]
+        )
+    columns = [
+        Column("network"),
+        Column.number("median, ms per frame"),
+        Column.number("mean, ms per frame"),
+        Column("source", kind="long"),
+    ]
+    return Table(f"{material.name}-published-speed", columns, rows, "Comparison with published results")
+
+
+def frame_milliseconds(found: Json) -> float | None:
+    """Median milliseconds of a whole frame over all laps; the mean if there is no median.
+
+    The median is shown because a few slow frames hardly change it.
+    """
+    times = found.get("milliseconds")
+    median = (times.get("spread") or {}).get("median") if isinstance(times, dict) else None
+    return frame_mean(found) if median is None else float(median)
+
+
+def frame_mean(found: Json) -> float | None:
+    """Mean milliseconds of a whole frame, to compare with the published means."""
+    value = found.get("milliseconds")
+    if isinstance(value, dict):
+        value = value.get("total", sum(v for v in value.values() if isinstance(v, (int, float))))
+    return float(value) if isinstance(value, (int, float)) else None
+
+
+def _speed_hints(found: Json) -> Iterator[Hint]:
+    milliseconds = frame_milliseconds(found)
+    if milliseconds is None:
+        return
+    if milliseconds > FRAME_BUDGET_MS:
+        yield Hint(
+            "warn",
+            f"A frame takes {milliseconds:.1f} ms, too slow for 60 Hz.",
+            "Try mode: linear in the section runtime.",
+        )
+        return
+    share = milliseconds / FRAME_BUDGET_MS
+    times = found.get("milliseconds")
+    slow = (times.get("spread") or {}).get("p99") if isinstance(times, dict) else None
+    if slow is not None and slow > FRAME_BUDGET_MS:
+        yield Hint(
+            "warn",
+            f"1 % of the frames take {slow:.1f} ms or more, too slow for 60 Hz.",
+            f"The median is {milliseconds:.2f} ms. Measure again while nothing else runs on the machine.",
+        )
+    elif slow is not None:
+        yield Hint(
+            "good",
+            f"A frame takes {100 * share:.1f} % of the 16.7 ms that 60 Hz allows. 99 of 100 frames take at "
+            f"most {math.ceil(100 * slow / FRAME_BUDGET_MS)} % of that time.",
+            "That is fast enough for a game.",
+        )
+    else:
+        yield Hint("good", f"A frame takes {100 * share:.1f} % of the 16.7 ms that 60 Hz allows.", "")
+
+
+def _track_hints(found: Json) -> Iterator[Hint]:
+    reached, total = (found.get(key) for key in ("waypoints_reached", "waypoints"))
+    if total and reached is not None and reached < total:
+        yield Hint(
+            "warn",
+            f"The character reached {reached} of {total} waypoints.",
+            "It circles around a waypoint or stops before it. See the laps in the section on steering.",
+        )
+    drawn, predicted = (found.get(key) for key in ("largest_turn_degrees", "predicted_turn_degrees"))
+    if drawn is not None and drawn > FLIP_DEGREES:
+        yield Hint(
+            "warn",
+            f"A joint turned by {drawn:.0f} degrees in one frame.",
+            "It flips, which is visible on a skinned character.",
+        )
+    elif predicted is not None and predicted > FLIP_DEGREES:
+        yield Hint(
+            "note",
+            f"The network predicted a turn of a joint by {predicted:.0f} degrees in one frame.",
+            f"As drawn, no joint turned by more than {drawn:.0f} degrees. Check whether joint rotations flip "
+            "in the clips.",
+        )
+
+
+NAME = "responsivity"
+# Three ways to count the weights and biases that one frame uses, explained at `parameter_counts` in
+# hobble.measures.responsivity.run. compare.json calls such a count "computations".
+COUNTS = ("true", "table_6_1", "table_6_1_as_printed")
+
+
+class Sizes(TypedDict):
+    """The size of a network.
+
+    computations: name in COUNTS -> that count of weights and biases, None for a network without layers.
+    weights_bytes: phase mode -> bytes of weights in memory. exact: the phase mode that approximates nothing.
+    """
+
+    computations: dict[str, int | None]
+    weights_bytes: dict[str, int]
+    exact: str
+
+
+class TimeLine(StraightLine):
+    """A straight line fitted to times `y` (ms) over counts of computations `x`, one point per configuration.
+
+    slope, intercept and r2 are None if all x are equal. whose: whose times, "hobble" or "published". mode:
+    phase mode; None for published times. step, computations: which times and which counts, see `fit_lines`.
+    """
+
+    whose: str
+    mode: str | None
+    step: str
+    computations: str
+    x: list[int]
+    y: list[float]
+
+
+def compared(all_measured: Sequence[ConfigurationResults], published: Json) -> ComparisonAddition:
+    """The laps of the track in each phase mode, the networks' sizes, and published sizes and times."""
+    sizes = {m.name: _sizes(m) for m in all_measured}
+    return ComparisonAddition(
+        entries=[entry for m in all_measured for entry in mode_entries(m)],
+        about=sizes,
+        against_published=_published_sizes(sizes, published),
+        milliseconds={
+            "difference": time_differences(all_measured),
+            "fit": fit_lines(all_measured, published),
+            "against_published": _published_times(all_measured, published),
+        },
+    )
+
+
+def tables(compared: Json) -> dict[str, Sequence[Row]]:
+    """Two tables: every lap; the lines of time over size, without their points."""
+    fit = compared["milliseconds"]["fit"]
+    return {
+        NAME: [lap for entry in compared[NAME] for lap in _lap_rows(entry)],
+        "fit": [{k: v for k, v in row.items() if k not in ("x", "y")} for row in fit],
+    }
+
+
+def mode_entries(results: ConfigurationResults) -> list[Json]:
+    """A configuration's results in each phase mode that was run. The key `configuration` has its name."""
+    found = results.results_of(NAME)
+    return [{**entry, "configuration": results.name} for entry in found.get("modes", [found])]
+
+
+def _sizes(results: ConfigurationResults) -> Sizes:
+    found = results.results_of(NAME)
+    counts = found["parameters"]
+    return {
+        "computations": {key: counts[key] if counts else None for key in COUNTS},
+        "weights_bytes": {mode: count * found["bytes_each"] for mode, count in found["stored"].items()},
+        "exact": found["exact"],
+    }
+
+
+def time_differences(all_measured: Sequence[ConfigurationResults]) -> list[DifferenceOf]:
+    """How much the frame times of any two configurations differ, in each phase mode that both have run.
+
+    The difference is computed by eq. 3.2 of Segerstedt (2021), see `pair`.
+    """
+    out: list[DifferenceOf] = []
+    for a, b in combinations(all_measured, 2):
+        entries_of_b = {entry["mode"]: entry for entry in mode_entries(b)}
+        for entry in mode_entries(a):
+            if entry["mode"] in entries_of_b:
+                times = [
+                    {
+                        "mean": e["milliseconds"]["total"],
+                        "sd": e["milliseconds"]["spread"]["sd"],
+                        "means": lap_means(e),
+                    }
+                    for e in (entry, entries_of_b[entry["mode"]])
+                ]
+                out.append({"a": a.name, "b": b.name, "over": entry["mode"], **compare_series(*times)})
+    return out
+
+
+def fit_lines(all_measured: Sequence[ConfigurationResults], published: Json) -> list[TimeLine]:
+    """Straight lines of milliseconds per frame over computations, for our times and for the published times.
+
+    computations: one of COUNTS. step: which time is fitted. "total" is the mean time of a whole frame; the
+    published times are such means. "predict" is the mean time of the step `predict`. "median" is the median
+    time of a whole frame; other programs on the machine change it least. slope: milliseconds per computation.
+    Configurations with the same network are separate points. Networks without layers are left out.
+    """
+    out = []
+    entries = [
+        (m, entry) for m in all_measured if m.results_of(NAME)["parameters"] for entry in mode_entries(m)
+    ]
+    modes = list(dict.fromkeys(entry["mode"] for _, entry in entries))
+    for counts in COUNTS:
+        for mode in modes:
+            for step in ("total", "predict", "median"):
+                points = [
+                    (m.results_of(NAME)["parameters"][counts], _time(entry["milliseconds"], step))
+                    for m, entry in entries
+                    if entry["mode"] == mode
+                ]
+                out.append(_fit("hobble", mode, step, counts, points))
+    times = {row["configuration"]: row["milliseconds"] for row in published["responsivity"]}
+    for counts, key in (("true", "parameters"), ("table_6_1_as_printed", "table_6_1")):
+        points = [
+            (row[key], times[row["configuration"]])
+            for row in published["computations"]
+            if row["configuration"] in times
+        ]
+        out.append(_fit("published", None, "total", counts, points))
+    return out
+
+
+def _time(milliseconds: Json, step: str) -> float:
+    """The time of a `step` of `fit_lines`, ms. milliseconds: the entry of that name in responsivity.json."""
+    return (milliseconds["spread"] if step == "median" else milliseconds)[step]
+
+
+def _fit(whose: str, mode: str | None, step: str, counts: str, points: list[tuple[int, float]]) -> TimeLine:
+    """The line through `points`: (computations, ms) of each configuration. For the rest see `TimeLine`."""
+    unfitted: StraightLine = {"slope": None, "intercept": None, "r2": None, "points": len(points)}
+    fitted = fit_line([x for x, _ in points], [y for _, y in points])
+    return {
+        "whose": whose,
+        "mode": mode,
+        "step": step,
+        "computations": counts,
+        "x": [x for x, _ in points],
+        "y": [y for _, y in points],
+        **(fitted or unfitted),
+    }
+
+
+def lap_means(entry: Json) -> list[float]:
+    """Milliseconds per frame of each lap, all steps together."""
+    return [lap["milliseconds"]["total"] for lap in entry["laps"]]
+
+
+def _published_sizes(sizes_of: Mapping[str, Sizes], published: Json) -> list[PublishedRow]:
+    """Published sizes of networks next to ours. sizes_of: configuration -> sizes of its network."""
+    out = []
+    for row in published["computations"]:
+        sizes = sizes_of.get(row["configuration"])
+        counts = sizes["computations"] if sizes else {}
+        in_table = {**row, "table": "6.1"}
+        out.append(
+            published_row(
+                "computations of Table 6.1", in_table, row["table_6_1"], counts.get("table_6_1_as_printed")
+            )
+        )
+        out.append(published_row("parameters of a phase", row, row["parameters"], counts.get("true")))
+    for row in published["stages"]:
+        if row["stage"] == "training" and "bytes" in row:
+            sizes = sizes_of.get(row["configuration"])
+            # The published weights are those of the constant mode, which stores the weights of 50 phases.
+            ours = sizes["weights_bytes"].get("constant") if sizes else None
+            out.append(published_row("weights of 50 phases", row, row["bytes"], ours, "bytes"))
+    return out
+
+
+def _published_times(all_measured: Sequence[ConfigurationResults], published: Json) -> list[PublishedRow]:
+    """Published times next to ours: of a frame, and of a prediction in each phase mode."""
+    by_name = {m.name: m for m in all_measured}
+    out = []
+    for row in published["responsivity"]:
+        results = by_name.get(row["configuration"])
+        ours = results.results_of(NAME)["milliseconds"]["total"] if results else None
+        out.append(published_row("a frame", row, row["milliseconds"], ours, "ms"))
+        if "sd" in row:
+            in_text = {**row, "table": None}  # the standard deviation is only in the text of the thesis
+            means = lap_means(results.results_of(NAME)) if results else []
+            sd = float(np.std(means)) if len(means) > 1 else None
+            out.append(published_row("standard deviation of the means of laps", in_text, row["sd"], sd, "ms"))
+    for row in published["modes"]:
+        results = by_name.get(row["configuration"])
+        entries = mode_entries(results) if results else []
+        times = {entry["mode"]: entry["milliseconds"]["predict"] for entry in entries}
+        what = f"a prediction, {row['mode']}"
+        out.append(published_row(what, row, row["milliseconds"], times.get(row["mode"]), "ms"))
+    return out
+
+
+def _lap_rows(entry: Json) -> list[Row]:
+    """A row for each lap in one phase mode. entry: from `mode_entries`."""
+    head = {"configuration": entry["configuration"], "mode": entry["mode"]}
+    rows: list[Row] = []
+    for lap in entry["laps"]:
+        times = lap["milliseconds"]
+        row = {key: value for key, value in lap.items() if key != "milliseconds"}
+        row |= {f"milliseconds_{step}": times[step] for step in (*STEPS, "total")}
+        row |= {f"milliseconds_{step}_sd": sd for step, sd in times["sd"].items()}
+        rows.append({**head, **row, **{f"milliseconds_{k}": v for k, v in flatten(times["spread"]).items()}})
+    return rows
+
+
+def compared_section(compared: Compared) -> PageSection:
+    """Two charts: the times of the laps, and the time of a frame over the size of the network."""
+    parts = [SectionPart(10, lap_lines(compared)), SectionPart(20, fit_chart(compared))]
+    return PageSection("speed", parts, title="Time per frame", order=30)
+
+
+def compared_columns(compared: Compared) -> Iterator[OverviewColumn]:
+    """Median time per frame (in the exact phase mode if it was run), and two sizes of the network."""
+    exact = in_exact_mode(compared)
+    frames = {name: entry["milliseconds"]["spread"]["median"] for name, entry in exact.items()}
+    yield OverviewColumn(30, Column.number("ms per frame, median"), frames)
+    about = {entry["configuration"]: entry for entry in compared["configurations"]}
+    counts = {name: (entry["computations"] or {}).get("true") for name, entry in about.items()}
+    yield OverviewColumn(40, Column.count("parameters of one frame"), counts)
+    yield OverviewColumn(110, Column("in memory", lambda v: format_bytes(float(v)), "n"), _bytes(compared))
+
+
+def compared_verdicts(compared: Compared) -> Iterator[Verdict]:
+    """Which configuration stays closest to the track, and which is smoothest, fastest and smallest.
+
+    Only configurations that reached every waypoint can be the closest or the smoothest.
+    """
+    exact = in_exact_mode(compared)
+    arrived = {name: e for name, e in exact.items() if e["waypoints_reached"] == e["waypoints"]}
+    astray = [name for name in exact if name not in arrived]
+    left_out = f" Did not reach every waypoint: {', '.join(astray)}." if astray else ""
+    yield from verdict_on_lowest(
+        20,
+        "Closest to the track",
+        {name: e["path_overshoot_cm"] for name, e in arrived.items()},
+        lambda name, v: f"{name} is never more than {format_number(v, 3)} cm off the track",
+        left_out,
+    )
+    yield from verdict_on_lowest(
+        30,
+        "Smoothest",
+        {name: e["foot_slide_cm"] for name, e in arrived.items()},
+        lambda name, v: (
+            f"the feet of {name} slide {format_number(v, 2)} cm a step, and no joint turns more than "
+            f"{format_number(exact[name]['largest_turn_degrees'], 2)} degrees in a frame"
+        ),
+    )
+    yield from verdict_on_lowest(
+        40,
+        "Fastest",
+        {name: e["milliseconds"]["spread"]["median"] for name, e in exact.items()},
+        lambda name, v: f"the median frame of {name} takes {format_number(v, 3)} ms",
+    )
+    yield from verdict_on_lowest(
+        50, "Smallest", _bytes(compared), lambda name, v: f"{name} needs {format_bytes(v)} of memory to run"
+    )
+
+
+def in_exact_mode(compared: Compared) -> dict[str, Any]:
+    """Configuration -> its results in the exact phase mode, or in another one if the exact mode was not run.
+
+    The exact mode evaluates the network without approximation.
+    """
+    exact = {entry["configuration"]: entry["exact"] for entry in compared["configurations"]}
+    # The exact mode of a configuration comes last, so that it replaces the other modes in `by_name`.
+    ordered = sorted(compared["responsivity"], key=lambda e: e["mode"] == exact[e["configuration"]])
+    by_name = {entry["configuration"]: entry for entry in ordered}
+    return {name: by_name[name] for name in configuration_names(compared) if name in by_name}
+
+
+def _bytes(compared: Compared) -> dict[str, float]:
+    """Configuration -> bytes of its network's weights in memory, in the exact phase mode."""
+    return {e["configuration"]: e["weights_bytes"][e["exact"]] for e in compared["configurations"]}
+
+
+def lap_lines(compared: Compared) -> Chart | None:
+    """Milliseconds per frame, lap by lap, for each phase mode."""
+    options: dict[str, list[Trace]] = {}
+    # The cubic mode comes first, because the chart begins with the first option.
+    for entry in sorted(compared["responsivity"], key=lambda entry: entry["mode"] != "cubic"):
+        laps = [lap for lap in entry["laps"] if isinstance(lap.get("milliseconds"), dict)]
+        x, y = [lap["lap"] for lap in laps], [lap["milliseconds"]["spread"]["median"] for lap in laps]
+        colour = configuration_colours(compared)[entry["configuration"]]
+        trace = line_trace(entry["configuration"], x, y, colour, mode="lines+markers")
+        options.setdefault(f"{entry['mode']} phase", []).append(trace)
+    if not options:
+        return None
+    for traces in options.values():
+        for row in compared["published"]["responsivity"]:
+            if row["configuration"] in configuration_names(compared):
+                last_lap = max((max(t["x"], default=1) for t in traces), default=1)
+                colour = configuration_colours(compared)[row["configuration"]]
+                label = f"{row['label']}: published mean"
+                traces.append(
+                    line_trace(label, [1, last_lap], [row["milliseconds"]] * 2, colour, dash="dot", width=1.2)
+                )
+    return Chart(
+        "compare-laps",
+        "Milliseconds per frame, lap by lap",
+        "Median time of a whole frame in each lap of the track. Dotted lines are published means, measured "
+        "on another machine.",
+        layout={"xaxis": axis("lap", dtick=1), "yaxis": axis("ms per frame", rangemode="tozero")},
+        choose="Phase mode",
+        options=options,
+    )
+
+
+def fit_chart(compared: Compared) -> Chart | None:
+    """Frame time over the number of parameters: our times and the published ones, each with a fitted line."""
+    # At most two fits: our medians in the cubic mode, and the published means, which have no mode.
+    shown_fits = [
+        fit
+        for fit in compared["milliseconds"]["fit"]
+        if fit["computations"] == "true"
+        and fit["step"] == ("median" if fit["whose"] == "hobble" else "total")
+        and fit["mode"] in (None, "cubic")
+        and fit["x"]
+    ]
+    traces: list[Trace] = []
+    for fit, colour in zip(shown_fits, ("@accent", "@g2"), strict=False):
+        label = "ours (medians, cubic phase)" if fit["whose"] == "hobble" else "published (means)"
+        traces.append(dot_trace(label, fit["x"], fit["y"], colour, "%{x:,} parameters: %{y:.3f} ms"))
+        if fit["slope"] is not None:
+            ends = [min(fit["x"]), max(fit["x"])]
+            values = [fit["intercept"] + fit["slope"] * x for x in ends]
+            traces.append(line_trace(f"{label}, straight fit", ends, values, colour, width=1.4))
+    if not traces:
+        return None
+    layout = {
+        "xaxis": axis("parameters of one frame", tickformat="~s", rangemode="tozero"),
+        "yaxis": axis("ms per frame", rangemode="tozero"),
+    }
+    caption = (
+        "If the dots lie on a straight line, the time of a frame is a constant plus a time proportional to "
+        "the number of parameters."
+    )
+    return Chart("compare-fit", "Frame time over network size", caption, traces, layout, 340)

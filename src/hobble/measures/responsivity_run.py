@@ -1,0 +1,635 @@
+"""Laps of the waypoint track: how closely the character follows it, and the time of each step of a frame.
+
+All laps are walked at the same time, each by its own character. Lap 1 begins and ends at one waypoint, lap 2
+at the next, and so on around the track. If there are more laps than waypoints, several laps begin at the same
+waypoint. Their characters start at different distances before this waypoint. So they reach it at different
+moments of their gait and by slightly different paths, and no two laps are the same.
+
+To measure the times, one character alone walks the beginning of each lap again.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from hobble.measures.responsivity import Options
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from time import perf_counter
+from typing import Any, TypedDict
+
+import numpy as np
+
+from hobble.core.quat import Array
+from hobble.measures.measure import MeasureInputs, Outcome, Row
+from hobble.measures.walks import foot_slide, turns_between
+from hobble.models.load import load_network
+from hobble.models.network import Network
+from hobble.runtime.animation import ProceduralAnimation, world_rotations
+from hobble.runtime.controller import STEPS
+from hobble.runtime.options import Runtime
+from hobble.runtime.waypoints import TRACK, Waypoint
+
+
+class Spread(TypedDict):
+    """Statistics of the time of a frame, ms. The time of a frame is the sum of its `Steps`.
+
+    sd, median, p99: standard deviation, median and 99th percentile. whole_call: mean time of a call of
+    `next_pose`, which also does some work outside the steps.
+    """
+
+    sd: float
+    median: float
+    p99: float
+    whole_call: float
+
+
+class Steps(TypedDict):
+    """Milliseconds of each step of a frame. See `hobble.runtime.controller` for what each step does."""
+
+    prepare: float
+    input: float
+    insert: float
+    predict: float
+    output: float
+    update: float
+
+
+class Milliseconds(Steps):
+    """Mean time of each step, ms.
+
+    total: mean time of a whole frame, ms. sd: standard deviation of the time of each step, ms. spread:
+    statistics of the time of a whole frame.
+    """
+
+    total: float
+    sd: Steps
+    spread: Spread
+
+
+class LapWalk(TypedDict):
+    """How one lap of the track went.
+
+    lap: its number, from 1. finished: whether all waypoints were reached. path_overshoot_cm,
+    path_distance_cm: the largest and the mean distance from the line between waypoints. foot_slide_cm: mean
+    slide of a toe in a stance; None without a stance. steps: number of stances. largest_turn_degrees: largest
+    turn of a joint in one frame, as drawn. predicted_turn_degrees: largest turn of a joint in one frame, as
+    the network predicts it, before the runtime limits turns. turns_held_back: number of frames in which the
+    runtime limited a turn.
+    """
+
+    lap: int
+    finished: bool
+    frames: int
+    seconds: float
+    waypoints_reached: int
+    path_overshoot_cm: float
+    path_distance_cm: float
+    foot_slide_cm: float | None
+    steps: int
+    largest_turn_degrees: float
+    predicted_turn_degrees: float
+    turns_held_back: int
+
+
+class Lap(LapWalk):
+    """How one lap went, and the time of a frame.
+
+    milliseconds: measured while one character alone walks the beginning of the lap again.
+    """
+
+    milliseconds: Milliseconds
+
+
+class LapPath(TypedDict):
+    """The path of a lap: a place every `seconds_between` seconds.
+
+    x, z: places, m. off_cm: largest distance from the line between waypoints since the previous stored place.
+    """
+
+    lap: int
+    seconds_between: float
+    x: list[float]
+    z: list[float]
+    off_cm: list[float]
+
+
+class ModeResults(TypedDict):
+    """All laps of one phase mode: a way to evaluate the network, such as cubic interpolation over the phase.
+
+    waypoints: number of waypoints in all laps together. waypoints_reached, turns_held_back: sums over the
+    laps. mean_lap_seconds: mean over the finished laps; None if there are none. foot_slide_cm: mean over the
+    laps. path_overshoot_cm, largest_turn_degrees, predicted_turn_degrees: the largest values of all laps, see
+    `LapWalk`.
+    """
+
+    mode: str
+    laps: list[Lap]
+    laps_finished: int
+    waypoints_reached: int
+    waypoints: int
+    mean_lap_seconds: float | None
+    path_overshoot_cm: float
+    foot_slide_cm: float | None
+    largest_turn_degrees: float
+    predicted_turn_degrees: float
+    turns_held_back: int
+    milliseconds: Milliseconds
+
+
+class PieceResults(TypedDict):
+    """What one job of this measurement writes: all laps in one phase mode.
+
+    laps: the results. runs: the paths of the first laps.
+    """
+
+    laps: ModeResults
+    runs: list[LapPath]
+
+
+class Track(TypedDict):
+    """The closed track, a line through waypoints.
+
+    waypoints: how many. metres: length of the line. gaits: the gait on the way to each waypoint. x, z: places
+    of the waypoints, m.
+    """
+
+    waypoints: int
+    metres: float
+    gaits: list[str]
+    x: list[float]
+    z: list[float]
+
+
+class Responsivity(ModeResults):
+    """responsivity.json: the results of the configured phase mode, and in `modes` those of all modes.
+
+    runs: the paths of the first laps in the configured mode. parameters: three counts of the weights and
+    biases that one frame uses, None for a network without layers. `true`: the actual count; `table_6_1`: by
+    the formula of Segerstedt (2021, table 6.1); `table_6_1_as_printed`: by the same formula, but with one
+    hidden layer fewer than the network has, as in the numbers printed in that table. stored: mode -> how many
+    numbers the network keeps in memory, each of `bytes_each` bytes. exact: the mode that evaluates the
+    network without approximation. laps_other_modes: number of laps in each other mode.
+    """
+
+    configuration: str
+    track: Track
+    runs: list[LapPath]
+    parameters: dict[str, int] | None
+    stored: dict[str, int]
+    bytes_each: int
+    exact: str
+    laps_other_modes: int
+    modes: list[ModeResults]
+
+
+FPS = 60
+PATH_STEP = 15  # of a path, the place in every 15th frame is stored
+AT_ONCE = 60  # frames: the rotations of at most this many are in memory at the same time
+RUN_UP = 1000.0  # cm; a character starts at most this far before the waypoint where its lap begins
+
+
+@dataclass(frozen=True)
+class LapStarts:
+    """Where the characters of C laps start.
+
+    places: (C, 2) x and z, cm. facing: (C, 2) direction in which the character looks. waypoints: (C,) index
+    of the waypoint where the lap begins.
+    """
+
+    places: Array
+    facing: Array
+    waypoints: np.ndarray
+
+    def place_characters(self, animation: ProceduralAnimation, laps: slice) -> None:
+        """Put the characters of `animation` at the starts of the laps in the slice `laps`, one at each.
+
+        The characters must follow the track.
+        """
+        animation.reset(self.places[laps], self.facing[laps])
+        assert animation.follower is not None
+        animation.follower.reached[:] = self.waypoints[laps]
+
+
+def lap_starts(track: Sequence[Waypoint], laps: int) -> LapStarts:
+    """The starts of `laps` laps.
+
+    The first lap begins at the last waypoint of the track, the second lap at the first waypoint.
+    """
+    count = len(track)
+    waypoints = (np.arange(laps) - 1) % count
+    corners = np.array([waypoint.position for waypoint in track], float)
+    ways = corners - np.roll(corners, 1, axis=0)  # way n leads to waypoint n
+    lengths = np.hypot(ways[:, 0], ways[:, 1])
+    # Laps that begin at the same waypoint start at evenly spaced distances before it.
+    rounds = -(-laps // count)  # the largest number of laps that begin at one waypoint
+    distances = np.arange(laps) // count / rounds * np.minimum(lengths, RUN_UP)[waypoints]
+    places = (
+        corners[waypoints] - (distances / np.maximum(lengths[waypoints], 1e-9))[:, None] * ways[waypoints]
+    )
+    # A character faces the waypoint where its lap begins, or the next one if it starts there.
+    facing = ways[np.where(distances > 0, waypoints, (waypoints + 1) % count)]
+    return LapStarts(places, facing, waypoints)
+
+
+def walk_laps(
+    network: Network, runtime: Runtime, laps: int, longest: int, track: Sequence[Waypoint]
+) -> list[tuple[LapWalk, LapPath]]:
+    """Walk `laps` laps of at most `longest` frames. Returns how each lap went, and its path.
+
+    If a character does not reach the waypoint where its lap begins within `longest` frames, its lap begins at
+    the character's start, with no waypoint reached.
+    """
+    starts = lap_starts(track, laps)
+    animation = ProceduralAnimation(network, characters=laps, waypoints=track, **dict(runtime))
+    starts.place_characters(animation, slice(None))
+    recorded = _record(animation, starts.waypoints + 1, longest)
+    return [_measure_lap(recorded, c, int(starts.waypoints[c]) + 1, len(track), longest) for c in range(laps)]
+
+
+@dataclass(frozen=True)
+class _Recorded:
+    """F frames of C characters.
+
+    toes: (F, C, 2, 3) positions of the toe joints, cm. contacts: (F, C, 4) of left heel, left toe, right
+    heel, right toe. places: (F, C, 2) x and z of the root, cm. The other fields are (F, C). off_track:
+    distance from the track, cm. reached: index of the next waypoint; after the last waypoint of the track it
+    goes on rising. drawn_turn, predicted_turn: the largest turn of a joint since the frame before, as drawn
+    and as predicted, degrees (0 in the first frame). limited: whether the runtime limited the turn of any
+    joint.
+    """
+
+    toes: Array
+    contacts: Array
+    places: Array
+    off_track: Array
+    reached: np.ndarray
+    drawn_turn: Array
+    predicted_turn: Array
+    limited: np.ndarray
+
+
+def _record(animation: ProceduralAnimation, first: np.ndarray, longest: int) -> _Recorded:
+    """Walk until the laps of all characters are over.
+
+    first: (C,) value of `reached` with which each lap begins. longest: a lap lasts at most this many frames.
+    """
+    follower, skeleton, count = animation.follower, animation.skeleton, animation.characters
+    assert follower is not None
+    goal = first + len(follower.track)  # value of `reached` at the end of each lap
+    toes = [skeleton.role("left_toe"), skeleton.role("right_toe")]
+    recorded: list[list[Array]] = [[], [], [], [], []]  # for each value of `now`, the values of all frames
+    turns, lap_frames, frames = _Turns(), np.zeros(count, int), 0
+    while True:
+        begun = follower.reached >= first
+        lap_frames[begun] += 1
+        # A lap is over at its goal or after `longest` frames, or if it has not begun after `longest` frames.
+        if np.all((follower.reached >= goal) | (lap_frames >= longest) | (~begun & (frames >= longest))):
+            break
+        pose = animation.next_pose()
+        positions = pose.positions.reshape(count, -1, 3)
+        now = (
+            positions[:, toes],
+            np.atleast_2d(pose.contacts),
+            np.atleast_2d(pose.root)[:, ::2],
+            follower.off_path.copy(),
+            follower.reached.copy(),
+        )
+        for values, value in zip(recorded, now, strict=True):
+            values.append(value)
+        turns.add(animation, pose.rotations.reshape(count, -1, 4))
+        frames += 1
+    of_toes, contacts, places, off_track, reached = (np.array(values) for values in recorded)
+    return _Recorded(of_toes, contacts, places, off_track, reached.astype(int), *turns.all_measured())
+
+
+class _Turns:
+    """The turns of joints from frame to frame, measured whenever AT_ONCE frames have been added.
+
+    A joint has three rotations in a frame. The network predicts the first. The runtime limits the turn, which
+    gives the second. It then places the feet, which gives the third, the drawn one.
+    """
+
+    def __init__(self) -> None:
+        self._drawn: list[Array] = []
+        self._limited: list[Array] = []
+        self._predicted: list[tuple[Array, Array]] = []
+        self._before: tuple[Array, Array] | None = None
+        self._measured: list[tuple[Array, Array, np.ndarray]] = []
+
+    def add(self, animation: ProceduralAnimation, drawn: Array) -> None:
+        """Add the last frame of C characters. drawn: (C, J, 4) rotations of the drawn pose."""
+        self._drawn.append(drawn)
+        self._limited.append(animation.state.joint_rotation.copy())
+        self._predicted.append(animation.predicted_turns)
+        if len(self._drawn) == AT_ONCE:
+            self._measure()
+
+    def all_measured(self) -> tuple[Array, Array, np.ndarray]:
+        """The fields `drawn_turn`, `predicted_turn` and `limited` of `_Recorded`, for all added frames."""
+        if self._drawn:
+            self._measure()
+        drawn, predicted, limited = (np.concatenate(parts) for parts in zip(*self._measured, strict=True))
+        return drawn, predicted, limited
+
+    def _measure(self) -> None:
+        """Measure the turns of the frames added since the last call, and forget their rotations."""
+        drawn = np.array(self._drawn)
+        predicted = world_rotations(*(np.array(part) for part in zip(*self._predicted, strict=True)))
+        before = self._before or (drawn[0], predicted[0])
+        self._measured.append(
+            (
+                turns_between(np.concatenate([before[0][None], drawn])),
+                turns_between(np.concatenate([before[1][None], predicted])),
+                turn_was_limited(predicted, np.array(self._limited)),
+            )
+        )
+        self._before = drawn[-1], predicted[-1]
+        self._drawn, self._limited, self._predicted = [], [], []
+
+
+def turn_was_limited(predicted: Array, limited: Array) -> np.ndarray:
+    """(...) whether the runtime limited the turn of any joint.
+
+    predicted, limited: (..., J, 4) quaternions before and after the runtime limits turns.
+    """
+    # The dot product of two unit quaternions is 1 or -1 if they are the same rotation.
+    same = np.abs(np.sum(predicted * limited, axis=-1)) > 1 - 1e-6
+    return np.asarray((~same).any(axis=-1))
+
+
+def _measure_lap(
+    recorded: _Recorded, c: int, first: int, waypoints: int, longest: int
+) -> tuple[LapWalk, LapPath]:
+    """How the lap of character c went, and its path.
+
+    first: the value of `reached` with which the lap begins. waypoints: number of waypoints of the track.
+    longest: the lap lasts at most this many frames.
+    """
+    reached = recorded.reached[:, c]
+    begin = int(np.searchsorted(reached, first))
+    begin = 0 if begin == len(reached) else begin  # 0: the character never reached the lap's first waypoint
+    end = min(int(np.searchsorted(reached, first + waypoints)) + 1, begin + longest, len(reached))
+    # `turned` leaves out the lap's first frame, because its turn is since the frame before the lap.
+    span, turned = slice(begin, end), slice(begin + 1, end)
+    slides = foot_slide(recorded.toes[span, c], recorded.contacts[span, c])
+    off_track, reached_in_lap = recorded.off_track[span, c], max(0, int(reached[end - 1]) - first)
+    lap: LapWalk = {
+        "lap": c + 1,
+        "finished": reached_in_lap == waypoints,
+        "frames": end - begin,
+        "seconds": round((end - begin) / FPS, 3),
+        "waypoints_reached": reached_in_lap,
+        "path_overshoot_cm": round(float(np.max(off_track)), 3),
+        "path_distance_cm": round(float(np.mean(off_track)), 3),
+        "foot_slide_cm": round(float(slides.mean()), 4) if len(slides) else None,
+        "steps": len(slides),
+        "largest_turn_degrees": round(float(recorded.drawn_turn[turned, c].max(initial=0.0)), 3),
+        "predicted_turn_degrees": round(float(recorded.predicted_turn[turned, c].max(initial=0.0)), 3),
+        "turns_held_back": int(recorded.limited[span, c].sum()),
+    }
+    return lap, _path(c + 1, recorded.places[span, c], off_track)
+
+
+def _path(lap: int, places: Array, off_track: Array) -> LapPath:
+    """The path of a lap. The place in every PATH_STEP-th frame is stored.
+
+    lap: its number. places: (F, 2) x and z, cm. off_track: (F,) distance from the track, cm. Each stored
+    place has the largest distance since the stored place before it.
+    """
+    stored = range(0, len(places), PATH_STEP)
+    return {
+        "lap": lap,
+        "seconds_between": PATH_STEP / FPS,
+        "x": np.round(places[stored, 0] / 100, 2).tolist(),
+        "z": np.round(places[stored, 1] / 100, 2).tolist(),
+        "off_cm": [round(float(off_track[max(0, f - PATH_STEP + 1) : f + 1].max()), 1) for f in stored],
+    }
+
+
+# The largest numbers of frames that are timed: in each lap, and in all laps together.
+TIMED_OF_LAP, TIMED_OF_ALL = 10 * FPS, 100 * FPS
+WARM_UP = 60  # the first frames are not measured, because compiled code is loaded in them
+
+
+def timed_frames(
+    network: Network, runtime: Runtime, laps: int, longest: int, track: Sequence[Waypoint]
+) -> list[Array]:
+    """For each lap, (F, steps + 1) seconds: of each step in its first F frames, then of the whole call.
+
+    The laps begin as in `hobble.measures.responsivity.laps.walk_laps`, but are walked one after another, with
+    one character at a time. A character alone does the same as among others, to the last bit. longest: the
+    largest number of frames of a lap. F is the least of three numbers: TIMED_OF_LAP, `longest`, and
+    TIMED_OF_ALL divided by the number of laps.
+    """
+    starts = lap_starts(track, laps)
+    animation = ProceduralAnimation(network, waypoints=track, **dict(runtime))
+    for _ in range(WARM_UP):
+        animation.next_pose()
+    frames = max(1, min(TIMED_OF_LAP, TIMED_OF_ALL // laps, longest))
+    out: list[Array] = []
+    for lap in range(laps):
+        starts.place_characters(animation, slice(lap, lap + 1))
+        times = np.empty((frames, len(STEPS) + 1))
+        for row in times:
+            before = perf_counter()
+            animation.next_pose()
+            row[-1] = perf_counter() - before
+            row[:-1] = animation.seconds
+        out.append(times)
+    return out
+
+
+def milliseconds(seconds: Array) -> Milliseconds:
+    """Statistics of frame times. seconds: (F, steps + 1), see `timed_frames`."""
+    ms = 1000 * seconds
+    total = ms[:, : len(STEPS)].sum(axis=1)
+    return {
+        **_named_steps(ms.mean(axis=0)),
+        "total": round(float(total.mean()), 6),
+        "sd": _named_steps(ms.std(axis=0)),
+        "spread": {
+            "sd": round(float(total.std()), 6),
+            "median": round(float(np.median(total)), 6),
+            "p99": round(float(np.percentile(total, 99)), 6),
+            "whole_call": round(float(ms[:, -1].mean()), 6),
+        },
+    }
+
+
+def _named_steps(values: Array) -> Steps:
+    """Step -> its value. values: in the order of STEPS; further values are ignored."""
+    prepare, inputs, insert, predict, output, update = (round(float(v), 6) for v in values[: len(STEPS)])
+    return {
+        "prepare": prepare,
+        "input": inputs,
+        "insert": insert,
+        "predict": predict,
+        "output": output,
+        "update": update,
+    }
+
+
+STORED_PATHS = 5  # the paths of this many laps are stored
+
+
+def measure_responsivity(
+    network: Network,
+    *,
+    configuration: str,
+    runtime: Runtime,
+    laps: int,
+    lap_seconds: float,
+    laps_other_modes: int | None = None,
+    modes: Sequence[str] | None = None,
+    track: Sequence[Waypoint] = TRACK,
+    done: Mapping[str, PieceResults] | None = None,
+) -> Responsivity:
+    """Laps of the track of Segerstedt (2021), in the phase mode of `runtime` and in other modes.
+
+    laps: number of laps in the mode of `runtime`. lap_seconds: simulated time after which a lap ends, even if
+    waypoints remain. laps_other_modes: number of laps in each other mode, at most `laps`; None: `laps`.
+    modes: the phase modes to run in addition to that of `runtime`; by default all modes of the network. done:
+    mode -> what `laps_of_mode` returned for it, if its laps have already been walked.
+
+    The result is described in docs/artefacts.md. Its key `modes` has the laps and the summary of each mode.
+    The laps and the summary of the mode of `runtime` are also at the top level. Only the values under
+    "milliseconds" depend on the clock. `largest_turn_degrees` is the largest turn of a joint from one frame
+    to the next as drawn, and `predicted_turn_degrees` is the largest turn as the network predicts it. In
+    `turns_held_back` frames, the runtime let a joint turn less than predicted. `runs` are the paths of the
+    first STORED_PATHS laps in the mode of `runtime`.
+    """
+    own = network.resolve_mode(runtime.mode)
+    laps_of_others = min(laps, laps_other_modes or laps)
+    of_mode = dict(done or {})
+    for mode in dict.fromkeys((*map(network.resolve_mode, network.modes if modes is None else modes), own)):
+        if mode not in of_mode:
+            in_mode = runtime.model_copy(update={"mode": mode})
+            count = laps if mode == own else laps_of_others
+            of_mode[mode] = laps_of_mode(network, in_mode, count, lap_seconds, track)
+    return {
+        "configuration": configuration,
+        "track": {
+            "waypoints": len(track),
+            "metres": round(
+                sum(np.hypot(*(np.subtract(a.position, b.position))) for a, b in _segments(track)) / 100, 3
+            ),
+            "gaits": [waypoint.gait for waypoint in track],
+            "x": [waypoint.position[0] / 100 for waypoint in track],
+            "z": [waypoint.position[1] / 100 for waypoint in track],
+        },
+        "runs": of_mode[own]["runs"],
+        "parameters": parameter_counts(network.sizes) if network.sizes else None,
+        "stored": {mode: network.stored_numbers(mode) for mode in network.modes},
+        "bytes_each": np.dtype(network.default_storage).itemsize,
+        "exact": network.resolve_mode(None),
+        "laps_other_modes": laps_of_others,
+        **of_mode[own]["laps"],
+        "modes": [piece["laps"] for piece in of_mode.values()],
+    }
+
+
+def laps_of_mode(
+    network: Network,
+    runtime: Runtime,
+    laps: int,
+    lap_seconds: float,
+    track: Sequence[Waypoint] = TRACK,
+) -> PieceResults:
+    """All laps in the mode of `runtime`. For the arguments see `measure_responsivity`."""
+    longest = int(lap_seconds * FPS)
+    times = timed_frames(network, runtime, laps, longest, track)
+    walked = walk_laps(network, runtime, laps, longest, track)
+    results: list[Lap] = [
+        {**lap, "milliseconds": milliseconds(seconds)}
+        for (lap, _), seconds in zip(walked, times, strict=True)
+    ]
+    entry: ModeResults = {
+        "mode": runtime.mode,
+        "laps": results,
+        "laps_finished": sum(lap["finished"] for lap in results),
+        "waypoints_reached": sum(lap["waypoints_reached"] for lap in results),
+        "waypoints": laps * len(track),
+        "mean_lap_seconds": _mean([lap["seconds"] for lap in results if lap["finished"]]),
+        "path_overshoot_cm": max(lap["path_overshoot_cm"] for lap in results),
+        "foot_slide_cm": _mean([lap["foot_slide_cm"] for lap in results]),
+        "largest_turn_degrees": max(lap["largest_turn_degrees"] for lap in results),
+        "predicted_turn_degrees": max(lap["predicted_turn_degrees"] for lap in results),
+        "turns_held_back": sum(lap["turns_held_back"] for lap in results),
+        "milliseconds": milliseconds(np.concatenate(times)),
+    }
+    return {"laps": entry, "runs": [run for _, run in walked[:STORED_PATHS]]}
+
+
+def parameter_counts(sizes: Sequence[int]) -> dict[str, int]:
+    """Number of weights and biases that one frame uses, actual and as Table 6.1 of Segerstedt counts them.
+
+    sizes: units of each layer, from inputs to outputs. true: the actual number. table_6_1: by the formula of
+    the table, the sum of n_l (1 + n_(l+1)) over the layers, plus the number of outputs. table_6_1_as_printed:
+    by the same formula without one of the hidden layers, because the text of the thesis states one hidden
+    layer fewer than the network has.
+
+    >>> parameter_counts((342, 512, 512, 311))
+    {'true': 597815, 'table_6_1': 598157, 'table_6_1_as_printed': 335501}
+    """
+    without_a_layer = [sizes[0], *sizes[2:]]
+    return {
+        "true": sum(a * b + b for a, b in pairwise(sizes)),
+        "table_6_1": sum(a * (1 + b) for a, b in pairwise(sizes)) + sizes[-1],
+        "table_6_1_as_printed": sum(a * (1 + b) for a, b in pairwise(without_a_layer)) + sizes[-1],
+    }
+
+
+def lap_rows(result: Responsivity) -> list[Row]:
+    """The laps of every mode as rows for a CSV file. The last columns are the times and their spread."""
+    rows: list[Row] = []
+    for entry in result["modes"]:
+        for lap in entry["laps"]:
+            # Laps read from a file have sorted keys. The columns have the order of the fields of `Lap`.
+            values: Row = {"mode": entry["mode"]} | lap
+            row = {key: values[key] for key in ("mode", *Lap.__annotations__) if key != "milliseconds"}
+            times: dict[str, Any] = {**lap["milliseconds"]}
+            row |= {f"milliseconds_{key}": times[key] for key in (*STEPS, "total")}
+            row |= {f"milliseconds_{key}_sd": times["sd"][key] for key in STEPS}
+            rows.append(row | {f"milliseconds_{key}": times["spread"][key] for key in Spread.__annotations__})
+    return rows
+
+
+def run_piece(inputs: MeasureInputs, options: Options, piece: str) -> PieceResults:
+    """The laps in one phase mode. piece: the name of the mode."""
+    laps = options.laps if piece == inputs.runtime.mode else min(options.laps, options.laps_other_modes)
+    runtime = inputs.runtime.model_copy(update={"mode": piece})
+    return laps_of_mode(load_network(inputs.weights), runtime, laps, options.lap_seconds)
+
+
+def run(inputs: MeasureInputs, options: Options) -> Outcome:
+    """responsivity.json, and its laps as a table."""
+    done: dict[str, Any] = inputs.measured_pieces()
+    result = measure_responsivity(
+        load_network(inputs.weights),
+        configuration=inputs.configuration,
+        runtime=inputs.runtime,
+        laps=options.laps,
+        lap_seconds=options.lap_seconds,
+        laps_other_modes=options.laps_other_modes,
+        modes=options.modes,
+        done=done,
+    )
+    reached = [
+        f"{m['mode']}: {m['waypoints_reached']} of {m['waypoints']} waypoints" for m in result["modes"]
+    ]
+    return Outcome(result, {"laps": lap_rows(result)}, "; ".join(reached))
+
+
+def _segments(track: Sequence[Waypoint]) -> list[tuple[Waypoint, Waypoint]]:
+    """The two ends of each segment of the closed track. The last segment ends at the first waypoint."""
+    return list(zip(track, [*track[1:], track[0]], strict=True))
+
+
+def _mean(values: list[float | None]) -> float | None:
+    """The mean of the values that are not None; None if there are none."""
+    known = [v for v in values if v is not None]
+    return round(float(np.mean(known)), 4) if known else None

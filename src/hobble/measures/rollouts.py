@@ -1,0 +1,202 @@
+"""Errors of roll-outs, in which the network continues from its own poses."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from hobble.report.gather import ReportMaterial
+
+from collections.abc import Iterator, Sequence
+from functools import partial
+from typing import Annotated, Any
+
+from pydantic import AfterValidator, Field
+
+from hobble.core.files import Json
+from hobble.core.section import Positive
+from hobble.measures.accuracy import COLOURS, NAMES
+from hobble.measures.compare import ComparisonAddition, ConfigurationResults
+from hobble.measures.measure import SPLITS, Cost, JointOptions, Measure, Row, SampleOptions, sample_in_words
+from hobble.report.parts import SPLITS as SPLIT_LABELS
+from hobble.report.parts import (
+    Chart,
+    Compared,
+    PageSection,
+    SectionPart,
+    Trace,
+    Verdict,
+    axis,
+    configuration_colours,
+    format_number,
+    line_trace,
+    log_axis,
+    verdict_on_lowest,
+)
+
+
+def _require_lengths(lengths: tuple[int, ...]) -> tuple[int, ...]:
+    """Returns `lengths`. Raises ValueError if it is empty."""
+    if not lengths:
+        raise ValueError("must name at least one number of frames")
+    return lengths
+
+
+class Options(JointOptions, SampleOptions):
+    """The keys of this measurement in a configuration's section `evaluation`."""
+
+    rollouts: Annotated[tuple[Positive, ...], AfterValidator(_require_lengths)] = Field(
+        (1, 10, 60, 300), description="lengths of roll-outs, in frames"
+    )
+
+
+MEASURE = Measure(
+    name="rollouts",
+    module=__name__,
+    inputs=("weights", "clips", "summaries", "skeleton"),
+    options=Options,
+    runtime=("mode",),
+    cost=Cost(memory_mb=120, mb_per_1000_frames=27, seconds_per_1000_frames=0.6, least_minutes=30),
+)
+
+
+def section(found: Json, material: ReportMaterial) -> PageSection:
+    """The chart, which is added to the section on accuracy."""
+    return PageSection("accuracy", [SectionPart(50, rollout_chart(found))])
+
+
+def sample_note(found: Json) -> str:
+    """Sentences about the measured sample and the error bars; empty if all clips were measured as a whole."""
+    words = sample_in_words(found)
+    return f" Measured on {words}. Whiskers are 95 % confidence intervals." if words else ""
+
+
+def _error_bars(found: Json, split: str) -> dict[str, Any]:
+    """Plotly error bars of the mean errors of a split: half widths of their 95 % confidence intervals."""
+    entries = [entry[split] for entry in found["lengths"]]
+    known = [entry for entry in entries if entry.get("position_error_cm") is not None]
+    half_widths = [(entry.get("interval") or {}).get("position_error_cm", 0.0) for entry in known]
+    return {"type": "data", "array": half_widths, "color": "@faint", "thickness": 1}
+
+
+def rollout_chart(found: Json) -> Chart | None:
+    """How the error grows when the network continues from its own poses."""
+    traces = []
+    for split in ("held_out", "train"):
+        rows = [
+            (entry["length"], entry[split]["position_error_cm"])
+            for entry in found.get("lengths", ())
+            if (entry.get(split) or {}).get("position_error_cm") is not None
+        ]
+        if rows:
+            x, y = zip(*rows, strict=True)
+            error_bars = {"error_y": _error_bars(found, split)} if found.get("sample") else {}
+            traces.append(line_trace(NAMES[split], x, y, COLOURS[split], mode="lines+markers", **error_bars))
+    if not traces:
+        return None
+    return Chart(
+        "rollouts",
+        "Error when the network continues from its own poses",
+        "Mean distance between a joint and its captured position. In a roll-out, the network continues from "
+        "its own poses, as at run time. The horizontal axis shows the length of the roll-outs (60 frames are "
+        "one second). If the line flattens, the character stays stable. A joint is drawn halfway between its "
+        "predicted position and the position to which its predicted velocity takes it. This chart measures "
+        "the drawn positions, before the feet are put on the ground. The charts above measure only the "
+        "predicted position, so their error differs from the value at 1 frame in this chart."
+        + sample_note(found),
+        traces,
+        {
+            "xaxis": log_axis("frames", [x for trace in traces for x in trace["x"]]),
+            "yaxis": axis("cm per joint", rangemode="tozero"),
+        },
+    )
+
+
+NAME = "rollouts"
+
+
+def compared(all_measured: Sequence[ConfigurationResults], published: Json) -> ComparisonAddition:
+    """A list entry for each configuration and length of roll-outs, without the errors of single clips."""
+    return ComparisonAddition(
+        entries=[
+            {"configuration": m.name, **{k: v for k, v in entry.items() if k != "clips"}}
+            for m in all_measured
+            for entry in m.results_of(NAME)["lengths"]
+        ]
+    )
+
+
+def tables(compared: Json) -> dict[str, list[Row]]:
+    """One table, with a row for each configuration, length and split."""
+    rows: list[Row] = [
+        {"configuration": entry["configuration"], "length": entry["length"], "split": split, **entry[split]}
+        for entry in compared[NAME]
+        for split in SPLITS
+    ]
+    return {NAME: rows}
+
+
+FRAMES_PER_SECOND = 60
+
+
+def compared_section(compared: Compared) -> PageSection:
+    """The chart, which is added to the section on accuracy."""
+    return PageSection("accuracy", [SectionPart(20, compared_chart(compared))])
+
+
+def compared_verdicts(compared: Compared) -> Iterator[Verdict]:
+    """Which configuration stays closest to the captured motion in roll-outs of about a second.
+
+    The held-out clips are compared, or the training clips if there are no errors of held-out clips.
+    """
+    lengths = {row["length"] for row in compared["rollouts"]}
+    length = min(lengths, key=lambda n: abs(n - FRAMES_PER_SECOND), default=None)
+    rows = [row for row in compared["rollouts"] if row["length"] == length]
+    for split, label in SPLIT_LABELS.items():
+        errors = {row["configuration"]: (row[split] or {}).get("position_error_cm") for row in rows}
+        if any(value is not None for value in errors.values()):
+            ending = f"cm from the captured joints on average, in roll-outs of {length} frames on {label}"
+            yield from verdict_on_lowest(
+                10,
+                "Closest to captured motion",
+                errors,
+                partial(_distance_words, ending),
+            )
+            return
+
+
+def _distance_words(ending: str, name: str, value: float) -> str:
+    """Half of a sentence: the mean distance `value` of the configuration `name`, followed by `ending`."""
+    return f"the joints of {name} are {format_number(value, 3)} {ending}"
+
+
+def compared_chart(compared: Compared) -> Chart | None:
+    """How the error grows when the networks continue from their own poses."""
+    options: dict[str, list[Trace]] = {}
+    for split, label in SPLIT_LABELS.items():
+        traces = []
+        for name, colour in configuration_colours(compared).items():
+            rows = [r for r in compared.get("rollouts", ()) if r["configuration"] == name]
+            rows = [r for r in rows if (r[split] or {}).get("position_error_cm") is not None]
+            if rows:
+                x = [row["length"] for row in rows]
+                y = [row[split]["position_error_cm"] for row in rows]
+                traces.append(line_trace(name, x, y, colour, mode="lines+markers"))
+        if traces:
+            options[label] = traces
+    if not options:
+        return None
+    return Chart(
+        "compare-rollouts",
+        "Error when a network continues from its own poses",
+        "Mean distance between a joint and its captured position. In a roll-out, a network continues from "
+        "its own poses. The horizontal axis shows the length of the roll-outs (60 frames are one second).",
+        layout={
+            "xaxis": log_axis(
+                "frames", [x for traces in options.values() for trace in traces for x in trace["x"]]
+            ),
+            "yaxis": axis("cm per joint", rangemode="tozero"),
+        },
+        choose="Clips",
+        options=options,
+    )

@@ -1,0 +1,455 @@
+"""Walks of generated figures, and what is measured of a walk.
+
+Centimetres, degrees, 60 frames a second. F is the number of frames, J that of joints. contacts: (F, 4)
+predicted contacts with the ground, from 0 to 1, of left heel, left toe, right heel, right toe.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from hobble.core.quat import Array
+from hobble.core.skeleton import Skeleton
+from hobble.models.network import Network
+from hobble.runtime.animation import ProceduralAnimation
+from hobble.runtime.options import Runtime
+
+STANCE = 0.5  # a foot counts as standing if its predicted contact is at least this
+SHORTEST_STANCE = 4  # frames; a shorter contact is neither a stance nor a step
+# A toe skates if it moves less than this many cm above the height of a standing toe (Zhang et al. 2018).
+SKATING_BELOW = 2.5
+
+
+def runs_of_true(on: np.ndarray) -> np.ndarray:
+    """(N, 2) for each run of true values in `on` (F,): its first frame, and the first frame after it.
+
+    >>> runs_of_true(np.array([False, True, True, False, True])).tolist()
+    [[1, 3], [4, 5]]
+    """
+    edges = np.diff(np.concatenate([[0], np.asarray(on, np.int8), [0]]))
+    return np.flatnonzero(edges).reshape(-1, 2)
+
+
+def feet_in_stance(contacts: Array) -> np.ndarray:
+    """(F, 2) whether the left and the right foot stand, on heel or toe or both. contacts: (F, 4)."""
+    return np.maximum(contacts[:, ::2], contacts[:, 1::2]) >= STANCE
+
+
+def foot_slide(toes: Array, contacts: Array) -> Array:
+    """(N,) how far the toe slides over the ground in each of N stances, cm.
+
+    The stances of the left foot come first. A stance is a run of at least SHORTEST_STANCE frames in which the
+    toe has contact. toes: (F, 2, 3) positions of the left and right toe, cm. contacts: (F, 4).
+    """
+    out = []
+    for side in range(2):
+        moved = np.linalg.norm(np.diff(toes[:, side, ::2], axis=0), axis=1)
+        for start, end in runs_of_true(contacts[:, 2 * side + 1] >= STANCE):
+            if end - start >= SHORTEST_STANCE:
+                out.append(moved[start : end - 1].sum())
+    return np.array(out)
+
+
+def skating(toes: Array, standing_height: float) -> Array:
+    """(F - 1, 2) how far each toe skates over the ground from one frame to the next, cm.
+
+    Predicted contacts are not used. After Zhang, Starke, Komura, Saito (2018), a horizontal movement v counts
+    as v (2 - 2^(h / SKATING_BELOW)): all of it on the ground, none of it at SKATING_BELOW. h is the toe's
+    height above `standing_height`, clipped to 0 .. SKATING_BELOW. Of the heights before and after the
+    movement, the larger is taken. toes: (F, 2, 3) positions of the left and right toe, cm, heights above the
+    ground. standing_height: height of the toe joint of a standing foot, cm.
+    """
+    moved = np.linalg.norm(np.diff(toes[..., ::2], axis=0), axis=-1)
+    height = np.maximum(toes[1:, :, 1], toes[:-1, :, 1]) - standing_height
+    return np.asarray(moved * (2.0 - 2.0 ** (np.clip(height, 0.0, SKATING_BELOW) / SKATING_BELOW)))
+
+
+def largest_turn(rotations: Array) -> float:
+    """Largest rotation of any joint from one frame to the next, degrees.
+
+    rotations: (F, J, 4) quaternions of the joints in the world.
+    """
+    return float(turns_between(rotations).max(initial=0.0))
+
+
+def turns_between(rotations: Array) -> Array:
+    """(F - 1, ...) largest rotation of any joint since the frame before, degrees.
+
+    rotations: (F, ..., J, 4) quaternions of the joints in the world.
+    """
+    # Two rotations whose quaternions have the dot product d differ by an angle of 2 arccos |d|.
+    dot = np.abs(np.sum(rotations[1:] * rotations[:-1], axis=-1, dtype=float))
+    return np.asarray(np.degrees(2 * np.arccos(np.minimum(1.0, dot.min(axis=-1)))))
+
+
+def acceleration(positions: Array) -> Array:
+    """(F - 2, ...) length of the second difference of positions (F, ..., 3), cm per frame squared."""
+    return np.linalg.norm(np.diff(positions, n=2, axis=0), axis=-1)
+
+
+def bend(a: Array, b: Array, c: Array) -> Array:
+    """(...) degrees by which a limb is bent at b; 0 is straight.
+
+    a, b, c: (..., 3) positions of three successive joints of the limb.
+    """
+    u, v = b - a, c - b
+    cosine = np.sum(u * v, axis=-1) / np.maximum(
+        np.linalg.norm(u, axis=-1) * np.linalg.norm(v, axis=-1), 1e-9
+    )
+    return np.degrees(np.arccos(np.clip(cosine, -1, 1)))
+
+
+def in_root_coordinates(positions: Array, root: Array, yaw: Array) -> Array:
+    """Convert world positions (..., J, 3) to coordinates of a root at `root` (..., 3) with `yaw` (...)."""
+    p = positions - root[..., None, :]
+    sin, cos = np.sin(yaw)[..., None], np.cos(yaw)[..., None]
+    x, z = p[..., 0] * cos - p[..., 2] * sin, p[..., 0] * sin + p[..., 2] * cos
+    return np.stack([x, p[..., 1], z], axis=-1)
+
+
+def asymmetry(left: float | None, right: float | None) -> float | None:
+    """(left - right) / mean of both: positive if the left is larger. None if one is None or both are 0."""
+    if left is None or right is None or left + right == 0:
+        return None
+    return 2 * (left - right) / (left + right)
+
+
+def gait_measures(
+    skeleton: Skeleton, local: Array, contacts: Array, travelled: Array
+) -> dict[str, float | None]:
+    """Measures of one character's walk: name -> value.
+
+    local: (F, J, 3) joint positions in root coordinates, cm. contacts: (F, 4). travelled: (F, 3) positions of
+    the root in the world, cm.
+
+    `speed`: cm/s, from the straight distance between the first and last root. `stance_left`: share of the
+    frames in which the foot stands. `step_left`: mean step length, cm, that is how far the landing heel is
+    ahead of the other heel; None if there is no step. `knee_left`, `arm_left`: range of the knee's bend and
+    of the arm's swing, degrees from the 5th to the 95th percentile. The right side has the same measures.
+    `stance_asymmetry`, `step_asymmetry`: see `asymmetry`. `lean_forward`, `lean_left`: mean lean of the
+    trunk, degrees. `hip_height`: mean height of the hips, cm.
+    """
+    role = skeleton.role
+    seconds = (len(local) - 1) / 60
+    standing = feet_in_stance(contacts)
+    heels = local[:, [role("left_heel"), role("right_heel")], 2]  # how far forward
+    steps: list[list[float]] = [[], []]  # lengths of the left foot's steps, then of the right foot's
+    for side in range(2):
+        for start, end in runs_of_true(standing[:, side]):
+            if start > 0 and end - start >= SHORTEST_STANCE:  # a stance from frame 0 has no landing
+                steps[side].append(heels[start, side] - heels[start, 1 - side])
+    step_lengths = [float(np.mean(lengths)) if lengths else None for lengths in steps]
+    stance_shares = [float(share) for share in standing.mean(axis=0)]
+    out: dict[str, Any] = {
+        "speed": float(np.linalg.norm((travelled[-1] - travelled[0])[::2]) / seconds),
+        "stance_left": stance_shares[0],
+        "stance_right": stance_shares[1],
+        "stance_asymmetry": asymmetry(*stance_shares),
+        "step_left": step_lengths[0],
+        "step_right": step_lengths[1],
+        "step_asymmetry": asymmetry(*step_lengths),
+    }
+    for name in ("left", "right"):
+        hip, knee, heel = (local[:, role(f"{name}_{part}")] for part in ("hip", "knee", "heel"))
+        arm = local[:, role(f"{name}_wrist")] - local[:, role(f"{name}_shoulder")]
+        out[f"knee_{name}"] = _percentile_range(bend(hip, knee, heel))
+        out[f"arm_{name}"] = _percentile_range(np.degrees(np.arctan2(arm[:, 2], -arm[:, 1])))
+    trunk = (local[:, role("neck")] - local[:, role("hips")]).mean(axis=0)
+    out["lean_forward"] = float(np.degrees(np.arctan2(trunk[2], trunk[1])))
+    out["lean_left"] = float(np.degrees(np.arctan2(trunk[0], trunk[1])))
+    out["hip_height"] = float(local[:, role("hips"), 1].mean())
+    return out
+
+
+def _percentile_range(angles: Array) -> float:
+    """Difference between the 95th and the 5th percentile."""
+    low, high = np.percentile(angles, [5, 95])
+    return float(high - low)
+
+
+FPS = 60
+SPEEDS = {"walk": 2.5, "jog": 7.0}  # target speeds, cm a frame
+VELOCITY, GAIT = "target_velocity", "gait"  # the names of the targets that are not channels
+# This share of a stretch, at its start, is not measured, because the motion still changes to the new target.
+SETTLING_SHARE = 0.25
+
+
+@dataclass(frozen=True)
+class CrowdTarget:
+    """The targets of C figures for a stretch of `frames` frames. They are constant in the stretch.
+
+    gait: (C,) names of gaits. channels: name -> values (C, columns). speed: (C,) cm a frame; None: the SPEEDS
+    of the gaits, which then have to be keys of SPEEDS.
+    """
+
+    frames: int
+    gait: Sequence[str]
+    channels: Mapping[str, Array] = field(default_factory=dict, repr=False)
+    speed: Sequence[float] | None = None
+
+
+@dataclass(frozen=True)
+class Walks:
+    """The motion of C figures over F frames, which consist of S stretches, one for each `CrowdTarget`.
+
+    local: (F, C, J, 3) joint positions in root coordinates, cm, float32. contacts: (F, C, 4) predicted
+    contacts of left heel, left toe, right heel, right toe. phase: (F, C) from 0 to 1. root: (F, C, 3)
+    positions of the root in the world, cm. acceleration: (F, C) the largest of any joint, cm per frame
+    squared, 0 in the first and last frame. starts: (S + 1,) first frame of each stretch, then F.
+    """
+
+    local: Array = field(repr=False)
+    contacts: Array = field(repr=False)
+    phase: Array = field(repr=False)
+    root: Array = field(repr=False)
+    acceleration: Array = field(repr=False)
+    starts: np.ndarray
+
+    def of_figures(self, figures: slice) -> Walks:
+        """The motion of the figures in the slice `figures`."""
+        return Walks(
+            self.local[:, figures],
+            self.contacts[:, figures],
+            self.phase[:, figures],
+            self.root[:, figures],
+            self.acceleration[:, figures],
+            self.starts,
+        )
+
+    def measured_frames(self, stretch: int, figure: int) -> slice:
+        """The frames of stretch number `stretch` in which figure number `figure` is measured.
+
+        The first SETTLING_SHARE of the stretch is left out. After it, as many whole gait cycles as fit are
+        measured, up to the end of the stretch. If not even one fits, all frames after the first share are.
+        """
+        start, stop = int(self.starts[stretch]), int(self.starts[stretch + 1])
+        start += round(SETTLING_SHARE * (stop - start))
+        # Cycles that the figure has walked since frame `start`, with fractions.
+        cycles = np.concatenate([[0.0], np.cumsum(np.mod(np.diff(self.phase[start:stop, figure]), 1.0))])
+        whole = np.floor(cycles[-1])
+        if whole < 1:
+            return slice(start, stop)
+        return slice(start + int(np.searchsorted(cycles, cycles[-1] - whole)), stop)
+
+
+def generate_walks(network: Network, script: Sequence[CrowdTarget], runtime: Runtime) -> Walks:
+    """The motion of C figures that follow `script`. They begin standing and walk ahead on flat ground.
+
+    script: one `CrowdTarget` for each stretch, in order. Figures with the same targets move in the same way,
+    to the last bit, until their targets first differ. So, to save time, a single character of the animation
+    walks for all of them until then.
+    """
+    assert network.skeleton is not None
+    count, frames = len(script[0].gait), sum(s.frames for s in script)
+    animation = ProceduralAnimation(network, **dict(runtime))
+    walker = np.zeros(count, int)  # the character that walks for each figure
+    local = np.zeros((frames, count, len(network.skeleton.joints), 3), np.float32)
+    contacts, root = np.zeros((frames, count, 4)), np.zeros((frames, count, 3))
+    phase, acceleration = np.zeros((frames, count)), np.zeros((frames, count))
+    recent: list[Array] = []  # joint positions in the world, of the last three frames or fewer
+    frame = 0
+    for stretch in script:
+        target = _targets(network, stretch)
+        first, new_walker = _group_by_target(walker, *target.values())
+        if len(first) > animation.characters:
+            # Figures with one character now have different targets. Each target gets a copy of the character.
+            copied = walker[first]  # (new characters,) the character from which each new one is copied
+            animation, recent = animation.copies(copied), [p[copied] for p in recent]
+            walker = new_walker
+        target_now = {name: values[_first_figures(walker)] for name, values in target.items()}
+        velocity, shares = target_now.pop(VELOCITY), target_now.pop(GAIT)
+        for _ in range(stretch.frames):
+            pose = animation.next_pose(velocity, gait=shares, **target_now)
+            # The arrays of a single character have no axis for characters. It is added here.
+            positions, roots = pose.positions.reshape(len(shares), -1, 3), np.atleast_2d(pose.root)
+            root[frame], phase[frame] = roots[walker], np.atleast_1d(pose.phase)[walker]
+            contacts[frame] = np.atleast_2d(pose.contacts)[walker]
+            local[frame] = in_root_coordinates(positions, roots, np.atleast_1d(pose.yaw))[walker]
+            recent = [*recent[-2:], positions]
+            if len(recent) == 3:
+                second_difference = recent[2] - 2 * recent[1] + recent[0]
+                squared = np.einsum("cjk,cjk->cj", second_difference, second_difference)
+                acceleration[frame - 1] = np.sqrt(np.max(squared, axis=1))[walker]
+            frame += 1
+    starts = np.cumsum([0, *(s.frames for s in script)])
+    return Walks(local, contacts, phase, root, acceleration, starts)
+
+
+def _targets(network: Network, stretch: CrowdTarget) -> dict[str, Array]:
+    """The targets of C figures in a stretch, by name.
+
+    VELOCITY: (C, 2) to the side and forward, cm a frame. GAIT: (C, 6) shares of the gaits. Name of each
+    channel: (C, columns) its values.
+    """
+    velocity = np.zeros((len(stretch.gait), 2))
+    velocity[:, 1] = [SPEEDS[name] for name in stretch.gait] if stretch.speed is None else stretch.speed
+    shares = np.array([[float(name == gait) for name in network.gaits] for gait in stretch.gait])
+    return {VELOCITY: velocity, GAIT: shares, **stretch.channels}
+
+
+def _group_by_target(walker: np.ndarray, *targets: Array) -> tuple[np.ndarray, np.ndarray]:
+    """Group the figures that had the same character so far and have the same targets from now on.
+
+    walker: (C,) the character that walked for each figure so far. targets: arrays (C, n). Returns (groups,)
+    the first figure of each group, and (C,) the group of each figure.
+    """
+    alike = np.column_stack([walker, *targets])
+    _, first, group = np.unique(alike, axis=0, return_index=True, return_inverse=True)
+    return first, group.reshape(-1)
+
+
+def _first_figures(walker: np.ndarray) -> np.ndarray:
+    """(characters,) the first figure of each character. walker: (C,) the character of each figure."""
+    return np.unique(walker, return_index=True)[1]
+
+
+def channel_values(network: Network, name: str, figures: Sequence[Mapping[str, float]]) -> dict[str, Array]:
+    """{name: values (C, columns)} for `CrowdTarget.channels`, or {} if the network lacks the channel `name`.
+
+    figures: for each of C figures, name of a column -> value. Columns that are not named are 0.
+    """
+    columns = network.channels.get(name)
+    if columns is None:
+        return {}
+    out = np.zeros((len(figures), len(columns)))
+    for row, values in zip(out, figures, strict=True):
+        for column, value in values.items():
+            row[columns.index(column)] = value
+    return {name: out}
+
+
+PHASES = 24  # phase bins of a cycle
+# A distance has settled when it differs from its last value by at most this share of its whole change.
+SETTLED_SHARE = 0.1
+SMALLEST_CHANGE_CM = 0.1  # smaller changes get no settling time
+
+
+def phase_bins(phase: Array) -> np.ndarray:
+    """(...) index of the bin of each phase, 0 to PHASES - 1. phase: (...) from 0 to 1."""
+    return np.minimum((np.asarray(phase) * PHASES).astype(int), PHASES - 1)
+
+
+def mean_cycle(local: Array, phase: Array) -> Array:
+    """(PHASES, J, 3) mean pose in each phase bin. local: (F, J, 3) joint positions, cm. phase: (F,).
+
+    An empty bin gets the pose of the nearest bin that is not empty.
+    """
+    bin_of_frame = phase_bins(phase)
+    mean = np.zeros((PHASES, *local.shape[1:]))
+    filled = np.unique(bin_of_frame)
+    for b in filled:
+        mean[b] = local[bin_of_frame == b].mean(axis=0)
+    for b in set(range(PHASES)) - set(filled.tolist()):
+        gap = np.abs(filled - b)
+        nearest = np.argmin(np.minimum(gap, PHASES - gap))  # the last bin is next to the first
+        mean[b] = mean[filled[nearest]]
+    return mean
+
+
+def distance_to_cycle(local: Array, phase: Array, cycle: Array) -> Array:
+    """(F,) distance of each pose from the pose of a mean cycle at the same phase, cm, mean over the joints.
+
+    local: (F, J, 3) joint positions, cm. phase: (F,). cycle: result of `mean_cycle`.
+    """
+    return np.linalg.norm(local - cycle[phase_bins(phase)], axis=-1).mean(axis=-1)
+
+
+def cycle_frames(phase: Array) -> int:
+    """Mean length of a cycle in frames, limited to the range from 10 to 90. phase: (F,)."""
+    rate = np.mod(np.diff(phase), 1.0).mean()
+    return int(np.clip(round(1 / max(rate, 1e-3)), 10, 3 * FPS // 2))
+
+
+def settling_seconds(distance: Array, normal: float, window: int) -> float | None:
+    """Seconds from a change until a motion has settled.
+
+    The motion has settled when `distance` is close to its last value and stays so.
+
+    distance: (F,) distance to a reference motion in each frame after the change, cm. normal: the distance
+    before the change, cm. window: number of frames over which `distance` is averaged, usually a cycle.
+    "Close" means within SETTLED_SHARE of the difference between `normal` and the last value. None if this
+    difference is below SMALLEST_CHANGE_CM.
+    """
+    window = min(window, len(distance))
+    smooth = np.convolve(distance, np.ones(window) / window, mode="valid")
+    change = abs(float(smooth[-1]) - normal)
+    if change < SMALLEST_CHANGE_CM:
+        return None
+    unsettled = np.abs(smooth - smooth[-1]) > SETTLED_SHARE * change
+    return round((int(np.flatnonzero(unsettled)[-1]) + window if np.any(unsettled) else 0) / FPS, 5)
+
+
+SIDES = ("left", "right")
+
+
+def gait_features(skeleton: Skeleton, local: Array, contacts: Array, root: Array) -> dict[str, float]:
+    """The results of `gait_measures`, and means and standard deviations (sd) of angles, heights and sway.
+
+    local: (F, J, 3) joint positions in root coordinates, cm. contacts: (F, 4) of left heel, left toe, right
+    heel, right toe. root: (F, 3) positions of the root in the world, cm. Returns name -> value. Angles are in
+    degrees, lengths in cm, the speed in cm/s. Step lengths and asymmetries are 0 if there is no step.
+    """
+    measurements = gait_measures(skeleton, local, contacts, root)
+    out = {name: value if value is not None else 0.0 for name, value in measurements.items()}
+    joints = {
+        f"{side}_{part}": local[:, skeleton.role(f"{side}_{part}")].astype(float)
+        for side in SIDES
+        for part in ("hip", "knee", "heel", "toe", "shoulder", "elbow", "wrist")
+    }
+    hips, neck = (local[:, skeleton.role(part)].astype(float) for part in ("hips", "neck"))
+    for side in SIDES:
+        hip, knee, heel, toe = (joints[f"{side}_{part}"] for part in ("hip", "knee", "heel", "toe"))
+        shoulder, elbow, wrist = (joints[f"{side}_{part}"] for part in ("shoulder", "elbow", "wrist"))
+        angles = {
+            "thigh": _swing(knee - hip),
+            "knee_bend": bend(hip, knee, heel),
+            "ankle": bend(knee, heel, toe),
+            "upper_arm": _swing(elbow - shoulder),
+            "elbow": bend(shoulder, elbow, wrist),
+        }
+        for name, angle in angles.items():
+            out |= _mean_and_sd(f"{name}_{side}", angle)
+        out[f"elbow_out_{side}"] = float(np.mean((elbow - shoulder)[:, 0]))  # to the left, on both sides
+        out[f"wrist_height_{side}"] = float(np.mean((wrist - shoulder)[:, 1]))
+        out[f"toe_lift_{side}"] = float(np.ptp(toe[:, 1]))
+    out |= _mean_and_sd("pelvis_height", hips[:, 1])
+    out |= _mean_and_sd("pelvis_sway", hips[:, 0])
+    out |= _mean_and_sd("trunk_forward", _swing(hips - neck))  # negative if the trunk leans forward
+    out |= _mean_and_sd("trunk_side", np.degrees(np.arctan2((neck - hips)[:, 0], (neck - hips)[:, 1])))
+    across = joints["left_shoulder"] - joints["right_shoulder"]
+    out |= _mean_and_sd("shoulder_twist", np.degrees(np.arctan2(across[:, 2], across[:, 0])))
+    return out
+
+
+def _swing(down: Array) -> Array:
+    """(F,) degrees by which a limb is swung forward; 0 if it points straight down.
+
+    down: (F, 3) from the upper to the lower end of the limb, in root coordinates.
+    """
+    return np.degrees(np.arctan2(down[:, 2], -down[:, 1]))
+
+
+def _mean_and_sd(name: str, values: Array) -> dict[str, float]:
+    return {f"{name}_mean": float(np.mean(values)), f"{name}_sd": float(np.std(values))}
+
+
+def spearman(x: Sequence[float] | Array, y: Sequence[float | None]) -> float | None:
+    """Spearman's rank correlation of the pairs (x, y) in which y is not None.
+
+    None if fewer than 3 pairs remain or if all their y are equal.
+    """
+    pairs = [(a, b) for a, b in zip(x, y, strict=True) if b is not None]
+    if len(pairs) < 3 or len({b for _, b in pairs}) < 2:
+        return None
+    ranks = np.array([_ranks(np.array(v)) for v in zip(*pairs, strict=True)])
+    return round(float(np.corrcoef(ranks)[0, 1]), 5)
+
+
+def _ranks(values: Array) -> Array:
+    """The rank of each value (N,), from 1. Equal values get the mean of their ranks."""
+    _, group, count = np.unique(values, return_inverse=True, return_counts=True)
+    return (np.cumsum(count) - (count - 1) / 2)[group]

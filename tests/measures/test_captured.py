@@ -1,0 +1,90 @@
+"""Rows converted back to motion have the path, accelerations and heights of the original motion."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from hobble.measures.sample import Sample, Stratum, captured_motion
+from hobble.measures.walks import acceleration, in_root_coordinates
+from hobble.rows.captured import captured_stretches, root_path, unbroken_stretches
+from hobble.rows.clip_rows import ClipRows, save_clip_rows
+from hobble.rows.excerpts import Excerpt
+from hobble.rows.layout import GAITS, RowLayout
+
+LAYOUT = RowLayout(3, channels=(("injury", 2),))
+FRAMES = 50
+
+
+@pytest.fixture
+def world() -> dict[str, np.ndarray]:
+    """A figure of three joints on a curved path."""
+    rng = np.random.default_rng(1)
+    t = np.arange(FRAMES + 1) / 20
+    yaw = 0.4 + 0.8 * np.sin(t)
+    root = np.stack([60 * np.sin(t), 0 * t, 80 * t], axis=1)
+    joints = root[:, None] + rng.normal(0, 10, (1, 3, 3)) + np.sin(3 * t)[:, None, None] * [[1.0, 2, 3]]
+    joints[..., 1] += 50
+    return {"yaw": yaw, "root": root, "joints": joints}
+
+
+def level(vectors: np.ndarray, yaw: np.ndarray) -> np.ndarray:
+    """World vectors (..., 3), relative to a root with this yaw."""
+    return in_root_coordinates(vectors, np.zeros((*vectors.shape[:-2], 3)), yaw)
+
+
+@pytest.fixture
+def rows(world) -> ClipRows:
+    """Rows as the format defines them. The ground of the first fit is 3 cm below the world's zero."""
+    yaw, root, joints = world["yaw"], world["root"], world["joints"]
+    y = np.zeros((FRAMES, LAYOUT.y_size))
+    here = yaw[:-1]
+    y[:, LAYOUT.y_root_velocity] = level(np.diff(root, axis=0)[:, None], here)[:, 0, ::2]
+    y[:, LAYOUT.y_turn] = -np.diff(yaw)[:, None]
+    y[:, LAYOUT.y_joint_position] = in_root_coordinates(joints[:-1], root[:-1], here).reshape(FRAMES, -1)
+    y[:, LAYOUT.y_joint_velocity] = level(np.diff(joints, axis=0), here).reshape(FRAMES, -1)
+    x = np.zeros((FRAMES, LAYOUT.x_terrain.start))
+    gait = np.zeros((FRAMES, len(GAITS), LAYOUT.samples))
+    gait[:, 2, LAYOUT.samples // 2 :] = 1
+    gait[:, 1, : LAYOUT.samples // 2] = 1
+    x[:, LAYOUT.x_gait] = gait.reshape(FRAMES, -1)
+    frame = np.arange(FRAMES) + 60
+    severity = np.tile([0.0, 4.0], (FRAMES, 1))
+    heights, mean = np.zeros((2 * FRAMES, 36)), np.tile([-3.0, 99.0], FRAMES)
+    fits = np.full(FRAMES, 2)
+    phase = np.linspace(0, 0.9, FRAMES)
+    return ClipRows("a", LAYOUT, {}, x, y, phase, {"injury": severity}, frame, 0 * frame, fits, heights, mean)
+
+
+def test_captured_motion_is_recovered_from_its_rows(rows, world) -> None:
+    (found,) = captured_stretches(rows)
+    assert len(found) == FRAMES
+    yaw, root, joints = world["yaw"], world["root"][:-1], world["joints"][:-1]
+    way = level((root - root[0])[:, None], np.full(FRAMES, yaw[0]))[:, 0]
+    np.testing.assert_allclose(found.root, way, atol=1e-9)
+    # Heights are above the ground.
+    np.testing.assert_allclose(found.local[..., 1], joints[..., 1] + 3, atol=1e-9)
+    np.testing.assert_allclose(found.acceleration[1:-1], acceleration(joints).max(axis=1), atol=1e-9)
+    assert found.acceleration[0] == 0
+    assert (found.gait == np.eye(len(GAITS))[2]).all()
+    np.testing.assert_allclose(found.velocity, rows.y[:, LAYOUT.y_root_velocity])
+    np.testing.assert_array_equal(found.channels["injury"], rows.channels["injury"])
+
+
+def test_a_gap_in_the_frames_separates_two_stretches(rows, tmp_path) -> None:
+    rows.frame[30:] += 2
+    first, second = captured_stretches(rows)
+    assert (len(first), len(second)) == (30, 20)
+    np.testing.assert_allclose(second.root[0], 0)
+    assert second.rows[0] == 30
+    save_clip_rows(tmp_path / "b.npz", rows)
+    save_clip_rows(tmp_path / "a.npz", rows)
+    paths = {name: tmp_path / f"{name}.npz" for name in "ba"}
+    assert [len(c) for c in captured_motion(paths, None)] == [30, 20, 30, 20]
+    part = Sample((Stratum("train", 2, 100, (Excerpt("a", 20, 15, 50),)),), 2)
+    assert [len(c) for c in captured_motion(paths, part)] == [10, 5]
+
+
+def test_no_rows_give_no_motion() -> None:
+    assert unbroken_stretches(np.zeros(0, int)) == []
+    assert root_path(np.zeros((1, 2)), np.zeros(1)).tolist() == [[0, 0, 0]]

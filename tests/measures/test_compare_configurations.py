@@ -1,0 +1,306 @@
+"""Comparison of configurations: eq. 3.2, fitted lines, published counts, different data sets."""
+
+from __future__ import annotations
+
+import csv
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+from hypothesis import given
+from hypothesis import strategies as st
+
+from hobble.core.errors import InputError
+from hobble.core.files import write_csv
+from hobble.measures.compare import (
+    compare_configurations,
+    comparison_tables,
+    difference_in_sds,
+    fit_line,
+    read_results,
+)
+from hobble.measures.responsivity_run import parameter_counts
+
+SIZES = {
+    "holden": (342, 512, 512, 311),
+    "holden-xl": (342, 512, 512, 512, 311),
+    "ava": (1302, 512, 512, 1751),
+}
+MODES = ("constant", "cubic")
+ROLLED = {split: {"frames": 5, "last_cm": 2.0} for split in ("train", "held_out")}
+JUDGED = {
+    "windows": 4,
+    "right": 0.75,
+    "right_without_side": 0.8,
+    "confusion": {"knee": {"knee": 3, "healthy": 1}},
+}
+RECOGNISED = {
+    "applies": True,
+    "captured": {"cross_validated": JUDGED, "held_out": JUDGED},
+    "generated": {**JUDGED, "right": 0.5, "by_severity": [{"severity": 10.0, "right": 0.9}]},
+}
+
+
+@pytest.fixture
+def published(root: Path) -> dict[str, Any]:
+    return yaml.safe_load((root / "src/hobble/report/published.yaml").read_text(encoding="utf-8"))
+
+
+def spread(mean: float, sd: float, frames: int = 100) -> dict[str, Any]:
+    return {"frames": frames, "mean": mean, "sd": sd, "position_error_cm": 1.0, "mean_of_clips": mean}
+
+
+def timed(ms: float) -> dict[str, Any]:
+    steps = dict.fromkeys(("prepare", "input", "insert", "output", "update"), 0.0)
+    return {
+        **steps,
+        "predict": ms / 2,
+        "total": ms,
+        "spread": {"sd": 0.1, "median": ms / 4},
+        "sd": {"predict": 0.1},
+    }
+
+
+def left_behind(folder: Path, name: str, clips: dict[str, float], sizes: tuple[int, ...]) -> list[Any]:
+    """The arguments of `read_results` for a configuration whose frame takes .1 ms plus 1 ns a computation."""
+    counts = parameter_counts(sizes)
+    modes = []
+    for k, mode in enumerate(MODES, 1):
+        ms = timed(k * (0.1 + 1e-6 * counts["true"]))
+        lap = {"lap": 1, "frames": 10, "milliseconds": ms}
+        modes.append({"mode": mode, "laps": [lap], "milliseconds": ms, "laps_finished": 1})
+    files: dict[str, Any] = {
+        "accuracy": {
+            "joints": 31,
+            "train": spread(np.mean(list(clips.values())), 0.02),
+            "held_out": {"frames": 0, "mean": None, "sd": None, "mean_of_clips": None},
+            "clips": [{"clip": c, "split": "train", **spread(m, 0.01)} for c, m in clips.items()],
+        },
+        "responsivity": {
+            "parameters": counts,
+            "bytes_each": 4,
+            "stored": {
+                "constant": 50 * counts["true"],
+                "linear": 10 * counts["true"],
+                "cubic": 4 * counts["true"],
+            },
+            "exact": MODES[-1],
+            "modes": modes,
+            **modes[-1],
+        },
+        "rollouts": {"lengths": [{"length": n, **ROLLED, "clips": []} for n in (1, 60)]},
+        "injury": {"applies": False, "reason": "none"},
+        "recognition": RECOGNISED if name == "ava" else {"applies": False, "reason": "none"},
+        "pipeline": {
+            "stages": [
+                {"stage": "training", "seconds": 60.0, "bytes": 9, "rules": []},
+                {"stage": "database", "seconds": 7.0, "bytes": 500, "rules": []},
+            ],
+            "database": {"bytes": 300},
+        },
+    }
+    folder = folder / name
+    folder.mkdir()
+    paths = {key: folder / f"{key}.json" for key in files}
+    for key, value in files.items():
+        paths[key].write_text(json.dumps(value))
+    paths["configuration"], paths["history"] = folder / "configuration.yaml", folder / "history.csv"
+    network = {"hidden_layers": len(sizes) - 2, "units": 512, "control_points": 4}
+    model = {"dataset": f"of-{name}", "channels": [], "network": network, "training": {"passes": 20}}
+    paths["configuration"].write_text(yaml.safe_dump({"configuration": model}))
+    blocks = "pass,train_mse,held_out_turn" if name == "ava" else "pass,train_mse,held_out_mse"
+    paths["history"].write_text(f"{blocks}\n1,0.5,0.25\n2,0.4,\n")
+    folders = [paths.pop(key) for key in ("configuration", "pipeline", "history")]
+    return [name, *folders, list(paths.values())]
+
+
+@pytest.fixture
+def compared(tmp_path: Path, published: dict[str, Any]) -> dict[str, Any]:
+    clips = {"holden": {"a": 0.04, "b": 0.02}, "holden-xl": {"a": 0.03, "b": 0.02}, "ava": {"b": 0.05}}
+    found = [read_results(*left_behind(tmp_path, n, clips[n], s)) for n, s in SIZES.items()]
+    return compare_configurations(found, published)
+
+
+def test_parameter_counts_equal_table_6_1(compared, published) -> None:
+    """The published numbers follow from the layers."""
+    for row in published["computations"]:
+        counts = parameter_counts(row["sizes"])
+        assert (counts["true"], counts["table_6_1_as_printed"]) == (row["parameters"], row["table_6_1"])
+    rows = [r for r in compared["against_published"] if r["measure"] == "computations of Table 6.1"]
+    assert {r["configuration"]: r["ours"] for r in rows if r["ours"]} == {
+        "holden": 335_501,
+        "holden-xl": 598_157,
+        "ava": 1_566_701,
+    }
+    assert all(r["ours"] in (None, r["published"]) for r in rows)
+    holden = compared["configurations"][0]
+    assert holden["weights_bytes"] == {"constant": 119_563_000, "linear": 23_912_600, "cubic": 9_565_040}
+
+
+def test_the_fit_recovers_the_line_of_the_frame_times(compared) -> None:
+    fits = {(f["whose"], f["mode"], f["step"], f["computations"]): f for f in compared["milliseconds"]["fit"]}
+    for k, mode in enumerate(MODES, 1):
+        fit = fits["hobble", mode, "total", "true"]
+        assert fit["slope"] == pytest.approx(k * 1e-6)
+        assert fit["intercept"] == pytest.approx(k * 0.1)
+        assert fit["r2"] == pytest.approx(1)
+        assert fits["hobble", mode, "predict", "true"]["slope"] == pytest.approx(k * 0.5e-6)
+        assert fits["hobble", mode, "median", "true"]["slope"] == pytest.approx(k * 0.25e-6)
+    theirs = fits["published", None, "total", "table_6_1_as_printed"]
+    slope, intercept = np.polyfit([335501, 598157, 335501, 1566701], [0.376, 0.499, 0.382, 1.55], 1)
+    assert (theirs["slope"], theirs["intercept"]) == pytest.approx((slope, intercept))
+    assert theirs["points"] == 4
+
+
+def test_a_pair_is_compared_on_the_clips_that_both_have(compared) -> None:
+    found = {(d["a"], d["b"], d["over"]): d["difference"] for d in compared["difference"]}
+    # No clip is held out, and `ava` has no clip `a`.
+    assert set(found) == {
+        *(("holden", "holden-xl", over) for over in ("train", "a", "b")),
+        *((a, "ava", over) for a in ("holden", "holden-xl") for over in ("train", "b")),
+    }
+    assert found["holden", "holden-xl", "a"] == pytest.approx(2 * 0.01 / 0.02)
+    assert found["holden", "holden-xl", "b"] == 0
+    assert found["holden", "ava", "train"] == pytest.approx(2 * 0.02 / 0.04)
+    times = {(d["a"], d["b"], d["over"]): d["difference"] for d in compared["milliseconds"]["difference"]}
+    assert len(times) == 3 * len(MODES)
+    apart = 1e-6 * (860_471 - 597_815)
+    assert times["holden", "holden-xl", "cubic"] == pytest.approx(2 * 2 * apart / 0.2)
+
+
+def test_equation_3_2_divides_by_the_deviations_of_frames_and_of_means(compared) -> None:
+    found = {(d["a"], d["b"], d["over"]): d for d in compared["difference"]}
+    row = found["holden", "holden-xl", "train"]  # clips of .04 and .02, and of .03 and .02
+    assert (row["sd_a"], row["sd_b"]) == (0.02, 0.02)
+    assert (row["sd_of_means_a"], row["sd_of_means_b"]) == (pytest.approx(0.01), pytest.approx(0.005))
+    assert row["difference"] == pytest.approx(2 * 0.005 / 0.04)
+    assert row["difference_of_means"] == pytest.approx(2 * 0.005 / 0.015)
+    assert found["holden", "ava", "train"]["difference_of_means"] is None, "one clip does not spread"
+    assert found["holden", "holden-xl", "a"]["difference_of_means"] is None
+    ours = {
+        (r["measure"], r["configuration"]): (r["published"], r["ours"]) for r in compared["against_published"]
+    }
+    what = "standard deviation of the means of training clips"
+    assert ours[what, "holden"] == (0.00954, pytest.approx(0.01))
+    laps = [r for r in compared["milliseconds"]["against_published"] if r["measure"].startswith("standard")]
+    assert [(r["configuration"], r["published"], r["ours"]) for r in laps] == [("holden", 0.0173, None)]
+
+
+def test_a_published_figure_is_listed_with_its_own_configuration_only(compared, published) -> None:
+    of = {
+        (row["configuration"], value)
+        for kind in ("accuracy", "responsivity", "modes", "stages", "computations")
+        for row in published[kind]
+        for value in row.values()
+        if isinstance(value, float | int)
+    }
+    rows = [*compared["against_published"], *compared["milliseconds"]["against_published"]]
+    rows = [row for row in rows if not row["measure"].startswith("hurt part")]
+    assert [row for row in rows if (row["configuration"], row["published"]) not in of] == []
+    compared_ones = {row["configuration"] for row in rows if row["ours"] is not None}
+    assert compared_ones == set(SIZES)
+    predictions = [row for row in rows if row["measure"].startswith("a prediction")]
+    assert {(row["configuration"], row["ours"]) for row in predictions} == {("ferre", None)}
+
+
+def test_tables_with_different_columns_survive_csv(compared, tmp_path) -> None:
+    found = comparison_tables(compared)
+    rows = {}
+    for name, table in found.items():
+        write_csv(tmp_path / f"{name}.csv", table)
+        with open(tmp_path / f"{name}.csv", newline="") as file:
+            rows[name] = list(csv.DictReader(file))
+        assert len(rows[name]) == len(table) > 0, name
+    assert [r["configuration"] for r in rows["configurations"]] == list(SIZES)
+    assert [r["computations_true"] for r in rows["configurations"]] == ["597815", "860471", "1828055"]
+    assert [(r["configuration"], r["clip"]) for r in rows["accuracy"]][2:] == [
+        ("holden-xl", "a"),
+        ("holden-xl", "b"),
+        ("ava", "b"),
+    ]
+    assert [(r["mode"], r["lap"]) for r in rows["responsivity"]] == [(m, "1") for _ in SIZES for m in MODES]
+    lengths = [(r["length"], r["split"]) for r in rows["rollouts"]]
+    assert lengths == 3 * [("1", "train"), ("1", "held_out"), ("60", "train"), ("60", "held_out")]
+    assert [tuple(r.values()) for r in rows["recognition"]][-1] == (
+        "ava",
+        "generated",
+        "knee",
+        "healthy",
+        "1",
+    )
+    named = [r for r in rows["published"] if r["measure"].startswith("hurt part")]
+    assert [(r["configuration"], r["published"], r["ours"]) for r in named] == [
+        ("ava", "0.82", "0.5"),
+        ("ava", "0.82", "0.8"),
+        ("ava", "0.82", "0.9"),
+    ]
+    last = rows["training"][-2:]
+    assert [r["held_out_turn"] for r in last] == ["0.25", ""]
+    assert [r["held_out_mse"] for r in last] == ["", ""]
+    json.dumps(compared, allow_nan=False)
+
+
+def test_published_clips_are_listed_with_ours_of_the_same_name(tmp_path, published) -> None:
+    clips = {"LocomotionFlat04_000": 0.03, "LocomotionFlat04_000_mirror": 0.07, "walk": 0.05}
+    found = compare_configurations(
+        [read_results(*left_behind(tmp_path, "a", clips, SIZES["holden"]))], published
+    )
+    rows = [r for r in found["against_published"] if "LocomotionFlat04" in r["measure"]]
+    assert [(r["source"], r["published"], r["ours"]) for r in rows] == [
+        ("segerstedt", 0.0448, 0.03),
+        ("release", 0.0396, 0.03),
+    ]
+
+
+def test_published_times_and_sizes_are_listed_with_their_measure(compared) -> None:
+    """The published size is compared with the database that training reads, the time with that of the
+    stage.
+    """
+    ours = {(r["measure"], r["configuration"]): r["ours"] for r in compared["against_published"]}
+    assert ours["database", "holden"] == 300
+    times = {
+        (r["measure"], r["configuration"]): (r["ours"], r["unit"])
+        for r in compared["milliseconds"]["against_published"]
+    }
+    assert times["database, time", "holden"] == (7.0, "s")
+    assert times["training, time", "ava"] == (60.0, "s")
+    assert "database" not in {measure for measure, _ in times}
+
+
+def test_one_configuration_alone_has_no_differences(tmp_path, published) -> None:
+    found = compare_configurations(
+        [read_results(*left_behind(tmp_path, "holden", {"a": 0.1}, SIZES["holden"]))], published
+    )
+    assert found["difference"] == []
+    assert found["milliseconds"]["fit"][0]["slope"] is None
+    assert comparison_tables(found)["difference"] == []
+
+
+def test_a_damaged_history_is_named(tmp_path) -> None:
+    files = left_behind(tmp_path, "holden", {"a": 0.1}, SIZES["holden"])
+    Path(files[3]).write_text("pass,train_mse\n1,half\n")
+    with pytest.raises(InputError, match=r"history\.csv"):
+        read_results(*files)
+
+
+NUMBER = st.floats(-1e3, 1e3)
+
+
+@given(NUMBER, st.floats(0.01, 10), NUMBER, st.floats(0.01, 10), st.floats(0.1, 10))
+def test_a_difference_depends_neither_on_the_unit_nor_on_the_order(
+    a: float, sa: float, b: float, sb: float, k: float
+) -> None:
+    found = difference_in_sds(a, sa, b, sb)
+    assert found == difference_in_sds(b, sb, a, sa)
+    assert found == pytest.approx(difference_in_sds(k * a, k * sa, k * b, k * sb))
+    assert found == pytest.approx(abs(a - b) / ((sa + sb) / 2))
+    assert difference_in_sds(a, 0, b, 0) is None
+
+
+def test_a_line_is_fitted_to_points() -> None:
+    assert fit_line([1, 1], [2, 3]) is None
+    assert fit_line([1, 2, 3], [2, 2, 2])["r2"] is None
+    assert fit_line([0, 1, 2], [1, 3, 5]) == pytest.approx({"slope": 2, "intercept": 1, "r2": 1, "points": 3})

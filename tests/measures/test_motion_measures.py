@@ -1,0 +1,124 @@
+"""Measures of motion, on motions whose measures are known."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from hobble.core import quat
+from hobble.core.skeleton import Skeleton, forward_kinematics
+from hobble.measures.walks import (
+    acceleration,
+    asymmetry,
+    bend,
+    feet_in_stance,
+    foot_slide,
+    gait_measures,
+    in_root_coordinates,
+    largest_turn,
+    runs_of_true,
+    skating,
+)
+
+
+def test_foot_slide_is_the_distance_that_the_toe_moves_in_stance() -> None:
+    frames = 40
+    contacts = np.zeros((frames, 4))
+    contacts[5:15, 1] = 1.0
+    contacts[20:22, 1] = 1.0  # too short to be a step
+    contacts[10:30, 3] = 0.6
+    toes = np.zeros((frames, 2, 3))
+    toes[:, 0, 0] = 0.3 * np.arange(frames)
+    toes[:, 1, 1] = np.arange(frames)  # rising is not sliding
+    np.testing.assert_allclose(foot_slide(toes, contacts), [0.3 * 9, 0.0], atol=1e-9)
+    assert feet_in_stance(contacts)[:, 0].sum() == 12
+    assert runs_of_true(np.ones(3, bool)).tolist() == [[0, 3]]
+
+
+def test_skating_counts_a_low_toe_by_its_height() -> None:
+    toes = np.zeros((3, 2, 3))
+    toes[:, :, 1] = 4.0
+    toes[:, :, 0] = 0.6 * np.arange(3)[:, None]
+    toes[:, :, 2] = 0.8 * np.arange(3)[:, None]
+    np.testing.assert_allclose(skating(toes, 4.0), 1.0)
+    toes[2, 1, 1] = 5.25  # half way up to where nothing counts, in the second frame only
+    np.testing.assert_allclose(skating(toes, 4.0), [[1.0, 1.0], [1.0, 2 - np.sqrt(2)]])
+    toes[:, 0, 1] = 6.5
+    np.testing.assert_allclose(skating(toes, 4.0)[:, 0], 0.0, atol=1e-12)
+    toes[:, 0, 1] = 3.0  # in the ground
+    np.testing.assert_allclose(skating(toes, 4.0)[:, 0], 1.0)
+
+
+def test_largest_turn_finds_the_one_joint_and_frame() -> None:
+    rotations = np.tile(quat.yaw(0.3), (6, 4, 1))
+    rotations[3:, 2] = quat.mul(quat.from_axis_angle([1.0, 0, 0], np.radians(50)), rotations[3:, 2])
+    rotations[4] *= -1  # the same rotations
+    assert largest_turn(rotations) == pytest.approx(50, abs=1e-4)
+    assert largest_turn(rotations[:1]) == 0
+
+
+def test_bend_and_asymmetry_of_known_poses_are_exact() -> None:
+    a, b, c = np.array([[0, 2.0, 0], [0, 1.0, 0], [0, 1.0, 1.0]])
+    assert bend(a, b, c) == pytest.approx(90)
+    assert bend(a, b, 2 * b - a) == pytest.approx(0, abs=1e-4)
+    assert asymmetry(3.0, 1.0) == pytest.approx(1.0)
+    assert asymmetry(None, 1.0) is None
+    assert asymmetry(0.0, 0.0) is None
+
+
+def test_the_acceleration_of_a_parabola_is_constant() -> None:
+    t = np.arange(5.0)
+    positions = np.stack([0.5 * t**2, t, 0 * t], axis=-1)[:, None]
+    np.testing.assert_allclose(acceleration(positions), 1.0)
+
+
+def test_poses_in_the_root_frame_do_not_depend_on_place_and_heading() -> None:
+    yaw = np.array([0.0, 0.9])
+    root = np.array([[0, 0, 0], [5.0, 0, -3]])
+    body = np.array([[1.0, 2, 3], [-1, 0, 4]])
+    world = np.stack([quat.rotate(quat.yaw(a), body) + r for a, r in zip(yaw, root, strict=True)])
+    np.testing.assert_allclose(in_root_coordinates(world, root, yaw), [body, body], atol=1e-12)
+
+
+def test_cadence_stance_and_step_length_of_a_known_walk_are_exact(holden31: Skeleton) -> None:
+    """A figure with a stiff right knee, an arm that swings through 40 degrees and a trunk that leans."""
+    frames = 240
+    t = 2 * np.pi * np.arange(frames) / 60
+    local = np.tile([1.0, 0, 0, 0], (frames, len(holden31.joints), 1))
+    axis = np.array([1.0, 0, 0])
+    local[:, holden31.role("left_knee")] = quat.from_axis_angle(axis, 0.5 + 0.5 * np.sin(t))
+    down = quat.from_axis_angle([0, 0, 1.0], -np.pi / 2)
+    local[:, holden31.role("left_shoulder")] = quat.mul(
+        quat.from_axis_angle(axis, np.radians(20) * np.sin(t)), down
+    )
+    local[:, holden31.role("right_shoulder")] = quat.from_axis_angle([0, 0, 1.0], np.pi / 2)
+    local[:, holden31.index("LowerBack")] = quat.from_axis_angle([0, 0, 1.0], -0.2)
+    positions = forward_kinematics(holden31, local, np.tile([0.0, 93, 0], (frames, 1)))[1]
+    contacts = np.zeros((frames, 4))
+    for start in range(0, frames, 60):
+        contacts[start + 5 : start + 41, 0] = 1
+        contacts[start + 35 : start + 59, 3] = 1
+    travelled = np.array([0.0, 0, 2.0]) * np.arange(frames)[:, None]
+    found = gait_measures(holden31, positions, contacts, travelled)
+    assert found["speed"] == pytest.approx(120)
+    assert found["stance_left"] == pytest.approx(0.6)
+    assert found["stance_right"] == pytest.approx(0.4)
+    assert found["stance_asymmetry"] == pytest.approx(0.4)
+    assert found["knee_left"] == pytest.approx(np.degrees(1.0), rel=0.05)
+    assert found["knee_right"] == pytest.approx(0, abs=1e-6)
+    assert found["arm_left"] == pytest.approx(40, rel=0.05)
+    assert found["arm_right"] == pytest.approx(0, abs=1e-6)
+    assert found["lean_left"] == pytest.approx(np.degrees(0.2), rel=0.01)
+    assert found["hip_height"] == pytest.approx(93)
+    heels = positions[:, [holden31.role("left_heel"), holden31.role("right_heel")], 2]
+    assert found["step_left"] == pytest.approx((heels[5::60, 0] - heels[5::60, 1]).mean())
+    assert found["step_right"] == pytest.approx((heels[35::60, 1] - heels[35::60, 0]).mean())
+
+
+def test_a_figure_that_never_steps_has_no_step_length(holden31: Skeleton) -> None:
+    rest = np.tile([1.0, 0, 0, 0], (30, len(holden31.joints), 1))
+    positions = forward_kinematics(holden31, rest, np.zeros((30, 3)))[1]
+    found = gait_measures(holden31, positions, np.ones((30, 4)), np.zeros((30, 3)))
+    assert found["step_left"] is None
+    assert found["step_asymmetry"] is None
+    assert found["speed"] == 0
