@@ -23,8 +23,8 @@ import yaml
 from hobble.core.clip import Clip
 from hobble.core.errors import HobbleError
 from hobble.labels.label import label_clip, mirror_labels
+from hobble.motion.edit import mirror_clip
 from hobble.motion.make import make_clip
-from hobble.motion.mirror import mirror_clip
 from hobble.motion.options import ClipMotion
 from hobble.synthetic.generate_clip import write_clip
 from hobble.terrain.clip_fits import clip_fits

@@ -29,8 +29,8 @@ from hobble.core.errors import HobbleError
 from hobble.core.processors import processor_name
 from hobble.labels.clip_labels import Labels as ClipLabels
 from hobble.labels.label import label_clip, mirror_labels
+from hobble.motion.edit import mirror_clip
 from hobble.motion.make import make_clip
-from hobble.motion.mirror import mirror_clip
 from hobble.motion.options import ClipMotion
 from hobble.motion.rig import load_skeleton
 from hobble.synthetic.generate_clip import write_clip

@@ -9,8 +9,7 @@ from hobble.core import quat
 from hobble.core.bvh import write_bvh
 from hobble.core.clip import Clip
 from hobble.core.skeleton import forward_kinematics
-from hobble.motion.decode import decode_channels
-from hobble.motion.read import read_bvh
+from hobble.motion.read import decode_channels, read_bvh
 
 
 @pytest.fixture

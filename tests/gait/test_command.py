@@ -14,7 +14,7 @@ from hobble.gait import derive_healthy, derive_people
 from hobble.gait.__main__ import main
 from hobble.gait.comparison import compare_clip, healthy_profile
 from hobble.gait.limp_grade import HEALTHY_FILE
-from hobble.motion.mirror import mirror_clip
+from hobble.motion.edit import mirror_clip
 from hobble.synthetic.generate_clip import walk_from_plan
 from hobble.synthetic.recipes import WALK, Segment
 

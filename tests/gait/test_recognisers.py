@@ -19,7 +19,7 @@ from hobble.gait.people import GAITS, NORMAL, read_people
 from hobble.gait.profile import PROFILE_NAMES, mirror_profile, profile_of_walk
 from hobble.gait.recogniser import SHRINKAGE, examples_of_people, learn, recognise, windows_with_cycles
 from hobble.gait.signals import CURVES
-from hobble.motion.mirror import mirror_clip
+from hobble.motion.edit import mirror_clip
 
 NORMAL_WALKS = ("105_29", "105_31", "105_34", "105_36")
 

@@ -12,7 +12,7 @@ from hobble.core.skeleton import other_side
 from hobble.hurt.hurt_clip import hurt_clip
 from hobble.labels.clip_labels import LabelReport
 from hobble.labels.label import mirror_labels
-from hobble.motion.mirror import mirror_clip
+from hobble.motion.edit import mirror_clip
 
 MADE = ("straight", "turning", "jog", "starting", "uneven")
 CAPTURED = ("07_01", "105_29", "09_01", "03_01")

@@ -14,7 +14,7 @@ from hobble.hurt.options import Hurt
 from hobble.hurt.version import SEVERITY_TOLERANCE, hurt_version
 from hobble.labels.clip_labels import LabelReport
 from hobble.labels.label import mirror_labels
-from hobble.motion.mirror import mirror_clip
+from hobble.motion.edit import mirror_clip
 
 REPORT = LabelReport("straight", "automatic", "automatic", "right", "extend", 0)
 THIGH = "RightUpLeg-RightLeg"

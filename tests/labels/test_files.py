@@ -19,7 +19,7 @@ from hobble.labels.read_files import (
     read_phase,
     whole_frame,
 )
-from hobble.motion.resample import sample_times
+from hobble.motion.edit import sample_times
 
 AT_120 = SourceTime(240, 120.0)
 

@@ -62,8 +62,7 @@ def outcome(file: Path, seed: int, folder: Path, frames: int | None = None) -> O
     """
     from hobble.core.bvh import write_bvh
     from hobble.core.errors import HobbleError
-    from hobble.motion.file_motion import load_source
-    from hobble.motion.make import make_clip
+    from hobble.motion.make import load_source, make_clip
     from hobble.motion.read import read_bvh
     from hobble.motion.rig import load_skeleton
 

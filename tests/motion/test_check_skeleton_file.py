@@ -10,7 +10,7 @@ import pytest
 
 from hobble.core.errors import InputError
 from hobble.motion.draft import draft_skeleton_file, guess_roles
-from hobble.motion.file_motion import rig_in_file
+from hobble.motion.make import rig_in_file
 from hobble.motion.read import read_bvh
 from hobble.motion.rig import load_skeleton
 

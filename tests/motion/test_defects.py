@@ -9,7 +9,7 @@ import pytest
 
 from hobble.core import quat
 from hobble.core.errors import InputError
-from hobble.motion.defects import find_jumps, repair_defects
+from hobble.motion.edit import find_jumps, repair_defects
 
 
 def with_rest_pose(clip, frames, root=None):

@@ -10,8 +10,8 @@ import pytest
 from hobble.core.errors import HobbleError
 from hobble.database.split_check import refuse_split_pairs
 from hobble.motion.axes import turned_about_vertical
-from hobble.motion.duplicates import clip_digest, duplicate_pairs, load_digests, save_digests
-from hobble.motion.mirror import mirror_clip
+from hobble.motion.edit import mirror_clip
+from hobble.motion.look import clip_digest, duplicate_pairs, load_digests, save_digests
 
 
 def test_turned_shortened_and_mirrored_copies_are_found(walker, holden31):

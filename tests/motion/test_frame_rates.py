@@ -10,8 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hobble.core import quat
-from hobble.motion.decode import frame_rate
-from hobble.motion.resample import sample_positions, sample_rotations, sample_times
+from hobble.motion.edit import sample_positions, sample_rotations, sample_times
+from hobble.motion.read import frame_rate
 
 
 def test_the_frame_rate_can_be_set(walk, bvh, make):
@@ -95,7 +95,7 @@ def test_a_joint_that_turns_suddenly_is_named(walk, bvh, make):
 @pytest.mark.shared
 @pytest.mark.parametrize("file", ["cmu/105_16", "cmu/16_21"])
 def test_round_trip_120_60_120_stays_within_2_mm(shared, make, file):
-    from hobble.motion.make import resample
+    from hobble.motion.edit import resample
 
     source, _ = make(shared / f"mocap/{file}.bvh", fps=120.0, proportions="clip")
     again = resample(resample(source, 60.0), 120.0)

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from hobble.motion import look_page as module
-from hobble.motion.look_page import choose_clips, foot_down_share, look_page, make_figure
+from hobble.motion import look as module
+from hobble.motion.look import choose_clips, foot_down_share, look_page, make_figure
 
 REPORT = {"rig": "<rig>", "source_fps": 120.0, "seconds": 4.0, "sha256": "a", "repairs": [], "retarget": None}
 REPORT |= {"scale": 1.0}

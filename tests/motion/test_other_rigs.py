@@ -13,7 +13,7 @@ import pytest
 from hobble.core import quat
 from hobble.core.bvh import write_bvh
 from hobble.core.errors import InputError
-from hobble.motion.file_motion import load_source
+from hobble.motion.make import load_source
 from hobble.motion.options import ClipMotion
 from hobble.motion.read import read_bvh
 from hobble.motion.rig import load_skeleton

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Iterator
 
 import numpy as np
 import pytest
@@ -11,7 +10,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hobble.core.errors import InputError
-from hobble.motion import read, read_numbers
 from hobble.motion.read import read_bvh
 
 SMALL = """HIERARCHY
@@ -39,17 +37,6 @@ Frame Time: 0.0333333
 1 2 3 4 5 6 7 8 9
 1.5e1 -2 3 4 5 6 7 8 -9
 """
-
-
-@pytest.fixture(scope="module", autouse=True, params=["compiled", "general"])
-def reader(request: pytest.FixtureRequest) -> Iterator[None]:
-    """Read the numbers by compiled code wherever it can, or never."""
-    with pytest.MonkeyPatch.context() as patch:
-        if request.param == "compiled":
-            patch.setattr(read_numbers, "LARGE", 0)
-        else:
-            patch.setattr(read, "read_numbers", lambda *_: None)
-        yield
 
 
 @pytest.fixture

@@ -12,7 +12,8 @@ import pytest
 from hobble.core import quat
 from hobble.core.clip import Clip
 from hobble.core.errors import HobbleError
-from hobble.motion.make import load_source, resample
+from hobble.motion.edit import resample
+from hobble.motion.make import load_source
 from hobble.motion.options import ClipMotion
 from hobble.motion.read import read_bvh
 from hobble.motion.retarget import plan, retarget_clip, retarget_pose

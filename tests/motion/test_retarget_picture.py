@@ -11,7 +11,7 @@ import pytest
 
 from hobble.core.bvh import write_bvh
 from hobble.motion.__main__ import main
-from hobble.motion.retarget_picture import POSES, WRONG, retarget_picture
+from hobble.motion.look import PICTURES, WRONG, retarget_picture
 from hobble.motion.rig import load_skeleton
 
 ROWS = 4
@@ -25,7 +25,7 @@ def lines(svg: str) -> list[dict[str, str]]:
 def test_the_bones_of_the_wrong_joint_are_red(walk, part, bones):
     """At the hip the angle is between trunk and thigh. The trunk has no single bone from head to hip."""
     drawn = lines(retarget_picture(walk, walk, part, 20.0))
-    assert sum(line["stroke"] == WRONG for line in drawn) == bones * POSES * ROWS
+    assert sum(line["stroke"] == WRONG for line in drawn) == bones * PICTURES * ROWS
 
 
 def test_equal_clips_are_drawn_alike_and_at_their_own_height(walk):

@@ -9,7 +9,7 @@ import pytest
 
 from hobble.motion.look import step_count, summarise_clips
 from hobble.motion.options import ClipMotion
-from hobble.motion.tempo import measure_accelerations, times_too_fast
+from hobble.motion.physics import measure_accelerations, times_too_fast
 
 
 def test_accelerations_grow_with_the_square_of_the_frame_rate(walker, holden31):

@@ -10,7 +10,7 @@ import pytest
 from hobble.core import quat
 from hobble.core.clip import Clip
 from hobble.core.errors import InputError
-from hobble.motion.balance import find_balance
+from hobble.motion.physics import find_balance
 from hobble.motion.tilt import world_tilt
 
 X, Z = np.eye(3)[0], np.eye(3)[2]

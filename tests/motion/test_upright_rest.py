@@ -13,10 +13,9 @@ from hobble.core.bvh import write_bvh
 from hobble.core.clip import Clip
 from hobble.core.errors import InputError
 from hobble.core.skeleton import Skeleton, forward_kinematics, rest_positions
-from hobble.motion.decode import decode_channels
-from hobble.motion.file_motion import load_source
+from hobble.motion.make import load_source
 from hobble.motion.options import ClipMotion
-from hobble.motion.read import read_bvh
+from hobble.motion.read import decode_channels, read_bvh
 from hobble.motion.rig import load_skeleton
 from tests.motion.other_rigs import PLAIN, rigged
 from tests.motion.scramble import compare, outcome

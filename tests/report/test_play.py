@@ -13,8 +13,7 @@ import pytest
 
 from hobble.core.skeleton import Skeleton, forward_kinematics
 from hobble.models.network import Network
-from hobble.motion.decode import decode_channels, frame_rate
-from hobble.motion.read import read_bvh
+from hobble.motion.read import decode_channels, frame_rate, read_bvh
 from hobble.runtime.animation import ProceduralAnimation
 from tests.report.example_motion import hills
 

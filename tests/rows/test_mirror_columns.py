@@ -12,7 +12,7 @@ from hobble.core.errors import HobbleError
 from hobble.core.skeleton import Skeleton
 from hobble.labels.label import label_clip, mirror_labels
 from hobble.labels.options import LabelOptions
-from hobble.motion.mirror import mirror_clip
+from hobble.motion.edit import mirror_clip
 from hobble.rows.build_rows import build_clip_rows, cycle_frames
 from hobble.rows.clip_rows import ClipRows, Pairs, pair_batches
 from hobble.rows.layout import RowLayout

@@ -10,7 +10,7 @@ from hobble.core.clip import load_clip
 from hobble.core.files import read_json
 from hobble.database.options import Merging
 from hobble.database.shard import write_shard
-from hobble.motion.duplicates import clip_digest, save_digests
+from hobble.motion.look import clip_digest, save_digests
 from hobble.workflow.job import job
 
 with job(snakemake) as log:

@@ -9,7 +9,7 @@ from hobble.hurt.options import HURT_CHANNEL, Hurt
 from hobble.hurt.version import hurt_version
 from hobble.labels.clip_labels import LabelReport, load_labels, save_labels
 from hobble.labels.label import mirror_labels, write_report
-from hobble.motion.mirror import mirror_clip, mirror_report
+from hobble.motion.edit import mirror_clip, mirror_report
 from hobble.workflow.batch_job import make_each
 
 

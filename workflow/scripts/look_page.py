@@ -3,7 +3,7 @@
 from hobble.core.clip import load_clip
 from hobble.core.files import read_json, write_text
 from hobble.labels.clip_labels import load_labels
-from hobble.motion.look_page import LABELS, look_page
+from hobble.motion.look import LABELS, look_page
 from hobble.workflow.job import job
 
 with job(snakemake):

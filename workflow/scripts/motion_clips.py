@@ -5,8 +5,8 @@ The clips are checked, retargeted to the data set's skeleton and resampled at 60
 
 from hobble.core.clip import load_clip, save_clip
 from hobble.core.files import write_json
+from hobble.motion.edit import mirror_clip, mirror_report
 from hobble.motion.make import make_clip
-from hobble.motion.mirror import mirror_clip, mirror_report
 from hobble.motion.options import ClipMotion
 from hobble.workflow.batch_job import make_each
 

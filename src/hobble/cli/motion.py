@@ -17,10 +17,8 @@ from typing import Literal
 from hobble.cli import batch
 from hobble.core.bvh import write_bvh
 from hobble.core.clip import Clip
-from hobble.motion.file_motion import load_source
-from hobble.motion.loop import loop_clip
-from hobble.motion.make import make_clip, resample
-from hobble.motion.mirror import mirror_clip
+from hobble.motion.edit import loop_clip, mirror_clip, resample
+from hobble.motion.make import load_source, make_clip
 from hobble.motion.options import ClipMotion
 from hobble.motion.read import read_bvh
 

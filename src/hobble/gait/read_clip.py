@@ -5,7 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from hobble.core.clip import Clip
-from hobble.motion.make import load_source, resample
+from hobble.motion.edit import resample
+from hobble.motion.make import load_source
 from hobble.motion.options import ClipMotion
 from hobble.motion.read import read_bvh
 from hobble.motion.rig import load_skeleton

@@ -10,12 +10,11 @@ from hobble.core.errors import HobbleError
 from hobble.core.files import write_text
 from hobble.motion.doubt import Doubt
 from hobble.motion.draft import draft_skeleton_file, guess_roles
-from hobble.motion.file_motion import raw_clip, rig_in_file
 from hobble.motion.find_body import find_body
-from hobble.motion.look import format_table, summarise_clips
+from hobble.motion.look import format_table, picture_of_file, summarise_clips
+from hobble.motion.make import raw_clip, rig_in_file
 from hobble.motion.options import ClipMotion
 from hobble.motion.read import read_bvh
-from hobble.motion.retarget_picture import picture_of_file
 
 SKELETONS = Path("config/skeletons")  # the folder of the skeleton files
 

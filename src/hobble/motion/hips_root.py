@@ -10,8 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from hobble.core import quat
-from hobble.motion.decode import Decoded, decode_channels
-from hobble.motion.read import Bvh
+from hobble.motion.read import Bvh, Decoded, decode_channels
 
 
 def below_hips(file: Bvh, hips: int) -> Bvh:

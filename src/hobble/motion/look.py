@@ -1,16 +1,14 @@
-"""Summarises a folder of clips before training: one line for each clip, and notes on all of them.
-
-The cadence is how often the ankles pass each other in a minute. For steps of a given length, it is nearly the
-same for all people. So if the cadence of a clip is impossible, the frame rate in its file may be wrong. A
-warning then names a frame rate that would make the cadence usual.
-"""
+"""Finds duplicate clips: the same file, or the same motion with another name or heading, or mirrored."""
 
 from __future__ import annotations
 
+import html
+import json
 import re
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -19,13 +17,123 @@ import numpy as np
 from hobble.core.clip import Clip
 from hobble.core.clip_files import find_clips, require_single_file, unused_file_notes
 from hobble.core.errors import HobbleError, InputError
+from hobble.core.files import load_npz, save_npz
 from hobble.core.quat import Array
-from hobble.motion.check_retarget import most_different
-from hobble.motion.duplicates import ClipDigest, clip_digest, duplicate_pairs
-from hobble.motion.make import make_clip
+from hobble.motion.body import SIDES, TRUNK
+from hobble.motion.edit import resample
+from hobble.motion.make import fit_skeleton, load_source, make_clip
 from hobble.motion.options import ClipMotion
-from hobble.motion.rig import leg_length
-from hobble.motion.tempo import times_too_fast
+from hobble.motion.physics import times_too_fast
+from hobble.motion.read import read_bvh
+from hobble.motion.retarget import ANGLES, BONES, most_different
+from hobble.motion.rig import leg_length, load_skeleton
+from hobble.motion.root import facing_directions
+
+# cm: two clips show the same motion if their joints are on average less than this apart. The release of
+# Holden et al. (2017) contains two mirrored clips, which are 1.2 and 1.3 cm from the mirror images of their
+# originals. Two different walks or runs of one person are at least 2.6 cm apart.
+SAME_MOTION = 1.7
+LONGER = 0.02  # clips are compared only if one is longer than the other by at most this share
+POSES = 12  # number of poses of each clip that are compared
+MIRRORED = np.array([-1.0, 1.0, 1.0])  # a position times this is mirrored in the plane x = 0
+
+
+@dataclass(frozen=True)
+class ClipDigest:
+    """The data of one clip by which it is compared with others.
+
+    sha256: checksum of the file. seconds: length of the clip. poses: (POSES, J, 3) cm, the positions of the
+    joints at times spread evenly over the clip, relative to the point of the ground below the hips at the
+    same time. They are turned so that the first pose faces +Z. mirrored: `poses` with left and right
+    exchanged, or None if the rig cannot be mirrored.
+    """
+
+    name: str
+    sha256: str
+    seconds: float
+    poses: Array = field(repr=False)
+    mirrored: Array | None = field(default=None, repr=False)
+
+
+def clip_digest(clip: Clip, sha256: str) -> ClipDigest:
+    """The data by which a clip is compared with others. sha256: checksum of its file."""
+    sampled = np.linspace(0, len(clip) - 1, POSES).round().astype(int)
+    moved = None if clip.translations is None else clip.translations[sampled]
+    sample = replace(clip, rotations=clip.rotations[sampled], root=clip.root[sampled], translations=moved)
+    poses = sample.positions - sample.positions[:, :1] * [1.0, 0.0, 1.0]
+    ahead = facing_directions(clip.skeleton, sample.positions[:1], 0.0)[0]
+    # Turn about the vertical axis, so that the facing direction (x, z) becomes (0, 1).
+    x, z = ahead[[0, 2]] / max(float(np.hypot(ahead[0], ahead[2])), 1e-9)
+    poses = poses @ np.array([[z, 0.0, x], [0.0, 1.0, 0.0], [-x, 0.0, z]])
+    try:
+        mirrored = poses[:, clip.skeleton.mirror_joints] * MIRRORED
+    except HobbleError:  # the names of the rig's joints do not show which joint is whose counterpart
+        mirrored = None
+    return ClipDigest(clip.name, sha256, len(clip) / clip.fps, poses, mirrored)
+
+
+def save_digests(path: Path, clips: Sequence[ClipDigest]) -> None:
+    """Write the data of all clips to one npz file. Its keys are like "3.poses", for the fourth clip."""
+    arrays = {
+        f"{number}.{name}": np.array(value)
+        for number, clip in enumerate(clips)
+        for name, value in vars(clip).items()
+        if value is not None
+    }
+    save_npz(path, count=np.array(len(clips)), **arrays)
+
+
+def load_digests(path: Path) -> list[ClipDigest]:
+    """The inverse of `save_digests`."""
+    data = load_npz(path)
+    return [
+        ClipDigest(
+            str(data[f"{number}.name"]),
+            str(data[f"{number}.sha256"]),
+            float(data[f"{number}.seconds"]),
+            data[f"{number}.poses"],
+            data.get(f"{number}.mirrored"),
+        )
+        for number in range(int(data["count"]))
+    ]
+
+
+def duplicate_pairs(clips: Sequence[ClipDigest]) -> list[tuple[str, str, str]]:
+    """Pairs of duplicates.
+
+    Each pair is given as the names of the two clips and what they have in common: "the same file", "the same
+    motion" or "mirrors of each other".
+    """
+    out = []
+    by_length = sorted(clips, key=lambda clip: clip.seconds)
+    for i, a in enumerate(by_length):
+        for b in by_length[i + 1 :]:
+            if b.seconds - a.seconds > LONGER * a.seconds:
+                break  # all further clips are even longer
+            if reason := _why_equal(a, b):
+                out.append((min(a.name, b.name), max(a.name, b.name), reason))
+    return sorted(out)
+
+
+def _why_equal(a: ClipDigest, b: ClipDigest) -> str:
+    """What two clips have in common, in the words of `duplicate_pairs`, or "" if they are no duplicates."""
+    if a.sha256 == b.sha256:
+        return "the same file"
+    if a.poses.shape != b.poses.shape:
+        return ""
+    if np.linalg.norm(a.poses - b.poses, axis=-1).mean() < SAME_MOTION:
+        return "the same motion"
+    if a.mirrored is not None and np.linalg.norm(a.mirrored - b.poses, axis=-1).mean() < SAME_MOTION:
+        return "mirrors of each other"
+    return ""
+
+
+# Summarises a folder of clips before training: one line for each clip, and notes on all of them.
+#
+# The cadence is how often the ankles pass each other in a minute. For steps of a given length, it is nearly
+# the same for all people. So if the cadence of a clip is impossible, the frame rate in its file may be wrong.
+# A warning then names a frame rate that would make the cadence usual.
+
 
 SLOWEST, FASTEST = 40.0, 260.0  # range of the cadences of people who walk or run, steps a minute
 RATES = (24, 25, 30, 60, 120, 240)  # usual frame rates of files
@@ -290,3 +398,331 @@ def format_table(folder: FolderSummary) -> str:
             f"{clip.standing:6.1f}  {remarks}"
         )
     return "\n".join([*lines, *folder.notes])
+
+
+# Makes an HTML page about a data set before training: a line for each clip, with a small walking figure.
+#
+# If there are very many clips, only some of them are read. The lines of the others show only what is in their
+# reports and labels.
+
+
+FRAMES, SECONDS = 40, 4.0  # the small figure shows up to 40 frames from the middle 4 seconds of its clip
+# Limits for the clips that are read: how many, and their length in seconds. Clips at these limits make a page
+# of 10 MB in half a minute.
+MOST_READ, MOST_SECONDS = 600, 5 * 3600.0
+MOST_NOTES = 40  # at most this many notes above the table are shown, such as notes on duplicates
+LABELS = ("cycles", "seconds", "warnings")  # keys of `labels/<clip>.json` that the page shows
+GOLDEN = 0.6180339887498949  # golden ratio - 1; its multiples, modulo 1, are spread evenly over 0..1
+COLUMNS = (
+    "clip",
+    "",
+    "rig",
+    "fps",
+    "s",
+    "hips, cm",
+    "steps/min",
+    "cycles",
+    "gait, s",
+    "foot down",
+    "largest difference",
+)
+STYLE = """body{font:14px/1.4 system-ui,sans-serif;margin:1.5em;color:#222;background:#fff}
+table{border-collapse:collapse}th,td{padding:2px 9px;text-align:left;border-bottom:1px solid #e3e3e3}
+th{position:sticky;top:0;background:#fff}td.n{text-align:right;font-variant-numeric:tabular-nums}
+.bar{display:inline-block;width:75px;height:9px;background:#eee;margin-right:6px}
+.bar i{display:block;height:100%;background:#4a7ab5}small,.note{color:#a04000}canvas{display:block}"""
+# One timer draws all figures that can be seen. D: the results of `make_figure`, C: the canvases. Users who
+# asked their system for less motion see only the first frame.
+SCRIPT = """const D=JSON.parse(document.getElementById('d').textContent);
+const C=[...document.querySelectorAll('canvas')];
+const calm=matchMedia('(prefers-reduced-motion: reduce)').matches;
+function draw(t){C.forEach((c,i)=>{const r=c.getBoundingClientRect();if(r.bottom<0||r.top>innerHeight)return;
+const d=D[i],p=d.p[calm?0:Math.floor(t*d.f/1000)%d.p.length],g=c.getContext('2d');
+g.clearRect(0,0,80,80);g.strokeStyle='#ccc';g.beginPath();g.moveTo(0,76);g.lineTo(80,76);g.stroke();
+g.lineWidth=1.5;d.b.forEach(([a,b,s])=>{g.strokeStyle=['#444','#c0392b','#2471a3'][s];g.beginPath();
+g.moveTo(p[2*a],p[2*a+1]);g.lineTo(p[2*b],p[2*b+1]);g.stroke()})});if(!calm)requestAnimationFrame(draw)}
+if(calm)addEventListener('scroll',()=>draw(0));requestAnimationFrame(draw);"""
+
+
+def make_figure(clip: Clip) -> dict[str, Any]:
+    """A figure that moves as in the clip but stays in place, seen from its side, to be drawn in the browser.
+
+    Returns three values under short keys, to keep the page small. p: for each frame, x and y of every joint
+    in pixels of a picture of 80 x 80. b: bones as (joint, joint, side), where side is 0 for the middle, 1 for
+    left and 2 for right. f: frames a second.
+    """
+    shown = min(len(clip), round(SECONDS * clip.fps))
+    first = (len(clip) - shown) // 2
+    frames = np.linspace(first, first + shown - 1, min(FRAMES, shown)).round().astype(int)
+    p = clip.positions[frames]
+    ahead = facing_directions(clip.skeleton, p, 0.0)
+    # How far each joint is ahead of the hips, cm.
+    along = np.sum((p - p[:, :1]) * ahead[:, None], axis=-1)
+    height = max(float(np.percentile(p[..., 1].max(axis=1), 90)), 1.0)
+    # The hips are in the middle, the floor is at pixel 76, and the figure is 68 pixels tall.
+    pixels = np.stack([40 + 68 * along / height, 76 - 68 * p[..., 1] / height], axis=-1)
+    bones = [(parent, j, _side(clip, j)) for j, parent in enumerate(clip.skeleton.parents) if parent >= 0]
+    flat = np.clip(pixels, 0, 80).round(1).reshape(len(frames), -1)
+    return {"p": flat.tolist(), "b": bones, "f": round(len(frames) * clip.fps / shown, 2)}
+
+
+def _side(clip: Clip, joint: int) -> int:
+    """1 for a joint on the left, 2 on the right, 0 in the middle, by its name."""
+    name = clip.skeleton.joints[joint].lower()
+    return 1 if "left" in name else 2 if "right" in name else 0
+
+
+def foot_down_share(contacts: Array) -> float:
+    """The share of frames in which a heel or toe is on the ground.
+
+    contacts: (F, 4), whether each of both heels and toes is on the ground (1 or 0).
+    """
+    return float((np.asarray(contacts) > 0.5).any(axis=1).mean())
+
+
+@dataclass(frozen=True)
+class _ClipLine:
+    """What the page shows about a clip.
+
+    labels: the values of LABELS for the clip. figure: the result of `make_figure`. foot_down: the result of
+    `foot_down_share`. Both are None if the clip was not read.
+    """
+
+    summary: ClipSummary
+    labels: Mapping[str, Any]
+    figure: dict[str, Any] | None = None
+    foot_down: float | None = None
+
+
+def look_page(
+    name: str,
+    reports: Sequence[Mapping[str, Any]],
+    labels: Sequence[Mapping[str, Any]],
+    read: Callable[[int], tuple[Clip, Array]],
+) -> str:
+    """The HTML text of the page about the data set `name`. The page needs no other files.
+
+    reports: for each clip, the content of `motion/<clip>.json`. labels: for each clip, the values of LABELS
+    in `labels/<clip>.json`. read: index of a clip -> the clip and its contacts (F, 4). It is called only for
+    the clips of `choose_clips`, one after another.
+    """
+    chosen = choose_clips(reports, labels)
+    lines = [
+        _ClipLine(summary_of_report(report), labelled)
+        for report, labelled in zip(reports, labels, strict=True)
+    ]
+    for n in sorted(chosen):
+        clip, contacts = read(n)
+        summary = summary_of_clip(clip, reports[n])
+        lines[n] = _ClipLine(summary, labels[n], make_figure(clip), foot_down_share(contacts))
+    summaries, common = shared_warnings([line.summary for line in lines])
+    lines = [replace(line, summary=summary) for line, summary in zip(lines, summaries, strict=True)]
+    # Only if all clips were read is it certain that nobody stands in them.
+    all_read = len(chosen) == len(lines)
+    notes = standing_notes(summaries) if all_read else [_sample_note(len(chosen))]
+    notes += [*common, *duplicate_notes(summaries)]
+    if (more := len(notes) - MOST_NOTES) > 0:
+        notes[MOST_NOTES:] = [f"And {more} more notes, most of them on duplicates."]
+    return _html(name, lines, notes)
+
+
+def choose_clips(reports: Sequence[Mapping[str, Any]], labels: Sequence[Mapping[str, Any]]) -> list[int]:
+    """Indices of the clips that are read for the page: all of them, or some if there are very many.
+
+    Clips with warnings are taken first, until they are half of MOST_READ. Then clips without warnings are
+    taken, and last any further clips with warnings. The clips of each group are spread evenly over the data
+    set. If there is any clip, at least one is taken.
+
+    reports, labels: as for `look_page`.
+    """
+    warned = [
+        bool(summary_of_report(report).warnings or labelled["warnings"])
+        for report, labelled in zip(reports, labels, strict=True)
+    ]
+    # Wherever a list in this order is cut off, the numbers before the cut are spread evenly.
+    spread = sorted(range(len(reports)), key=lambda n: n * GOLDEN % 1)
+    with_warning, without = ([n for n in spread if warned[n] is which] for which in (True, False))
+    half = MOST_READ // 2
+    out: list[int] = []
+    seconds = 0.0
+    for n in [*with_warning[:half], *without, *with_warning[half:]][:MOST_READ]:
+        seconds += reports[n]["seconds"]
+        if out and seconds > MOST_SECONDS:
+            break
+        out.append(n)
+    return out
+
+
+def _sample_note(count: int) -> str:
+    return (
+        f"To keep this page small, only {count} clips were read, clips with warnings first. Only the clips "
+        "that were read have a figure and all numbers. Duplicates were searched only among them."
+    )
+
+
+def _html(name: str, lines: Sequence[_ClipLine], notes: Sequence[str]) -> str:
+    """The text of the page: the notes, then a table of the lines."""
+    seconds = sum(line.summary.seconds for line in lines)
+    figures = [line.figure for line in lines if line.figure is not None]
+    data = json.dumps(figures, separators=(",", ":"))
+    title = html.escape(name)
+    return (
+        f'<!doctype html><html lang="en"><meta charset="utf-8"><title>{title}</title><style>{STYLE}</style>'
+        f"<h1>{title}</h1><p>{len(lines)} clips, {seconds:.0f} s. Left is red, right is blue.</p>"
+        + "".join(f'<p class="note">{html.escape(note)}</p>' for note in notes)
+        + f"<table><thead><tr>{''.join(f'<th>{column}</th>' for column in COLUMNS)}</tr></thead>"
+        + f"<tbody>{''.join(_row(line) for line in lines)}</tbody></table>"
+        + f'<script type="application/json" id="d">{data}</script><script>{SCRIPT}</script></html>\n'
+    )
+
+
+def _row(line: _ClipLine) -> str:
+    """A row of the table, with a cell for each of COLUMNS."""
+    summary, labels = line.summary, line.labels
+    gaits = ", ".join(f"{gait} {s:.1f}" for gait, s in labels["seconds"].items() if s >= 0.05)
+    difference = "not retargeted"
+    if summary.largest_difference:
+        joint, degrees = summary.largest_difference
+        # The bar is full at 15 degrees, the mean difference above which a clip is refused.
+        bar = f'<span class="bar"><i style="width:{min(100.0, degrees / 15 * 100):.0f}%"></i></span>'
+        difference = f"{bar}{html.escape(joint)} {degrees:.0f}&deg;"
+    remarks = "; ".join([*summary.warnings, *labels["warnings"]])
+    name = html.escape(summary.name) + (f"<br><small>{html.escape(remarks)}</small>" if remarks else "")
+    # These cells stay empty if the clip was not read.
+    picture, measured_cells, foot_down = "", ["", ""], ""
+    if line.foot_down is not None:
+        picture = '<canvas width="80" height="80"></canvas>'
+        measured_cells = [f"{summary.hip_height:.0f}", f"{summary.cadence:.0f}"]
+        foot_down = f"{100 * line.foot_down:.0f} %"
+    numbers = [f"{summary.fps:.4g}", f"{summary.seconds:.1f}", *measured_cells, str(labels["cycles"])]
+    cells = "".join(f'<td class="n">{value}</td>' for value in numbers)
+    return (
+        f"<tr><td>{name}</td><td>{picture}</td>"
+        f"<td>{html.escape(summary.rig)}</td>{cells}<td>{html.escape(gaits)}</td>"
+        f'<td class="n">{foot_down}</td><td>{difference}</td></tr>'
+    )
+
+
+# Draws a clip beside the retargeted motion, as stick figures from the side and from the front.
+
+
+# Roles of the joints along a leg and along an arm.
+LIMBS = (("hips", "hip", "knee", "heel", "toe"), ("chest", "shoulder", "elbow", "wrist"))
+PICTURES = 6  # poses of the clip in each row of the picture
+WIDE, HIGH, EDGE = 150, 260, 46  # pixels: width and height of one figure, and the margin for captions
+COLOURS = {"left": "#2b6cb0", "right": "#8a8a8a", "": "#333333"}  # of the limbs' bones; "": trunk and head
+WRONG = "#d62828"  # colour of the bones that differ most
+
+
+def picture_of_file(bvh: Path, skeleton: Path, skeleton_folder: Path, options: ClipMotion) -> str:
+    """The picture (SVG) of a BVH file's motion and of the result of retargeting.
+
+    It is drawn even if the workflow refuses the result because it differs too much from the source.
+
+    skeleton: the file of the skeleton that gets the motion. skeleton_folder: the folder with all skeleton
+    files, with which the rig of the BVH file is recognised. Raises InputError for a BVH file that cannot be
+    read or that has this skeleton's bones already.
+    """
+    target = load_skeleton(skeleton, skeleton.stem)
+    source = load_source(read_bvh(bvh), target, skeleton_folder, options)
+    before = resample(source.clip, options.fps)
+    before = replace(before, skeleton=replace(before.skeleton, roles=source.match.roles))
+    fitted = fit_skeleton(before, source, target.skeleton, options.proportions)
+    if fitted.difference is None:
+        raise InputError(
+            bvh, f"already has the bones of {target.skeleton.name}, so there is no retargeting to draw"
+        )
+    return retarget_picture(before, fitted.clip, *most_different(fitted.difference))
+
+
+def retarget_picture(source: Clip, result: Clip, part: str, degrees: float) -> str:
+    """An SVG of four rows of PICTURES figures: source and result from the side, then both from the front.
+
+    source, result: the clip before and after retargeting, both with roles and at the same frame rate. part:
+    the joint or limb that differs most, such as "left knee"; its bones are drawn in red. degrees: by how much
+    it differs on average.
+    """
+    frames = np.linspace(0, min(len(source), len(result)) - 1, PICTURES).round().astype(int)
+    rows = [
+        (f"{name}, from the {view}", _draw_figures(clip, frames, part, view))
+        for view in ("side", "front")
+        for name, clip in (("source", source), ("result", result))
+    ]
+    width, height = PICTURES * WIDE + 2 * EDGE, len(rows) * HIGH + 2 * EDGE
+    title = f"{source.name}: the {part} is {degrees:.0f} degrees off its source on average (red)"
+    out = [
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height}" width="{width}" '
+        f'font-family="sans-serif" font-size="14"><rect width="100%" height="100%" fill="white"/>',
+        f'<text x="{EDGE}" y="28" font-size="18">{html.escape(title)}</text>',
+    ]
+    for number, (name, figures) in enumerate(rows):
+        top = EDGE + number * HIGH
+        out.append(f'<text x="{EDGE}" y="{top + 16}">{html.escape(name)}</text>')
+        out += [
+            f'<g transform="translate({EDGE + WIDE * (k + 0.5):g},{top + HIGH - 14})">{figure}</g>'
+            for k, figure in enumerate(figures)
+        ]
+    captions = [
+        f'<text x="{EDGE + WIDE * (k + 0.5):g}" y="{height - 14}" text-anchor="middle">'
+        f"{frame / result.fps:.2f} s</text>"
+        for k, frame in enumerate(frames)
+    ]
+    return "\n".join([*out, *captions, "</svg>\n"])
+
+
+def _draw_figures(clip: Clip, frames: Array, part: str, view: str) -> list[str]:
+    """For each of the `frames`, the SVG elements of the figure in that frame.
+
+    A figure's lowest point is at y = 0, and its hips are at x = 0. part: the joint or limb in red. view:
+    "side" or "front".
+    """
+    at = {role: clip.positions[frames, clip.skeleton.role(role)] for role in clip.skeleton.roles}
+    ahead = facing_directions(clip.skeleton, clip.positions[frames], 0.0)
+    across = np.cross([0.0, 1.0, 0.0], ahead)
+    rightward = ahead if view == "side" else across  # what points to the right in the picture
+    places = {  # role -> (PICTURES, 2) distance to the right of the hips, and height; cm
+        role: np.stack([np.sum((p - at["hips"]) * rightward, axis=-1), p[:, 1]], axis=-1)
+        for role, p in at.items()
+    }
+    heights = np.stack(list(places.values()))[..., 1]
+    lowest = heights.min(axis=0)
+    scale = (HIGH - 50) / max(float(np.median(np.ptp(heights, axis=0))), 1e-9)  # pixels a cm
+    return [
+        "".join(
+            _draw_bone(places[a][k], places[b][k], lowest[k], scale, WRONG if wrong else COLOURS[side])
+            for a, b, side, wrong in _bones_to_draw(places, part)
+        )
+        for k in range(len(frames))
+    ]
+
+
+def _bones_to_draw(places: Mapping[str, Array], part: str) -> list[tuple[str, str, str, bool]]:
+    """For each bone to draw: the roles of its start and end, its side, and whether it belongs to `part`.
+
+    The side of trunk and head is "". places: its keys are the roles that the figure has.
+    """
+    side, _, name = part.partition(" ")
+    roles = ANGLES.get(name) or BONES.get(name) or ()
+    in_part = set(pairwise(role if role == "head" else f"{side}_{role}" for role in roles))
+    chains: list[tuple[str, tuple[str, ...]]] = [("", TRUNK)]
+    for limb_side in SIDES:
+        for first, *rest in LIMBS:
+            chains.append((limb_side, (first, *(f"{limb_side}_{role}" for role in rest))))
+    return [
+        (a, b, bone_side, (a, b) in in_part)
+        for bone_side, chain in chains
+        for a, b in pairwise(role for role in chain if role in places)
+    ]
+
+
+def _draw_bone(a: Array, b: Array, lowest: float, scale: float, colour: str) -> str:
+    """The SVG line from `a` to `b`, each (2,) x and height in cm. In an SVG, y points down.
+
+    lowest: the height in cm at y = 0. scale: pixels a cm.
+    """
+    x1, y1, x2, y2 = a[0] * scale, (lowest - a[1]) * scale, b[0] * scale, (lowest - b[1]) * scale
+    thick = 6 if colour == WRONG else 3
+    return (
+        f'<line x1="{x1:.1f}" y1="{y1:.1f}" x2="{x2:.1f}" y2="{y2:.1f}" stroke="{colour}" '
+        f'stroke-width="{thick}" stroke-linecap="round"/>'
+    )

@@ -55,7 +55,7 @@ class KnownSkeleton:
 class RigMatch:
     """Which known skeleton a clip's rig is, and how it maps to the target.
 
-    rig: name of the known skeleton, or UNKNOWN_RIG of `hobble.motion.file_motion`. roles: role -> name of the
+    rig: name of the known skeleton, or UNKNOWN_RIG of `hobble.motion.make`. roles: role -> name of the
     clip's joint. is_target_skeleton: whether the clip has the target's own joints and an equal rest pose.
     followed_joints: name of a target joint -> name of the clip's joint that it follows. has_known_rest_pose:
     whether the clip's rest pose equals that of the known skeleton (as `has_equal_rest_pose` compares them);

@@ -14,8 +14,8 @@ from hobble.core.clip import Clip
 from hobble.core.errors import InputError
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
-from hobble.motion.balance import Balance, find_balance
 from hobble.motion.orient import unit_vectors
+from hobble.motion.physics import Balance, find_balance
 from hobble.motion.rig import leg_length
 
 # A plane, called the ground, is fitted to the balls of standing feet. Its axes are the horizontal direction

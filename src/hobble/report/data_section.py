@@ -13,7 +13,7 @@ from hobble.channels import channel
 from hobble.channels.shown import shown_names
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
-from hobble.motion.check_retarget import MOST_DIFFERENCE, most_different
+from hobble.motion.retarget import MOST_DIFFERENCE, most_different
 from hobble.report.gather import ReportMaterial
 from hobble.report.parts import Chart, Column, Table, Trace, axis, format_bytes
 from hobble.rows.clip_rows import row_count

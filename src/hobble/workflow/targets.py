@@ -210,7 +210,7 @@ def _check_hurt(project: Project, name: str, dataset: Dataset, links: Sequence[s
 def _check_mirror(name: str, skeleton_file: SkeletonFile) -> None:
     """Raise HobbleError for a skeleton that cannot be mirrored. name: the skeleton's name."""
     from hobble.core.skeleton import Skeleton
-    from hobble.motion.mirror import mirror_skeleton
+    from hobble.motion.edit import mirror_skeleton
 
     skeleton = Skeleton.from_dict({"name": name, **skeleton_file.model_dump(exclude={"maps"})})
     mirror_skeleton(skeleton)

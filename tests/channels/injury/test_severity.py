@@ -25,7 +25,7 @@ from hobble.channels.injury.status import InjurySpell, Status, read_status
 from hobble.core.clip import Clip
 from hobble.core.errors import InputError
 from hobble.core.skeleton import Skeleton
-from hobble.motion.resample import sample_times
+from hobble.motion.edit import sample_times
 
 THIGH, ARM = "LeftUpLeg-LeftLeg", "LeftArm-LeftForeArm"
 

@@ -1,20 +1,298 @@
-"""Finds broken frames, and cuts them off, bridges them or smooths them.
-
-A joint of a living body changes its velocity little between frames. A large change is an error of the file: a
-rest pose or zeros as first or last frame, a teleport, a jump at the seam of a loop, a single wrong frame.
-In sentences for users the first frame is frame 1, but in the code it is frame 0.
-"""
+"""Changes whole clips: resamples, mirrors and repeats them, and repairs broken frames."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
 from hobble.core import quat
 from hobble.core.clip import Clip
+from hobble.core.errors import HobbleError
 from hobble.core.quat import Array
+from hobble.core.skeleton import Skeleton, other_side
+from hobble.motion.axes import turned_about_vertical
+from hobble.motion.root import facing_directions
+
+
+def resample(clip: Clip, fps: float) -> Clip:
+    """The clip at another frame rate. New frames at the times of old frames are exactly equal to these."""
+    if clip.fps == fps:
+        return clip
+    times = sample_times(len(clip), clip.fps, fps)
+    return replace(
+        clip,
+        fps=fps,
+        rotations=sample_rotations(clip.rotations, times),
+        root=sample_positions(clip.root, times),
+        translations=None if clip.translations is None else sample_positions(clip.translations, times),
+    )
+
+
+def sample_times(frames: int, source_fps: float, fps: float) -> Array:
+    """(N,) times of the new frames, counted in source frames, from 0 to the last that is within the clip.
+
+    frames: number of source frames.
+
+    >>> sample_times(5, 120, 60)
+    array([0., 2., 4.])
+    """
+    last = int(np.floor((frames - 1) * fps / source_fps + 1e-6))
+    return np.minimum(np.arange(last + 1) * (source_fps / fps), frames - 1)
+
+
+def _neighbours(times: Array) -> tuple[Array, Array, Array]:
+    """For each of the `times` (N,): the frame before it, the frame after it, and its position between them.
+
+    The position is 0 to 1, and 0 at a whole frame. There both frames are this frame.
+    """
+    first = np.floor(times + 1e-9).astype(int)
+    share = np.clip(times - first, 0.0, 1.0)
+    share[share < 1e-9] = 0.0
+    return first, np.where(share > 0, first + 1, first), share
+
+
+def sample_rotations(rotations: Array, times: Array) -> Array:
+    """Rotations (N, J, 4) at `times` (N,), interpolated between the rotations (F, J, 4) of F frames.
+
+    times: in frames. At a whole frame the result is exactly the rotations of that frame.
+    """
+    first, second, share = _neighbours(times)
+    if not share.any():
+        return quat.continuous(rotations[first])
+    out = quat.slerp(rotations[first], rotations[second], share[:, None])
+    out[share == 0] = rotations[first[share == 0]]
+    return quat.continuous(quat.normalize(out))
+
+
+def sample_positions(positions: Array, times: Array) -> Array:
+    """Positions (N, ..., 3) at `times` (N,), interpolated between the positions (F, ..., 3) of F frames.
+
+    times: in frames.
+    """
+    first, second, share = _neighbours(times)
+    share = share.reshape(-1, *(1,) * (positions.ndim - 1))  # (N, 1, ..., 1), to broadcast
+    return positions[first] * (1 - share) + positions[second] * share
+
+
+# Mirrors a motion in the plane x = 0: negates x, and swaps the joints of the left and right side.
+
+
+# A position, or a rotation (w, x, y, z), is mirrored in the plane x = 0 if it is multiplied by this.
+MIRRORED, MIRRORED_ROTATION = np.array([-1.0, 1.0, 1.0]), np.array([1.0, 1.0, -1.0, -1.0])
+
+
+def mirror_skeleton(skeleton: Skeleton) -> Skeleton:
+    """The skeleton with left and right swapped: a symmetric skeleton stays the same.
+
+    Raises HobbleError if two joints are counterparts (such as left and right knee), but their parents are
+    not.
+    """
+    swap = skeleton.mirror_joints
+    for j, p in enumerate(skeleton.parents):
+        if p >= 0 and skeleton.parents[swap[j]] != swap[p]:
+            a, b = skeleton.joints[j], skeleton.joints[swap[j]]
+            why = f"the parents of {a} and {b} are not counterparts on the left and on the right"
+            raise HobbleError(f"skeleton {skeleton.name} cannot be mirrored: {why}")
+    ends = {}
+    for name in skeleton.end_sites:
+        # A joint without a counterpart keeps its own end site, mirrored.
+        x, y, z = skeleton.end_sites.get(other_side(name), skeleton.end_sites[name])
+        ends[name] = (-x, y, z)
+    return replace(skeleton, offsets=skeleton.offsets[swap] * MIRRORED, end_sites=ends)
+
+
+def mirror_clip(clip: Clip, name: str) -> Clip:
+    """The clip mirrored in the plane x = 0. name: of the mirrored clip."""
+    swap = clip.skeleton.mirror_joints
+    translations = None if clip.translations is None else clip.translations[:, swap] * MIRRORED
+    return Clip(
+        name,
+        mirror_skeleton(clip.skeleton),
+        clip.fps,
+        clip.rotations[:, swap] * MIRRORED_ROTATION,
+        clip.root * MIRRORED,
+        translations,
+    )
+
+
+def mirror_report(report: Mapping[str, Any], name: str) -> dict[str, Any]:
+    """The report of a mirrored clip. report: the report of the original clip. name: of the mirrored clip."""
+    return {**report, "clip": name, "mirror_of": report["clip"], "facing": 0.0 - report["facing"]}
+
+
+# Plays a clip of one gait cycle several times in a row, and blends the seams between the repetitions.
+
+
+SEAM_BLEND = 0.2  # seconds before and after a seam over which it is blended; doubled until the seam is smooth
+FASTEST = 1.3  # a seam is smooth if no joint is faster than this times the highest speed in the clip
+TURNING = np.radians(20.0)  # a cycle in which the body turns by no more than this counts as straight
+UP = np.array([0.0, 1.0, 0.0])
+
+
+def loop_clip(clip: Clip, times: int, heading: float | None = None) -> Clip:
+    """Repeat a clip of one cycle `times` times. Each repetition starts where the last one ended.
+
+    The last frame of the clip may show the same pose as its first one, or the pose before it. heading: the
+    direction in which the first cycle moves, degrees from +Z towards +X; by default as in the clip. Raises
+    HobbleError for a clip of less than four frames.
+    """
+    if len(clip) < 4:
+        raise HobbleError(
+            f"{clip.name}: {len(clip)} frames are too few to be repeated as a cycle; at least 4 are needed"
+        )
+    cycle = _without_repeated_pose(clip)
+    move = _move_between_cycles(cycle)
+    highest_speed = _top_speed(clip)
+    reach = max(2, min(round(SEAM_BLEND * clip.fps), len(cycle) // 2))
+    while True:
+        looped = _repeat(_blended(cycle, move, reach), move, times)
+        if reach >= len(cycle) // 2 or _seam_speed(looped, len(cycle)) <= FASTEST * highest_speed:
+            return looped if heading is None else _turn_to_heading(looped, move, np.radians(heading))
+        reach = min(2 * reach, len(cycle) // 2)
+
+
+def _without_repeated_pose(clip: Clip) -> Clip:
+    """The clip without its last frame if this shows the same pose as the first one."""
+    first, second, last = (_pose(clip, i) for i in (0, 1, -1))
+    return (
+        _cut(clip, slice(0, -1))
+        if _mean_distance(first, last) < 0.5 * _mean_distance(first, second)
+        else clip
+    )
+
+
+def _pose(clip: Clip, frame: int) -> Array:
+    """(J, 3) positions of the joints relative to the ground below the hips, turned to face +Z."""
+    turn = quat.yaw(-_yaw(clip, frame))
+    place = clip.positions[frame] - clip.positions[frame, 0] * [1, 0, 1]
+    return quat.rotate(turn, place)
+
+
+def _mean_distance(a: Array, b: Array) -> float:
+    return float(np.linalg.norm(a - b, axis=-1).mean())
+
+
+def _yaw(clip: Clip, frame: int) -> float:
+    """The facing direction in a frame, radians from +Z towards +X."""
+    ahead = facing_directions(clip.skeleton, clip.positions[[frame]], 0.0)[0]
+    return float(np.arctan2(ahead[0], ahead[2]))
+
+
+def _move_between_cycles(cycle: Clip) -> tuple[float, Array]:
+    """How the root of a cycle must be moved to start the next one: a turn and a shift.
+
+    turn: radians about Y, through the origin. shift: (3,) cm over the ground, after the turn.
+    """
+    # Between -pi and pi.
+    turn = (_yaw(cycle, -1) - _yaw(cycle, 0) + np.pi) % (2 * np.pi) - np.pi
+    turn = float(turn) if abs(turn) > TURNING else 0.0
+    # The next cycle begins one frame after the last one of this cycle.
+    step = np.median(np.diff(cycle.root[-4:], axis=0), axis=0)
+    arrival = cycle.root[-1] + step
+    shift = arrival - quat.rotate(quat.yaw(turn), cycle.root[0])
+    return turn, shift * [1, 0, 1]
+
+
+def _blended(cycle: Clip, move: tuple[float, Array], reach: int) -> Clip:
+    """The cycle, changed so that its end leads into its start.
+
+    Half of the difference between end and start is removed at each of them. The change fades out over `reach`
+    frames. move: the result of `_move_between_cycles`.
+    """
+    turn, frames = move[0], len(cycle)
+    # The pose one frame after the end is extrapolated. It should be the first pose of the next cycle.
+    first = cycle.rotations[0].copy()
+    first[0] = quat.mul(quat.yaw(turn), first[0])
+    after_last = quat.slerp(cycle.rotations[-2], cycle.rotations[-1], np.array(2.0))
+    gaps = quat.log(quat.mul(quat.inv(after_last), first))
+    height_gap = cycle.root[0, 1] - (2 * cycle.root[-1, 1] - cycle.root[-2, 1])
+    n = np.arange(frames)
+    near_end, near_start = np.clip(1 - (frames - n) / reach, 0, 1), np.clip(1 - n / reach, 0, 1)
+    # The share of the gap that is added to each frame: from -.5 at the start to almost .5 at the end.
+    weight = 0.5 * (_eased(near_end) - _eased(near_start))
+    root = cycle.root + weight[:, None] * height_gap * UP
+    moved = cycle.translations
+    return replace(
+        cycle,
+        rotations=quat.mul(cycle.rotations, quat.exp(weight[:, None, None] * gaps)),
+        root=root,
+        translations=None if moved is None else moved + weight[:, None, None] * (moved[0] - moved[-1]),
+    )
+
+
+def _eased(x: Array) -> Array:
+    """Numbers from 0 to 1, changed so that they start and end gradually."""
+    return x * x * (3 - 2 * x)
+
+
+def _repeat(cycle: Clip, move: tuple[float, Array], times: int) -> Clip:
+    """The cycle played `times` times. move: the result of `_move_between_cycles`."""
+    turn, shift = move
+    rotations, roots = [], []
+    place = np.zeros(3)
+    for k in range(times):
+        yaw = quat.yaw(k * turn)
+        turned_cycle = cycle.rotations.copy()
+        turned_cycle[:, 0] = quat.mul(yaw, turned_cycle[:, 0])
+        rotations.append(turned_cycle)
+        roots.append(quat.rotate(yaw, cycle.root) + place)
+        place = place + quat.rotate(yaw, shift)
+    moved = cycle.translations
+    return replace(
+        cycle,
+        rotations=quat.continuous(np.concatenate(rotations)),
+        root=np.concatenate(roots),
+        translations=None if moved is None else np.concatenate([moved] * times),
+    )
+
+
+def _turn_to_heading(clip: Clip, move: tuple[float, Array], heading: float) -> Clip:
+    """Turn the clip about the vertical so that its first cycle moves in the direction `heading` (radians).
+
+    A cycle that stays within 1 cm has no direction, and its clip is not turned. move: the result of
+    `_move_between_cycles`.
+    """
+    shift = move[1]
+    if np.hypot(shift[0], shift[2]) < 1.0:
+        return clip
+    return turned_about_vertical(clip, heading - float(np.arctan2(shift[0], shift[2])))
+
+
+def _top_speed(clip: Clip) -> float:
+    """The highest speed of any joint, cm a frame."""
+    return float(np.linalg.norm(np.diff(clip.positions, axis=0), axis=-1).max())
+
+
+def _seam_speed(clip: Clip, cycle: int) -> float:
+    """The highest speed of any joint in the first two cycles, with the seam between them, cm a frame.
+
+    cycle: frames in a cycle.
+    """
+    speed = np.linalg.norm(np.diff(clip.positions, axis=0), axis=-1).max(axis=1)
+    return float(speed[: 2 * cycle].max())
+
+
+def _cut(clip: Clip, frames: slice) -> Clip:
+    """The clip with only some of its frames."""
+    moved = clip.translations
+    return replace(
+        clip,
+        rotations=clip.rotations[frames],
+        root=clip.root[frames],
+        translations=None if moved is None else moved[frames],
+    )
+
+
+# Finds broken frames, and cuts them off, bridges them or smooths them.
+#
+# A joint of a living body changes its velocity little between frames. A large change is an error of the file:
+# a rest pose or zeros as first or last frame, a teleport, a jump at the seam of a loop, a single wrong frame.
+# In sentences for users the first frame is frame 1, but in the code it is frame 0.
+
 
 # A step is the movement of a joint from one frame to the next. At f Hz it is a jump if it differs from the
 # neighbouring steps by more than JUMP + JUMP_AT_30 * (30 / f)^2 cm. The limit is higher at low frame rates,
@@ -33,7 +311,7 @@ BRIDGE = 0.25  # seconds: if two jumps are at most this far apart, the frames be
 BLEND = 0.1  # seconds on each side of a jump over which the motion is smoothed
 # A joint that turns by more than this from one frame to the next spins faster than a living joint can. Above
 # 120 Hz the limit is lower, in proportion to the time between frames.
-FLIP = np.radians(60.0)
+SPIN = np.radians(60.0)
 BLOCK = 4096  # frames that are searched at a time, to keep intermediate arrays small
 NO_POSE = 0.75  # frames have no pose if more than this share of their joints' rotations are zero
 
@@ -165,7 +443,7 @@ def notes_on_flips(clip: Clip, first: int) -> list[str]:
     Thumbs and end joints of captured rigs spin like this, because markers do not show how these joints are
     turned. first: the source's frame (from 0) at which the clip begins.
     """
-    limit = FLIP * min(1.0, 120.0 / clip.fps)
+    limit = SPIN * min(1.0, 120.0 / clip.fps)
     sentences = []
     for j, name in enumerate(clip.skeleton.joints):
         q = clip.rotations[:, j]

@@ -1,0 +1,471 @@
+"""Finds which way is down from how a body balances on its feet.
+
+While only one foot stands, the force of the ground acts at a point under this foot, the zero moment point,
+and points to the body's centre of mass (Vukobratovic and Borovac 2004). The force has two parts: one holds
+the body against gravity, and one accelerates it. So the standing feet and the accelerations in a few steps
+show the direction of gravity, even if the body leans or the ground slopes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hobble.core.clip import Clip
+from hobble.core.errors import InputError
+from hobble.core.quat import Array
+from hobble.core.smooth import gaussian
+from hobble.motion.body import SIDES
+from hobble.motion.rig import leg_length
+from hobble.motion.root import facing_directions
+
+GRAVITY = 981.0  # cm / s2
+# TRUNK, HEAD: shares of the body's mass (de Leva 1996). TRUNK_CENTRE: where the trunk's centre of mass is,
+# between the hips (0) and the shoulders (1). The head's centre of mass is taken to be at the head's joint.
+TRUNK, TRUNK_CENTRE = 0.4346, 0.55
+HEAD = 0.0694
+# Segments on each side of the body: share of the body's mass, role of the first joint, role of the second
+# joint, and where the segment's centre of mass is, between the first joint (0) and the second (1).
+SEGMENTS = (
+    (0.0271, "shoulder", "elbow", 0.577),
+    (0.0162, "elbow", "wrist", 0.457),
+    (0.0061, "wrist", "wrist", 0.0),
+    (0.1416, "hip", "knee", 0.41),
+    (0.0433, "knee", "heel", 0.446),
+    (0.0137, "heel", "toe", 0.5),
+)
+# Seconds: standard deviation of the Gaussian that smooths positions before accelerations are computed.
+SMOOTH = 0.04
+# Leg lengths a second: the ball of a standing foot is slower than this. Ball and heel of a swinging foot are
+# faster.
+SLOW_FOOT = 0.4
+UPRIGHT = 0.6  # leg lengths: hips at least this far above the standing foot, or the figure sits or kneels
+SHORTEST_STANCE = 0.06  # seconds: each foot must stand alone for at least this time, or no direction is found
+# PRESSED: the point between ankle (0) and ball (1) at which the force of the ground acts, for a figure that
+# moves forward at the speeds SPEEDS. Speeds are divided by the square root of gravity times leg length. The
+# points are means over 172 clips: of the data sets `cmu`, `styles` and `patients`, of Ferre et al. and of
+# Holden et al. (2017).
+SPEEDS, PRESSED = (-0.1, 0.0, 0.1), (0.45, 0.25, 1.0)
+# In these clips, the direction found in runs leans forward by mistake: by LEAN degrees at the speeds
+# RUN_SPEEDS, which are divided like SPEEDS. This lean is subtracted.
+RUN_SPEEDS, LEAN = (0.5, 0.9), (0.0, 3.5)
+
+
+@dataclass(frozen=True)
+class Balance:
+    """The direction against gravity, found from how the body balances.
+
+    up: (2,) x and z of this direction, scaled to y = 1. In 172 clips, the standard deviation of its error is
+    1 degree to the side and 1.9 degrees forward; in short clips it is twice as large. left: (2,) x and z of
+    the mean direction to the body's left, a unit vector. seconds: how long the figure stood on the left foot
+    alone or on the right foot alone, whichever is shorter.
+    """
+
+    up: Array
+    left: Array
+    seconds: float
+
+    @property
+    def aside(self) -> float:
+        """Degrees by which the direction against gravity leans from Y towards the body's left."""
+        return float(np.degrees(np.arcsin(np.clip(self.up @ self.left, -1.0, 1.0))))
+
+
+class _BodyMotion(NamedTuple):
+    """What the balance of a body depends on, in F frames.
+
+    at: role -> (F, 3) positions, cm. ahead: (F, 3) unit vectors along which the body faces. speed: (F,)
+    forward speed, divided by the square root of gravity times leg length. centre: (F, 3) centre of mass, cm.
+    push: (F, 3) acceleration of this centre, divided by the sum of gravity and vertical acceleration.
+    """
+
+    at: dict[str, Array]
+    ahead: Array
+    speed: Array
+    centre: Array
+    push: Array
+
+
+def find_balance(clip: Clip) -> Balance | None:
+    """The direction against gravity, or None if the body does not stand long enough on each foot alone."""
+    fps, leg = clip.fps, leg_length(clip.skeleton)
+    reach = max(1, round(fps / 20))  # frames: speeds of feet are measured over 50 ms before and after
+    if len(clip) < 4 * reach + 3:  # no frame would be left without its ends, where speeds are not reliable
+        return None
+    at = {role: clip.positions[:, clip.skeleton.role(role)] for role in clip.skeleton.roles}
+    ahead, centre = facing_directions(clip.skeleton, clip.positions, fps / 3), centre_of_mass(at)
+    velocity = np.gradient(gaussian(at["hips"], 0.1 * fps), axis=0) * fps
+    acceleration = np.gradient(np.gradient(gaussian(centre, SMOOTH * fps), axis=0), axis=0) * fps * fps
+    forward_speed = np.sum(velocity * ahead, axis=-1) / np.sqrt(GRAVITY * leg)
+    push = acceleration / (GRAVITY + acceleration[:, 1:2])
+    motion = _BodyMotion(at, ahead, forward_speed, centre, push)
+    slow = {  # role of a foot's joint -> (F,) whether the joint is slow
+        f"{side}_{part}": _speed(at[f"{side}_{part}"], reach) * fps < SLOW_FOOT * leg
+        for side in SIDES
+        for part in ("toe", "heel")
+    }
+    ups, seconds = [], []
+    for side, other in (SIDES, SIDES[::-1]):
+        # `alone`: the frames in which the foot of this side stands alone.
+        alone = slow[f"{side}_toe"] & ~slow[f"{other}_toe"] & ~slow[f"{other}_heel"]
+        alone &= at["hips"][:, 1] - at[f"{side}_heel"][:, 1] > UPRIGHT * leg
+        alone[: 2 * reach] = alone[-2 * reach :] = False
+        seconds.append(float(alone.sum() / fps))
+        if seconds[-1] < SHORTEST_STANCE:
+            return None
+        ups.append(_trimmed_mean(_up(motion, side)[alone]))
+    left = np.cross([0.0, 1.0, 0.0], ahead).mean(axis=0)[[0, 2]]
+    return Balance(0.5 * (ups[0] + ups[1]), left / max(float(np.linalg.norm(left)), 1e-9), min(seconds))
+
+
+def centre_of_mass(at: dict[str, Array]) -> Array:
+    """(..., 3) centre of mass of a body. Segments whose joints are missing are left out.
+
+    at: role -> positions (..., 3).
+    """
+    hips, shoulders = (0.5 * (at[f"left_{part}"] + at[f"right_{part}"]) for part in ("hip", "shoulder"))
+    total = TRUNK * (hips + TRUNK_CENTRE * (shoulders - hips)) + HEAD * at["head"]
+    mass = TRUNK + HEAD
+    for share, start, end, centre in SEGMENTS:
+        for side in SIDES:
+            a, b = at.get(f"{side}_{start}"), at.get(f"{side}_{end}")
+            if a is not None and b is not None:
+                total = total + share * (a + centre * (b - a))
+                mass += share
+    return np.asarray(total / mass)
+
+
+def _up(motion: _BodyMotion, side: str) -> Array:
+    """(F, 2) x and z of the direction against gravity, scaled to y = 1.
+
+    side: "left" or "right". The result is only valid in frames in which the foot of this side stands alone.
+    """
+    heel, bone = motion.at[f"{side}_heel"], motion.at[f"{side}_toe"] - motion.at[f"{side}_heel"]
+    pressed = np.interp(motion.speed, SPEEDS, PRESSED)[:, None]
+    level = np.linalg.norm(bone * [1, 0, 1], axis=-1, keepdims=True)
+    # `foot` is the point at which the force acts. Along the direction in which the body faces, it is at the
+    # share `pressed` of the way from ankle to ball. Sideways, it is at the share `middle`.
+    middle = 0.6
+    foot = heel + middle * bone + (pressed - middle) * level * motion.ahead
+    # The force points from `foot` to the centre of mass. Without its part that accelerates the body (`push`),
+    # it points against gravity.
+    arm = motion.centre - foot
+    lean = np.radians(np.interp(motion.speed, RUN_SPEEDS, LEAN))[:, None] * motion.ahead
+    return np.asarray((arm / np.maximum(arm[:, 1:2], 1.0) - motion.push - lean)[:, [0, 2]])
+
+
+def _trimmed_mean(values: Array) -> Array:
+    """(2,) mean of values (N, 2). In each column, the highest and the lowest tenth are left out."""
+    low, high = np.quantile(values, [0.1, 0.9], axis=0)
+    inside = (values >= low) & (values <= high)
+    return np.asarray((values * inside).sum(axis=0) / inside.sum(axis=0))
+
+
+def _speed(place: Array, reach: int) -> Array:
+    """(F,) speed of a point, cm a frame, measured from `reach` frames before to `reach` frames after.
+
+    place: (F, 3) its positions, cm. The first and last `reach` frames get the speed nearest to them.
+    """
+    steps = np.linalg.norm(place[2 * reach :] - place[: -2 * reach], axis=-1) / (2 * reach)
+    return np.pad(steps, reach, mode="edge")
+
+
+# Tempo: gravity sets how strongly a walking or running body accelerates. A walker falls forward over the
+# standing foot like an inverted pendulum, and a runner in the air falls freely. A clip with twice the true
+# frame rate shows four times these accelerations. They are smoothed over a part of a step, not over a fixed
+# time, so that the result does not depend on the frame rate.
+
+
+FEWEST_STEPS = 3  # steps; with fewer, nothing is estimated
+BRIEFEST = 4  # frames; shorter steps show no accelerations
+# Frames in which the hips are slower than this share of their fast speed (80th percentile) belong to no step.
+MOVES = 0.25
+ALONE = 0.3  # a foot stands alone if its ball is slower than this share of the speed of the other ball
+# A figure runs if the correlation of the height of its hips with the distance between its ankles is above
+# this. In a run, the hips are lowest when they pass over the standing foot (Cavagna et al. 1977).
+RUNS = 0.1
+# The usual values of fields of `Accelerations` in clips that play at the right speed: LEVEL for the field
+# `level` in walks and runs, WALK and RUN for other fields. The binary logarithm of a value is a + b s +
+# c s^2, where s is the binary logarithm of the length of a step in leg lengths. The coefficients (a, b, c)
+# are robust fits to 161 clips of CMU, Holden et al. (2017) and Ferre et al., and of the data sets `styles`
+# and `patients` (config/datasets).
+LEVEL = (-2.77, 0.83, 0.23)
+WALK = {"pendulum": (-1.43, -0.72, -0.2), "vertical": (-2.59, 1.59, 0.59)}
+RUN = {"pendulum": (-0.35, -0.35, -0.25), "falling": (-0.02, 0.21, -0.3)}
+STEPS = (0.3, 2.0)  # leg lengths: shortest and longest step for which the fits hold
+
+
+@dataclass(frozen=True)
+class Accelerations:
+    """The accelerations of a body's centre of mass, and what they depend on.
+
+    level, vertical: root mean squares of the horizontal and of the vertical acceleration, in g. falling: the
+    strongest downward acceleration (98th percentile), in g. pendulum: slope of the forward acceleration, in
+    g, against the forward lean, which is how far the centre of mass is ahead of the standing foot, divided by
+    its height above this foot. The slope of an inverted pendulum that stands on a point is 1. step: length of
+    a step in leg lengths. runs: whether the figure runs.
+    """
+
+    level: float
+    vertical: float
+    falling: float
+    pendulum: float
+    step: float
+    runs: bool
+
+
+@dataclass(frozen=True)
+class TooFast:
+    """How many times too fast a clip plays, from three estimates.
+
+    Values below 1 mean that it plays too slowly. least: the estimate nearest to 1, or 1 if some estimates are
+    above 1 and others below. likely: the median of the estimates.
+    """
+
+    least: float
+    likely: float
+
+
+def times_too_fast(clip: Clip, steps: int, scale: float = 1.0) -> TooFast | None:
+    """How many times too fast a clip plays. None if its accelerations cannot be measured.
+
+    steps: the number of steps in the clip. scale: size of the clip's figure / size of the captured person.
+    """
+    accelerations = measure_accelerations(clip, steps, GRAVITY * scale)
+    if accelerations is None:
+        return None
+    s = float(np.log2(np.clip(accelerations.step, *STEPS)))
+    usual = {"level": LEVEL, **(RUN if accelerations.runs else WALK)}
+    estimates = []
+    for name, (a, b, c) in usual.items():
+        value = np.log2(max(getattr(accelerations, name), 0.02))
+        # Half the logarithm, because accelerations grow with the square of the speed.
+        estimates.append(0.5 * (value - (a + b * s + c * s * s)))
+    low, likely, high = sorted(estimates)
+    least = low if low > 0 else min(high, 0.0)
+    return TooFast(float(2.0**least), float(2.0**likely))
+
+
+def measure_accelerations(clip: Clip, steps: int, gravity: float = GRAVITY) -> Accelerations | None:
+    """Measure the accelerations in a clip. None if its steps are too few or too short.
+
+    steps: the number of steps in the clip. gravity: the acceleration g for the size of the figure, cm / s2.
+    """
+    at = {role: clip.positions[:, clip.skeleton.role(role)] for role in clip.skeleton.roles}
+    if steps < FEWEST_STEPS or len(clip) < FEWEST_STEPS * BRIEFEST:
+        return None
+    speed = np.linalg.norm(np.gradient(gaussian(at["hips"][:, [0, 2]], 2.0), axis=0), axis=-1)
+    moves = speed > MOVES * np.percentile(speed, 80)
+    step_frames = moves.sum() / steps
+    if step_frames < BRIEFEST:
+        return None
+    centre = gaussian(centre_of_mass(at), step_frames / 12)
+    acceleration = np.gradient(np.gradient(centre, axis=0), axis=0) * clip.fps**2 / gravity
+    # At the ends of the clip, smoothed accelerations are unreliable.
+    used, edge = moves.copy(), max(2, round(step_frames / 4))
+    used[:edge] = used[-edge:] = False
+    if not used.any():
+        return None
+    ahead = facing_directions(clip.skeleton, clip.positions, step_frames)
+    values = acceleration[used]
+    return Accelerations(
+        level=float(np.sqrt(np.mean(np.sum(values[:, [0, 2]] ** 2, axis=-1)))),
+        vertical=float(np.sqrt(np.mean(values[:, 1] ** 2))),
+        falling=-float(np.percentile(values[:, 1], 2)),
+        pendulum=_pendulum_slope(at, centre, acceleration, ahead, used, max(1, round(step_frames / 8))),
+        step=float(speed[moves].sum() / steps / leg_length(clip.skeleton)),
+        runs=_height_correlation(at, step_frames, used) > RUNS,
+    )
+
+
+def _pendulum_slope(
+    at: dict[str, Array],
+    centre: Array,
+    acceleration: Array,
+    ahead: Array,
+    used: NDArray[np.bool_],
+    reach: int,
+) -> float:
+    """The slope of forward acceleration against forward lean, while one foot stands alone.
+
+    at: role -> (F, 3) positions. centre: (F, 3) centre of mass. acceleration: (F, 3) of `centre`, in g.
+    ahead: (F, 3) facing directions. used: (F,) bool, the frames to use. reach: speeds are measured from
+    this many frames before a frame to this many after it.
+    """
+    balls = [_distance_moved(at[f"{side}_toe"], reach) for side in SIDES]
+    # The zeros do not change the slope. With them, it is 0 if no foot ever stands alone.
+    leans, accelerations = [np.zeros(1)], [np.zeros(1)]
+    for k, side in enumerate(SIDES):
+        alone = used & (balls[k] < ALONE * balls[1 - k])
+        if alone.any():
+            # The foot presses on the ground at .6 of the way from ankle to ball.
+            arm = centre - (0.4 * at[f"{side}_heel"] + 0.6 * at[f"{side}_toe"])
+            lean = np.sum(arm / np.maximum(arm[:, 1:2], 1.0) * ahead, axis=-1)[alone]
+            forward = np.sum(acceleration * ahead, axis=-1)[alone]
+            leans.append(lean - lean.mean())
+            accelerations.append(forward - forward.mean())
+    lean, forward = np.concatenate(leans), np.concatenate(accelerations)
+    return float(lean @ forward / max(float(lean @ lean), 1e-9))
+
+
+def _distance_moved(point: Array, reach: int) -> Array:
+    """(F,) distance that a point (F, 3) moves from `reach` frames before a frame to `reach` frames after it.
+
+    It is 0 in the first and last `reach` frames.
+    """
+    out = np.zeros(len(point))
+    if len(point) > 2 * reach:
+        out[reach:-reach] = np.linalg.norm(point[2 * reach :] - point[: -2 * reach], axis=-1)
+    return out
+
+
+def _height_correlation(at: dict[str, Array], step_frames: float, used: NDArray[np.bool_]) -> float:
+    """Correlation of the height of the hips with the distance between the ankles.
+
+    at: role -> (F, 3) positions. step_frames: number of frames in a step. used: (F,) bool, the frames to use.
+    """
+    height = gaussian(at["hips"][:, 1], step_frames / 16)
+    distance = np.linalg.norm((at["left_heel"] - at["right_heel"])[:, [0, 2]], axis=-1)
+    # Only changes within a step count, so slower changes are subtracted.
+    height, distance = (values - gaussian(values, step_frames / 2) for values in (height, distance))
+    height, distance = height[used], distance[used]
+    return float(height @ distance / np.sqrt((height @ height) * (distance @ distance) + 1e-9))
+
+
+# Compares the speed of the hips with that of the feet.
+#
+# Relative to the hips, a standing foot moves backward as fast as the hips move forward. The two speeds differ
+# if the file gives the root's positions in another unit than the bones.
+
+
+# Allowed range of the quotient: speed of the hips / speed of the lower foot relative to the hips. It is .88
+# to 1.17 in 172 reference clips: those of CMU, Holden et al. (2017) and Ferre et al., and of the data sets
+# `styles` and `patients` (config/datasets).
+LEAST_QUOTIENT, MOST_QUOTIENT = 0.5, 1.7
+# The speed of a standing foot relative to the hips is assumed to lie between these percentiles of the lower
+# foot's speed.
+PERCENTILES = (50.0, 75.0)
+IN_PLACE = 0.15  # if the quotient is smaller, the figure walks in place
+SLOW = 0.5  # leg lengths a second; slower movements of hips and feet are not compared
+# A foot stands if its speed is below STANDS times the speed of the hips. SPAN: seconds over which the two
+# speeds are averaged.
+STANDS, SPAN = 0.12, 2 / 15
+# Limits of the standing share. This is the share of frames in which some foot stands, among the frames in
+# which the hips move. Below SELDOM the clip gets a warning, below NEVER it is refused. The share is .29 or
+# more in the 172 reference clips, and .2 after 1 cm of noise is added. With rotation channels declared in a
+# wrong order it is .12 or less in 40 of 42 tries, but .25 in a walk straight along an axis.
+SELDOM, NEVER = 0.27, 0.12
+# Allowed range of the factor by which the hips' path must be scaled so that feet stand most often. The factor
+# is .85 to 1 in the reference clips. It is below 1 because feet roll.
+SHORTEST_FACTOR, LONGEST_FACTOR = 0.79, 1.12
+FACTORS = np.exp(np.linspace(np.log(0.4), np.log(2.5), 47))  # the factors that are tried
+FEWEST_FRAMES = 40  # frames in which the hips move; with fewer, the standing share is not computed
+
+
+def speed_quotient(clip: Clip) -> float | None:
+    """Speed of the hips divided by the speed of the lower foot relative to the hips.
+
+    The lower foot's speed varies over the clip, and any value between its PERCENTILES may be that of a
+    standing foot. The value that brings the quotient nearest to 1 is taken. None if the clip has fewer than
+    three frames, if hips and foot are slow, or if the figure is not upright.
+    """
+    role, positions = clip.skeleton.role, clip.positions
+    if len(positions) < 3:
+        return None
+    hips = positions[:, role("hips")]
+    balls = np.stack([positions[:, role(f"{side}_toe")] for side in ("left", "right")], axis=1)
+    from_hips = np.diff(balls - hips[:, None], axis=0)[..., [0, 2]]
+    lower = balls[:-1, :, 1].argmin(axis=1)
+    foot = from_hips[np.arange(len(from_hips)), lower]
+    hips_speed = float(np.median(np.linalg.norm(np.diff(hips, axis=0)[:, [0, 2]], axis=-1)))
+    slow, fast = np.percentile(np.linalg.norm(foot, axis=-1), PERCENTILES)
+    leg = leg_length(clip.skeleton)
+    height = float(np.median(hips[:, 1] - balls[..., 1].min(axis=1)))
+    if max(hips_speed, slow) * clip.fps < SLOW * leg or height < UPRIGHT * leg:
+        return None
+    return hips_speed / max(float(np.clip(hips_speed, slow, fast)), 1e-3 * hips_speed)
+
+
+def standing_share(clip: Clip) -> tuple[float, float] | None:
+    """The share of frames in which some foot stands, and the factor by which the hips' path is scaled for it.
+
+    The factor is the one of FACTORS that makes the share largest. Only frames in which the hips move count.
+    None if there are fewer than FEWEST_FRAMES such frames.
+    """
+    role, places = clip.skeleton.role, clip.positions[..., [0, 2]]
+    span = max(1, round(SPAN * clip.fps))  # frames
+    if len(places) <= span:
+        return None
+    hips = places[:, role("hips")]
+    balls = np.stack([places[:, role(f"{side}_toe")] for side in ("left", "right")]) - hips
+    # How far the hips move within a span, and how far each foot moves relative to the hips.
+    hips_moved, feet_moved = hips[span:] - hips[:-span], balls[:, span:] - balls[:, :-span]
+    distance = np.linalg.norm(hips_moved, axis=-1)
+    moves = distance * clip.fps / span > SLOW * leg_length(clip.skeleton)
+    if moves.sum() < FEWEST_FRAMES:
+        return None
+    hips_moved, feet_moved, distance = hips_moved[moves], feet_moved[:, moves], distance[moves]
+    shares = []
+    for factor in FACTORS:
+        slide = np.linalg.norm(factor * hips_moved + feet_moved, axis=-1).min(axis=0)
+        shares.append(float(np.mean(slide < STANDS * factor * distance)))
+    best = int(np.argmax(shares))
+    return shares[best], float(FACTORS[best])
+
+
+def check_pace(path: Path, clip: Clip, leave: bool) -> str | None:
+    """A warning if the figure walks in place or its feet seldom stand; else None.
+
+    path: of the BVH file, for messages. leave: check nothing and return None. Raises InputError if the speeds
+    of feet and hips contradict each other, or if no foot stands in more than a few frames.
+    """
+    if leave:
+        return None
+    quotient = speed_quotient(clip)
+    if quotient is None or LEAST_QUOTIENT <= quotient <= MOST_QUOTIENT:
+        return _check_standing_share(path, clip)
+    if quotient < IN_PLACE:
+        return "The legs walk, but the hips stay in place, so the feet slide. The file hardly moves the hips."
+    raise _units_error(path, quotient)
+
+
+def _check_standing_share(path: Path, clip: Clip) -> str | None:
+    """The part of `check_pace` that uses `standing_share`."""
+    standing = standing_share(clip)
+    if standing is None:
+        return None
+    share, factor = standing
+    if share < NEVER:
+        raise InputError(
+            path,
+            f"the feet slide: while the hips move, a foot stands in only {share:.0%} of the frames. The "
+            "motion is very noisy, or its rotation channels are declared in another order than they were "
+            "written",
+            fix="Export the clip again. If the feet really slide (a skater, a vehicle), set motion.defects: "
+            "leave.",
+        )
+    if share < SELDOM:
+        return (
+            f"A foot stands in {share:.0%} of the frames in which the hips go, which is less than in any "
+            "walk or run. The motion is noisy, or its rotation channels are declared in another order than "
+            "they were written."
+        )
+    if not SHORTEST_FACTOR <= factor <= LONGEST_FACTOR:
+        raise _units_error(path, 1 / factor)
+    return None
+
+
+def _units_error(path: Path, quotient: float) -> InputError:
+    """The error for a root and bones in different units. quotient: speed of the hips / speed of the feet."""
+    times = f"{quotient:.{2 if quotient < 10 else 0}f}"
+    return InputError(
+        path,
+        f"the hips go {times} times as fast as the feet step, so the root's positions seem to be in another "
+        "unit than the OFFSETs",
+        fix="Export the clip again with one unit. If the feet really slide (a skater, a vehicle), set "
+        "motion.defects: leave.",
+    )
