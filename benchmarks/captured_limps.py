@@ -16,9 +16,9 @@ from hobble.channels.injury.limp.captured_limps import CapturedWalk
 from hobble.channels.injury.limp.run import compare_held_out
 from hobble.channels.injury.status import read_status
 from hobble.core.errors import InputError
+from hobble.gait.__main__ import read_clip
 from hobble.gait.cycles import measure_cycles
 from hobble.gait.profile import NO_CYCLE
-from hobble.gait.read_clip import read_clip
 from hobble.models.load import load_network
 from hobble.models.network import Network
 from hobble.runtime.options import Runtime

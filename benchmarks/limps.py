@@ -15,20 +15,37 @@ from pathlib import Path
 
 import numpy as np
 import yaml
+from derive_gait import REFERENCE, healthy_windows
 
 from hobble.channels.injury.limp.run import limp_distance
 from hobble.channels.injury.status import parse_links
 from hobble.core.clip import Clip
 from hobble.core.errors import HobbleError
 from hobble.core.files import load_npz
-from hobble.gait.comparison import compare_clip, healthy_profile
-from hobble.gait.cycles import join_walks, measure_cycles
-from hobble.gait.derive_healthy import REFERENCE, healthy_windows
-from hobble.gait.limp_grade import HEALTHY_FILE, Grader, grade_walk, healthy_covariance, learn_grader
-from hobble.gait.people import GAITS, NORMAL, read_people
-from hobble.gait.profile import PROFILE_NAMES, Profile, mirror_profile, profile_of_walk
-from hobble.gait.read_clip import read_clip
-from hobble.gait.recogniser import SHRINKAGE, examples_of_people, learn, recognise
+from hobble.gait.__main__ import read_clip
+from hobble.gait.cycles import join_walks, measure_clip
+from hobble.gait.profile import (
+    GAITS,
+    NORMAL,
+    PROFILE_NAMES,
+    Profile,
+    healthy_profile,
+    mirror_profile,
+    profile_of_walk,
+    read_people,
+)
+from hobble.gait.recognise import (
+    HEALTHY_FILE,
+    SHRINKAGE_OF_PEOPLE,
+    Grader,
+    compare_clip,
+    examples_of_people,
+    grade_walk,
+    learn,
+    learn_grader,
+    recognise,
+    shares_of_answers,
+)
 from hobble.hurt.hurt_clip import hurt_clip
 from hobble.labels.clip_labels import Labels
 from hobble.labels.label import label_clip
@@ -45,7 +62,7 @@ HEALTHY_WALKS = ("105_29", "105_36")  # hurt to be compared with captured limps
 
 def left_out() -> Iterator[tuple[int, list[int]]]:
     """Each person, and all other people."""
-    everyone = range(read_people().count)
+    everyone = range(len(read_people()))
     return ((person, [other for other in everyone if other != person]) for person in everyone)
 
 
@@ -55,9 +72,9 @@ def half_way(a: Profile, b: Profile, share: float) -> dict[str, float]:
 
 def limps(person: int, strength: float) -> Iterator[tuple[str, str, Profile, Profile]]:
     """(gait, side, walk, healthy walk) of one person, each leg in turn."""
-    healthy = read_people().profile(NORMAL, person)
+    healthy = read_people()[person][NORMAL]
     for gait in GAITS[1:]:
-        walk = half_way(healthy, read_people().profile(gait, person), strength)
+        walk = half_way(healthy, read_people()[person][gait], strength)
         yield gait, "right", walk, healthy
         yield gait, "left", mirror_profile(walk), mirror_profile(healthy)
 
@@ -98,7 +115,7 @@ def healthy_walks(folder: Path) -> None:
         own = [pair for _, *pair in healthy_windows(folder, performer)]
         rest = np.arange(len(REFERENCE)) != i
         others = np.average(known["covariances"][rest], axis=0, weights=known["clips"][rest])
-        stranger = learn_grader(read_people(), range(read_people().count), others)
+        stranger = learn_grader(healthy=others)
         said = [
             np.mean([judge(*pair).is_impaired for pair in own])
             for judge in (recognise, grade_walk, stranger.grade)
@@ -107,8 +124,8 @@ def healthy_walks(folder: Path) -> None:
 
 
 def strangers() -> None:
-    everyone, normal = range(read_people().count), lambda person: read_people().profile(NORMAL, person)
-    pairs = [(normal(a), normal(b)) for a in everyone for b in everyone if a != b]
+    normal = [person[NORMAL] for person in read_people()]
+    pairs = [(a, b) for a in normal for b in normal if a is not b]
     for name, judge in (("linear", recognise), ("graded", grade_walk)):
         wrong = np.mean([judge(*pair).is_impaired for pair in pairs])
         print(f"\none person's normal walk beside another's: {name} calls {wrong:.2f} impaired")
@@ -129,9 +146,11 @@ def captured(folder: Path, clips: list[str]) -> None:
             continue
         a, g = compared.answer, compared.grade
         print(f"  {path.stem}")
-        print(f"    linear {a.label} {a.side or ''}; windows: {rounded(compared.answer_shares())}")
-        shares = rounded(compared.grade_shares())
-        print(f"    graded {g.label} {g.side or ''} {g.strength:.1f}; windows: {shares}")
+        by_linear, by_graded = (
+            rounded(shares_of_answers(each)) for each in (compared.window_answers, compared.window_grades)
+        )
+        print(f"    linear {a.name}; windows: {by_linear}")
+        print(f"    graded {g.name} {g.strength:.1f}; windows: {by_graded}")
 
 
 def made(folder: Path) -> None:
@@ -144,9 +163,7 @@ def made(folder: Path) -> None:
         return clip, label_clip(clip, [], source, "walk", "flat", LabelOptions())[0]
 
     def walks(clips: list[Clip]) -> Profile:
-        return profile_of_walk(
-            join_walks(measure_cycles(clip.skeleton, clip.positions, clip.fps) for clip in clips)
-        )
+        return profile_of_walk(join_walks(map(measure_clip, clips)))
 
     sources = [read(name) for name in HEALTHY_WALKS]
     healthy = walks([clip for clip, _ in sources])
@@ -173,12 +190,9 @@ def main() -> None:
     parser.add_argument("folder", type=Path, metavar="CMU_FOLDER", help="folder of the CMU clips, as .bvh")
     parser.add_argument("clips", nargs="*", metavar="CLIP.bvh", help="more captured impaired walks")
     options = parser.parse_args()
-    linear = {
-        p: learn(*examples_of_people(read_people(), rest), shrinkage=SHRINKAGE) for p, rest in left_out()
-    }
+    linear = {p: learn(*examples_of_people(rest), shrinkage=SHRINKAGE_OF_PEOPLE) for p, rest in left_out()}
     people_left_out("linear", {p: lambda w, h, j=j: recognise(w, h, j) for p, j in linear.items()})
-    healthy = healthy_covariance()
-    graders: dict[int, Grader] = {p: learn_grader(read_people(), rest, healthy) for p, rest in left_out()}
+    graders: dict[int, Grader] = {p: learn_grader(rest) for p, rest in left_out()}
     people_left_out("graded", {p: g.grade for p, g in graders.items()})
     strangers()
     healthy_walks(options.folder)

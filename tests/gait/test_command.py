@@ -9,11 +9,9 @@ import pytest
 
 from hobble.core.bvh import write_bvh
 from hobble.core.clip import Clip
-from hobble.core.files import load_npz, save_npz
-from hobble.gait import derive_healthy, derive_people
 from hobble.gait.__main__ import main
-from hobble.gait.comparison import compare_clip, healthy_profile
-from hobble.gait.limp_grade import HEALTHY_FILE
+from hobble.gait.profile import healthy_profile
+from hobble.gait.recognise import compare_clip, shares_of_answers
 from hobble.motion.edit import mirror_clip
 from hobble.synthetic.generate_clip import walk_from_plan
 from hobble.synthetic.recipes import WALK, Segment
@@ -49,7 +47,7 @@ def at_the_checkout(monkeypatch, root):
 def test_the_procedural_walker_is_healthy_at_any_speed(walker, speed):
     seen = compare_clip(walker(speed), healthy_profile([walker(125)]))
     assert seen.window_answers
-    assert seen.answer_shares() == {"normal": 1.0}
+    assert shares_of_answers(seen.window_answers) == {"normal": 1.0}
     assert seen.effects["right"]["speed"] == pytest.approx(speed / 125, abs=0.03)
 
 
@@ -79,12 +77,6 @@ def test_a_clip_without_a_step_is_named_and_refused(holden31, walker, file, caps
     said = capsys.readouterr().err
     assert "standing.bvh" in said
     assert "no whole cycle" in said
-
-
-def test_a_healthy_clip_without_a_step_is_named_too(holden31, walker, file, capsys):
-    rotations = np.zeros((90, len(holden31.joints), 4))
-    rotations[..., 0] = 1
-    still = Clip("standing", holden31, 60.0, rotations, np.tile([0, 93.0, 0], (90, 1)))
     assert main([file(walker(125)), "--healthy", file(still)]) == 1
     assert "standing.bvh" in capsys.readouterr().err
 
@@ -94,21 +86,3 @@ def test_a_window_that_is_not_a_number_of_seconds_is_refused(walker, file, windo
     with pytest.raises(SystemExit):
         main([file(walker(125)), "--window", window])
     assert "--window" in capsys.readouterr().err
-
-
-def test_a_file_of_walks_with_unknown_curves_is_refused(tmp_path, capsys):
-    path = tmp_path / "walks.npz"
-    save_npz(path, gaits=np.array(["normal"]), curves=np.array(["knee"]), scalars=np.array(["speed"]))
-    assert derive_people.main([str(path), str(tmp_path / "out.npz")]) == 1
-    assert "`gaits` should be normal, antalgic" in capsys.readouterr().err
-    assert not (tmp_path / "out.npz").exists()
-    assert derive_people.main([]) == derive_healthy.main([]) == 2
-
-
-@pytest.mark.shared
-def test_the_spread_of_healthy_walks_is_derived_from_the_database(shared):
-    made, clips = derive_healthy.covariance(derive_healthy.healthy_windows(shared / "mocap" / "cmu", "07"))
-    known = load_npz(HEALTHY_FILE)
-    at = list(known["performers"]).index("07")
-    assert clips == known["clips"][at] == 8
-    np.testing.assert_allclose(made, known["covariances"][at], rtol=1e-6, atol=1e-9)

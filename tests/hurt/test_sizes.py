@@ -7,8 +7,7 @@ import pytest
 from hurt_gait import effects, measures
 
 from hobble.core.skeleton import other_side
-from hobble.gait.cycles import measure_cycles
-from hobble.gait.signals import CURVES
+from hobble.gait.cycles import CURVES, measure_cycles
 from hobble.hurt.hurt_clip import hurt_clip
 
 LEG = {

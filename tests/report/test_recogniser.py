@@ -13,9 +13,8 @@ import pytest
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 from hobble.gait.cycles import measure_cycles
-from hobble.gait.limp_grade import grade_walk, grader_of_all_people
-from hobble.gait.people import read_people
-from hobble.gait.profile import profile_of_walk
+from hobble.gait.profile import healthy_profile, profile_of_walk, read_people
+from hobble.gait.recognise import grade_walk, grader_of_all_people
 from hobble.models.network import Network
 from hobble.report.character import (
     healthy_walk,
@@ -72,11 +71,9 @@ def test_cycles_and_their_measurements_equal_those_of_python(
 
 def test_javascript_recognises_the_same_limps_as_python(tab: Any) -> None:
     """People's impaired walks at several strengths, compared with their healthy walks."""
-    known = read_people()
-    healthy, cases = known.normal_profile(), []
-    for gait in range(len(known.profiles)):
-        for person in (0, 3, 7):
-            walk = dict(zip(healthy, map(float, known.profiles[gait, person]), strict=True))
+    healthy, cases = dict(healthy_profile([])), []
+    for person in (0, 3, 7):
+        for walk in read_people()[person].values():
             cases += [{k: (1 - s) * healthy[k] + s * walk[k] for k in healthy} for s in (0.2, 0.6, 1.0)]
     found = tab.run(f"""(() => {{
       const grade = Hobble.grader({json.dumps(packed_statistics())}), healthy = {json.dumps(healthy)};

@@ -1,5 +1,9 @@
 """Finds the cycles of a walk and measures them. A cycle lasts from one landing of a foot to its next landing.
 
+A walking body is described by 22 curves over time, the same curves as in the data of people's walks
+(profile.py). Joints are found by role, such as "left_knee", so any rig whose joints have roles works. Angles
+are relative to the vertical and the direction of travel.
+
 A foot counts as landing when its ankle is furthest ahead of the hips. This rule also finds the landings of a
 foot that drags or is set down beside the other foot. Foot contacts would miss these landings, and so would
 zero crossings of the distance between the ankles.
@@ -8,15 +12,36 @@ zero crossings of the distance between the ankles.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
 
+from hobble.core.clip import Clip
 from hobble.core.quat import Array
-from hobble.core.skeleton import Skeleton
-from hobble.gait.signals import CURVES, Signals, measure_signals, mirror_signals
+from hobble.core.skeleton import Skeleton, other_side
+from hobble.core.smooth import gaussian
 
+SIDES = {"L": "left", "R": "right"}
+# Curves of each side.
+LIMBS = (
+    "hip_flexion",
+    "hip_abduction",
+    "knee_flexion",
+    "foot_pitch",
+    "ankle_height",
+    "ankle_forward",
+    "arm_forward",
+    "elbow_flexion",
+)
+# Curves of the whole body whose sign changes if the body is mirrored.
+SIGN_CHANGES = ("trunk_left", "pelvis_left_up", "pelvis_turn_left", "shoulders_turn_left")
+CURVES = (
+    *(f"{limb}_{side}" for side in SIDES for limb in LIMBS),
+    "trunk_forward",
+    *SIGN_CHANGES,
+    "hips_height",
+)
 SAMPLES = 50  # number of samples of each curve in a cycle
 SCALARS = (
     "stride_seconds",
@@ -28,6 +53,7 @@ SCALARS = (
     "step_L",
     "step_width",  # sideways distance between the ankles at the landings, leg lengths
 )
+TRAVEL_SECONDS = 0.5  # sigma of the Gaussian that smooths the direction of travel and that of the facing
 STANDING_SPEED = 0.35  # an ankle that is slower than this share of the walking speed stands still
 SHORTEST_CYCLE, LONGEST_CYCLE = 0.4, 3.5  # seconds
 LEAST_TRAVEL = 0.2  # leg lengths: if the hips travel less than this in a cycle, the body stands
@@ -35,9 +61,7 @@ LEAST_TRAVEL = 0.2  # leg lengths: if the hips travel less than this in a cycle,
 # is smaller than one of these two limits is no step.
 LEAST_SWING = 0.12  # leg lengths
 LEAST_SWING_SHARE = 0.4  # share of the ankle's range
-# Degrees that the path may turn in a cycle. The people with whom a walk is compared (people.py) walked
-# straight.
-MOST_TURN = 25.0
+MOST_TURN = 25.0  # degrees that the path may turn in a cycle; the recorded people walked straight
 # Mean cosine of the angle between the facing and the direction of travel. A cycle with less is walked
 # backward or sideways.
 LEAST_AHEAD = 0.7
@@ -47,8 +71,8 @@ LEAST_AHEAD = 0.7
 class Cycle:
     """A cycle of the right leg, from a landing in frame `start` to the next landing in frame `end`.
 
-    scalars: name of SCALARS -> value. curves: (22, 50) the curves signals.CURVES at 50 evenly spaced times,
-    of which the first is `start`.
+    scalars: name of SCALARS -> value. curves: (22, 50) the curves CURVES at 50 evenly spaced times, of which
+    the first is `start`.
     """
 
     start: int
@@ -78,9 +102,10 @@ class WalkCycles:
         kept = ((c for c in side if start <= c.start and c.end <= end) for side in (self.right, self.left))
         return WalkCycles(self.fps, *map(tuple, kept))
 
-    def mirrored(self) -> WalkCycles:
-        """The same walk, mirrored."""
-        return WalkCycles(self.fps, self.left, self.right)
+
+def measure_clip(clip: Clip) -> WalkCycles:
+    """Measure the cycles of a clip. Its skeleton may be any rig whose joints have roles."""
+    return measure_cycles(clip.skeleton, clip.positions, clip.fps)
 
 
 def measure_cycles(skeleton: Skeleton, positions: Array, fps: float = 60.0) -> WalkCycles:
@@ -92,17 +117,18 @@ def measure_cycles(skeleton: Skeleton, positions: Array, fps: float = 60.0) -> W
     """
     if len(positions) < SHORTEST_CYCLE * fps:
         return WalkCycles(fps, (), ())
-    walk = measure_signals(skeleton, positions, fps)
-    return WalkCycles(fps, tuple(_cycles(walk)), tuple(_cycles(mirror_signals(walk))))
+    at = {role: positions[:, skeleton.role(role)].astype(float) for role in skeleton.roles}
+    mirrored = {other_side(role): points * [-1.0, 1.0, 1.0] for role, points in at.items()}
+    return WalkCycles(fps, *(tuple(_cycles(_measure_signals(each, fps), fps)) for each in (at, mirrored)))
 
 
 def join_walks(walks: Iterable[WalkCycles]) -> WalkCycles:
     """The cycles of several clips of one person as one walk, in which the frame numbers have no meaning."""
     walks = tuple(walks)
-    right, left = (
-        tuple(itertools.chain(*side)) for side in zip(*((w.right, w.left) for w in walks), strict=True)
+    chained = itertools.chain.from_iterable
+    return WalkCycles(
+        walks[0].fps, tuple(chained(w.right for w in walks)), tuple(chained(w.left for w in walks))
     )
-    return WalkCycles(walks[0].fps, right, left)
 
 
 def find_landings(forward: Array, fps: float) -> list[int]:
@@ -114,7 +140,8 @@ def find_landings(forward: Array, fps: float) -> list[int]:
     frame.
     """
     reach = int(LONGEST_CYCLE * fps / 2)
-    least_swing = np.maximum(LEAST_SWING, LEAST_SWING_SHARE * _ranges(forward, reach))
+    around = np.lib.stride_tricks.sliding_window_view(np.pad(forward, reach, mode="edge"), 2 * reach + 1)
+    least_swing = np.maximum(LEAST_SWING, LEAST_SWING_SHARE * np.ptp(around, axis=1))
     landed: list[int] = []
     high = low = 0  # frames of the highest and the lowest value since the movement last changed direction
     rising = True
@@ -131,32 +158,119 @@ def find_landings(forward: Array, fps: float) -> list[int]:
     return [i for i in landed if i > 0]  # in frame 0 the ankle may have gone back for some time already
 
 
-def _ranges(values: Array, reach: int) -> Array:
-    """(F,) largest minus smallest value within `reach` frames before and after each frame."""
-    padded = np.pad(values, reach, mode="edge")
-    return np.ptp(np.lib.stride_tricks.sliding_window_view(padded, 2 * reach + 1), axis=1)
+@dataclass(frozen=True)
+class _Signals:
+    """F frames of a moving body. All lengths are in leg lengths.
+
+    curves: name of CURVES -> (F,), degrees or leg lengths. heading: (F,) direction of travel, degrees from
+    +Z towards +X, unwrapped (without jumps at 360). ahead: (F,) cosine of the angle between facing and
+    direction of travel. hips: (F, 2) path over the ground. ankle_speed: "L" or "R" -> (F,) speed over the
+    ground, leg lengths a second. across: "L" or "R" -> (F,) how far the ankle is to the left of the hips.
+    """
+
+    curves: dict[str, Array]
+    heading: Array
+    ahead: Array
+    hips: Array
+    ankle_speed: dict[str, Array]
+    across: dict[str, Array]
 
 
-def _cycles(walk: Signals) -> Iterable[Cycle]:
+def _measure_signals(at: Mapping[str, Array], fps: float) -> _Signals:
+    """The signals of a body. at: role -> positions (F, 3), cm, Y up, with F of 2 or more.
+
+    hip_flexion is the forward angle of the thigh from the vertical, hip_abduction its outward angle.
+    knee_flexion and elbow_flexion are 0 if the joint is straight. foot_pitch is the angle of the line from
+    ankle to toe above the horizontal. The trunk is the line from the hips to the neck, or to the chest or
+    head on a rig without a neck.
+    """
+    hips = at["hips"]
+    velocity = gaussian(np.gradient(hips, axis=0), TRAVEL_SECONDS * fps) * [1.0, 0.0, 1.0]
+    ahead = _unit(velocity)
+    left = np.cross([0.0, 1.0, 0.0], ahead)
+    bones = [
+        at[f"{side}_{a}"] - at[f"{side}_{b}"]
+        for side in SIDES.values()
+        for a, b in (("hip", "knee"), ("knee", "heel"))
+    ]
+    leg = float(sum(np.median(np.linalg.norm(bone, axis=1)) for bone in bones) / 2)
+    trunk = at[next(role for role in ("neck", "chest", "head") if role in at)] - hips
+    pelvis, shoulders = (at[f"left_{part}"] - at[f"right_{part}"] for part in ("hip", "shoulder"))
+    limbs = {
+        side: _limb(at, name, ahead, left if side == "L" else -left, leg) for side, name in SIDES.items()
+    }
+    curves = {f"{limb}_{side}": curve for side in SIDES for limb, curve in limbs[side].items()} | {
+        "trunk_forward": _angle(_dot(trunk, ahead), trunk[:, 1]),
+        "trunk_left": _angle(_dot(trunk, left), trunk[:, 1]),
+        "pelvis_left_up": _angle(pelvis[:, 1], np.hypot(_dot(pelvis, left), _dot(pelvis, ahead))),
+        "pelvis_turn_left": _angle(-_dot(pelvis, ahead), _dot(pelvis, left)),
+        "shoulders_turn_left": _angle(-_dot(shoulders, ahead), _dot(shoulders, left)),
+        "hips_height": hips[:, 1] / leg,
+    }
+    # The body faces at a right angle to the lines through its hips and its shoulders.
+    to_left = _unit(pelvis) + _unit(shoulders)
+    facing = _unit(gaussian(np.cross(to_left, [0.0, 1.0, 0.0]), TRAVEL_SECONDS * fps))
+    ankles = {side: at[f"{name}_heel"] for side, name in SIDES.items()}
+    return _Signals(
+        curves,
+        np.degrees(np.unwrap(np.arctan2(ahead[:, 0], ahead[:, 2]))),
+        _dot(facing, ahead),
+        hips[:, ::2] / leg,
+        {
+            side: np.linalg.norm(np.gradient(ankle, axis=0)[:, ::2], axis=1) * fps / leg
+            for side, ankle in ankles.items()
+        },
+        {side: _dot(ankle - hips, left) / leg for side, ankle in ankles.items()},
+    )
+
+
+def _limb(at: Mapping[str, Array], side: str, ahead: Array, outward: Array, leg: float) -> dict[str, Array]:
+    """The curves LIMBS of one side.
+
+    at: role -> positions (F, 3). side: "left" or "right". ahead, outward: (F, 3) unit vectors of the
+    direction of travel and of the direction away from the other leg. leg: leg length, cm.
+
+    arm_forward is the forward angle of the line from shoulder to elbow, or to the wrist on a rig without
+    elbows. Where joints are missing, arm_forward and elbow_flexion are 0.
+    """
+    hip, knee, ankle, toe, shoulder = (at[f"{side}_{p}"] for p in ("hip", "knee", "heel", "toe", "shoulder"))
+    zero = np.zeros(len(hip))
+    elbow, wrist = (at.get(f"{side}_{part}") for part in ("elbow", "wrist"))
+    thigh, foot = knee - hip, toe - ankle
+    arm_end = elbow if elbow is not None else wrist
+    arm = None if arm_end is None else arm_end - shoulder
+    return {
+        "hip_flexion": _angle(_dot(thigh, ahead), -thigh[:, 1]),
+        "hip_abduction": _angle(_dot(thigh, outward), -thigh[:, 1]),
+        "knee_flexion": _bend(hip, knee, ankle),
+        "foot_pitch": _angle(foot[:, 1], np.linalg.norm(foot[:, ::2], axis=1)),
+        "ankle_height": ankle[:, 1] / leg,
+        "ankle_forward": _dot(ankle - at["hips"], ahead) / leg,
+        "arm_forward": zero if arm is None else _angle(_dot(arm, ahead), -arm[:, 1]),
+        "elbow_flexion": zero if elbow is None or wrist is None else _bend(shoulder, elbow, wrist),
+    }
+
+
+def _cycles(walk: _Signals, fps: float) -> Iterator[Cycle]:
     """The cycles of the right leg that pass all limits above."""
-    right, left = (find_landings(walk.curves[f"ankle_forward_{side}"], walk.fps) for side in "RL")
+    right, left = (find_landings(walk.curves[f"ankle_forward_{side}"], fps) for side in "RL")
     for start, end in itertools.pairwise(right):
         left_landings = [i for i in left if start < i < end]
-        plausible_length = SHORTEST_CYCLE * walk.fps <= end - start <= LONGEST_CYCLE * walk.fps
+        plausible_length = SHORTEST_CYCLE * fps <= end - start <= LONGEST_CYCLE * fps
         if len(left_landings) == 1 and plausible_length:
             travel = np.linalg.norm(np.diff(walk.hips[start : end + 1], axis=0), axis=1).sum()
             straight = abs(walk.heading[end] - walk.heading[start]) <= MOST_TURN
             if travel >= LEAST_TRAVEL and straight and walk.ahead[start:end].mean() >= LEAST_AHEAD:
-                yield _cycle(walk, start, left_landings[0], end)
+                yield _cycle(walk, start, left_landings[0], end, fps)
 
 
-def _cycle(walk: Signals, start: int, left_landing: int, end: int) -> Cycle:
+def _cycle(walk: _Signals, start: int, left_landing: int, end: int, fps: float) -> Cycle:
     """The cycle from frame `start` to frame `end`. left_landing: the frame in which the left foot lands."""
-    seconds = (end - start) / walk.fps
+    seconds = (end - start) / fps
     speed = float(np.linalg.norm(walk.hips[end] - walk.hips[start])) / seconds
     right_ahead = walk.curves["ankle_forward_R"] - walk.curves["ankle_forward_L"]
     standing = {
-        side: _share_below(walk.ankle_speed[side][start : end + 1], STANDING_SPEED * speed) for side in "LR"
+        side: _share_below(walk.ankle_speed[side][start : end + 1], STANDING_SPEED * speed) for side in SIDES
     }
     width = [walk.across["L"][i] - walk.across["R"][i] for i in (start, left_landing)]
     values = (  # in the order of SCALARS
@@ -185,3 +299,22 @@ def _share_below(values: Array, limit: float) -> float:
     # For each interval between two frames, the share of it in which the line between the values is below.
     under, whole = below[:-1] + below[1:], distance[:-1] + distance[1:]
     return float(np.mean(np.divide(under, whole, out=np.zeros(len(under)), where=whole > 0)))
+
+
+def _unit(vectors: Array) -> Array:
+    return vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), 1e-9)
+
+
+def _dot(a: Array, b: Array) -> Array:
+    return np.sum(a * b, axis=-1)
+
+
+def _angle(opposite: Array, adjacent: Array) -> Array:
+    """Degrees of an angle in a right triangle, from the sides opposite and adjacent to it."""
+    return np.degrees(np.arctan2(opposite, adjacent))
+
+
+def _bend(a: Array, b: Array, c: Array) -> Array:
+    """Degrees by which the joint at b bends the line from a to c, all (F, 3). 0 is straight."""
+    u, v = b - a, c - b
+    return _angle(np.linalg.norm(np.cross(u, v), axis=-1), _dot(u, v))

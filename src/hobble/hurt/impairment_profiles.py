@@ -20,7 +20,7 @@ from hobble.core.quat import Array
 
 PROFILES_FILE = Path(__file__).with_name("people.json")
 # Angles over a gait cycle, in degrees. A profile says how each of them changes. The names are those of
-# `hobble.gait.signals`.
+# `hobble.gait.cycles`.
 CURVES = ("trunk_forward", "trunk_left", "pelvis_left_up", "pelvis_turn_left", "shoulders_turn_left")
 HARMONICS = 2  # a profile has the mean and this many harmonics of each curve
 NORMAL = "normal"  # name of the walk without an impairment

@@ -16,7 +16,7 @@ import numpy as np
 from hobble.channels import channel
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
-from hobble.gait.discriminant import Discriminant, learn
+from hobble.gait.recognise import Discriminant, learn
 from hobble.measures.measure import MeasureInputs, Outcome, Row, SampleOptions
 from hobble.measures.sample import captured_motion, sample_to_measure, with_sample
 from hobble.measures.walks import FPS, CrowdTarget, channel_values, gait_features, generate_walks

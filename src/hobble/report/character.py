@@ -18,11 +18,8 @@ from hobble.core.several_effects import SUM_NORM
 from hobble.core.skeleton import Skeleton
 from hobble.figure.mesh import body_mesh, mesh_key
 from hobble.gait.cycles import measure_cycles
-from hobble.gait.features import features
-from hobble.gait.limp_grade import LEANING, PARTS, STRENGTHS, Grader, grader_of_all_people
-from hobble.gait.people import read_people
-from hobble.gait.profile import Profile, profile_of_walk
-from hobble.gait.recogniser import SIDES
+from hobble.gait.profile import Profile, features, healthy_profile, profile_of_walk
+from hobble.gait.recognise import LEANING, PARTS, SIDES, STRENGTHS, Grader, grader_of_all_people
 from hobble.models.network import Network, inverse_or_0
 from hobble.models.packing import to_base64
 from hobble.rows.layout import RowLayout
@@ -425,9 +422,9 @@ def healthy_walk(network: Network, skeleton: Skeleton, runtime: Runtime) -> Prof
 
 
 def packed_statistics(statistics: Grader | None = None) -> dict[str, Any]:
-    """Packs what `hobble.gait.limp_grade` learnt from people's walks. A walk has D features.
+    """Packs what the graded recogniser of `hobble.gait.recognise` learnt from people's walks.
 
-    statistics: by default those learnt from all people.
+    A walk has D features. statistics: by default those learnt from all people.
 
     In the result, `features`: names of the features. `strengths`: the strengths of a limp that are tried; 1
     is the mean strength of people's limps. `healthySpread`: (D, D) covariance of healthy walks. `kinds`: a
@@ -437,7 +434,7 @@ def packed_statistics(statistics: Grader | None = None) -> dict[str, Any]:
     in base64.
     """
     statistics = statistics or grader_of_all_people()
-    normal = read_people().normal_profile()
+    normal = healthy_profile([])
     return {
         "features": list(features(normal, normal)),  # any two profiles do: only the names are used
         "strengths": STRENGTHS.tolist(),

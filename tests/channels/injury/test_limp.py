@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -21,10 +20,8 @@ from hobble.channels.injury.limp.captured_limps import (
 )
 from hobble.channels.injury.limp.crowd_walks import FigureWalk
 from hobble.channels.injury.limp.run import SEVERITIES, hurt_side, limp_distance, measure_limps
-from hobble.gait.cycles import SCALARS, Cycle, WalkCycles
-from hobble.gait.people import NORMAL, read_people
-from hobble.gait.profile import profile_of_walk
-from hobble.gait.signals import CURVES, SIGN_CHANGES
+from hobble.gait.cycles import CURVES, SCALARS, SIGN_CHANGES, Cycle, WalkCycles
+from hobble.gait.profile import NORMAL, profile_of_walk, read_people
 from hobble.runtime.options import Runtime
 
 LEFT_KNEE, RIGHT_KNEE = "LeftUpLeg-LeftLeg", "RightUpLeg-RightLeg"
@@ -49,16 +46,20 @@ def walking(limp: dict[str, float], speed: float) -> FigureWalk:
     """A figure that walks like people and limps on one side, by a share of the limp of people with pain in
     the right leg.
     """
-    known, strength = read_people(), max(limp.values(), default=0.0)
+    strength = max(limp.values(), default=0.0)
 
-    def mixed(of: Callable[[str], Any]) -> Any:
-        return (1 - strength) * of(NORMAL) + strength * of("antalgic")
+    def mixed(name: str) -> float:
+        usual, full = (
+            np.mean([person[gait][name] for person in read_people()]) for gait in (NORMAL, "antalgic")
+        )
+        return float((1 - strength) * usual + strength * full)
 
-    curves = np.array([mixed(lambda gait, n=n: known.curve(gait, n)[0]) for n in CURVES])
-    scalars = {n: float(mixed(lambda gait, n=n: known.scalar(gait, n)[0])) for n in SCALARS}
+    ramp = np.linspace(-0.5, 0.5, 50)  # of range 1 and mean 0
+    curves = np.array([mixed(f"mean {n}") + mixed(f"range {n}") * ramp for n in CURVES])
+    scalars = {n: mixed(n) for n in SCALARS}
     cycles = [Cycle(start, start + 70, scalars, curves) for start in range(0, FRAMES - 70, 70)]
     walk = WalkCycles(60.0, tuple(cycles), tuple(map(mirrored, cycles)))
-    walk = walk.mirrored() if "left" in limp else walk
+    walk = WalkCycles(60.0, walk.left, walk.right) if "left" in limp else walk
     return FigureWalk(walk, profile_of_walk(walk), speed, FRAMES)
 
 

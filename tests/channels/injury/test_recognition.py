@@ -19,7 +19,7 @@ from hobble.channels.injury.recognition.run import (
 )
 from hobble.core import quat
 from hobble.core.skeleton import Skeleton, forward_kinematics
-from hobble.gait.discriminant import learn
+from hobble.gait.recognise import learn
 from hobble.measures.walks import gait_features
 from hobble.rows.captured import Captured
 from hobble.runtime.options import Runtime

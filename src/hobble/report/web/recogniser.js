@@ -1,5 +1,5 @@
 // Recognises a limp: what hurts, on which side, and with what probability. It compares a walk with the healthy walk of the same figure.
-// It computes the same as `hobble.gait.features` and `hobble.gait.limp_grade` in Python. The page contains statistics of people's limps.
+// It computes the same as `hobble.gait.profile` and `hobble.gait.recognise` in Python. The page contains statistics of people's limps.
 import { measureWalk, profile } from "./cycles.js";
 import { bytes } from "./numbers.js";
 

@@ -1,4 +1,4 @@
-// Computes curves of a walking body over time, for the recogniser. `hobble.gait.signals` in Python does the same. Units are degrees and leg
+// Computes curves of a walking body over time, for the recogniser. `hobble.gait.cycles` in Python does the same. Units are degrees and leg
 // lengths. Angles are relative to the vertical and to the direction of travel.
 import { cross, dot, minus } from "./numbers.js";
 

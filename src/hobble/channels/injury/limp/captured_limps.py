@@ -16,8 +16,7 @@ from hobble.channels.injury.crowd_severities import INJURY
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 from hobble.gait.cycles import WalkCycles, join_walks, measure_cycles
-from hobble.gait.people import read_people
-from hobble.gait.profile import Profile, profile_of_walk
+from hobble.gait.profile import Profile, healthy_profile, profile_of_walk
 from hobble.measures.sample import ClipPart
 from hobble.measures.walks import FPS
 from hobble.rows.captured import captured_stretches, rotate_by_yaw
@@ -106,14 +105,14 @@ def healthy_reference(captured_walk: CapturedWalk, walks: Sequence[CapturedWalk]
 
     "performer": it is measured over the performer's healthy clips. "data set": if the performer has no
     healthy clip, it is measured over all healthy clips. "people": if there is no healthy clip at all, it is
-    the mean normal walk in `hobble.gait.people`. walks: all captured walks.
+    the mean normal walk of people in `hobble.gait.profile`. walks: all captured walks.
     """
     healthy = [other for other in walks if not other.severity_by_link and len(other.walk)]
     of_performer = [other for other in healthy if other.performer == captured_walk.performer]
     for chosen, whose in ((of_performer, "performer"), (healthy, "data set")):
         if chosen:
             return profile_of_walk(join_walks(other.walk for other in chosen)), whose
-    return read_people().normal_profile(), "people"
+    return healthy_profile([]), "people"
 
 
 def _walk_of_clip(

@@ -27,12 +27,16 @@ from hobble.channels.injury.limp.crowd_walks import FigureWalk, walk_figures
 from hobble.channels.injury.limp.with_other_channel import limps_together, named_together
 from hobble.core.errors import HobbleError
 from hobble.core.skeleton import Skeleton
-from hobble.gait.comparison import compare_walk
-from hobble.gait.effect_sizes import EFFECTS, effects_of_people, measure_effects
-from hobble.gait.features import features
-from hobble.gait.people import read_people
-from hobble.gait.profile import Profile, profile_of_walk
-from hobble.gait.recogniser import RIGHT, SIDES, examples_of_people
+from hobble.gait.profile import (
+    EFFECTS,
+    RIGHT,
+    Profile,
+    effects_of_people,
+    features,
+    measure_effects,
+    profile_of_walk,
+)
+from hobble.gait.recognise import SIDES, compare_walk, examples_of_people
 from hobble.hurt.body_parts import part_of_link
 from hobble.measures.measure import MeasureInputs, Outcome
 from hobble.measures.sample import clip_parts, sample_to_measure, with_sample
@@ -69,7 +73,7 @@ def measure_limps(
     the links to hurt, by default all.
 
     Keys of the result. `sizes`: a row for each gait, link and severity, with the effects of
-    `hobble.gait.effect_sizes` and the limp that is recognised; the link's side counts as the hurt side.
+    `hobble.gait.profile` and the limp that is recognised; the link's side counts as the hurt side.
     `trends`: Spearman's rho of each effect with severity, and the size of the effect at severity 10. `named`:
     at each severity, how well the limps of hurt legs are recognised. `people`: for each impairment that
     people imitated, mean and standard deviation of each effect. `captured`: effects in captured clips.
@@ -97,7 +101,7 @@ def measure_limps(
         "named": _recognition_by_severity(rows),
         "people": {
             gait: {name: [round(v, 5) for v in mean_and_sd] for name, mean_and_sd in of_gait.items()}
-            for gait, of_gait in effects_of_people(read_people()).items()
+            for gait, of_gait in effects_of_people().items()
         },
         "captured": [
             _row_of_clip(network.skeleton, clip, captured) for clip in captured if clip.severity_by_link
@@ -190,11 +194,11 @@ def _row_of_walk(
         }
     row |= _rounded_values(measure_effects(figure.profile, healthy.profile, side))
     found = compare_walk(figure.walk, figure.frames, healthy.profile, WINDOW_SECONDS)
-    answers = [answer for _, answer in found.window_answers]  # of the linear recogniser, for each window
-    grades = [grade for _, grade in found.window_grades]  # of the graded recogniser, for each window
+    answers = found.window_answers
+    grades = found.window_grades
     wrong_side = SIDES[1 - SIDES.index(side)]
-    row["called"] = " ".join(filter(None, (found.answer.label, found.answer.side)))
-    row["graded"] = " ".join(filter(None, (found.grade.label, found.grade.side)))
+    row["called"] = found.answer.name
+    row["graded"] = found.grade.name
     row["impaired"] = _share([a.is_impaired for a in answers])
     by_linear, by_graded = (
         [r.is_impaired and r.side != wrong_side for r in each] for each in (answers, grades)
@@ -262,8 +266,7 @@ def limp_distance(walk: Profile, healthy: Profile, other: Profile, other_healthy
     is the root mean square of the differences of all features of the limps. Each difference is divided by the
     standard deviation of its feature over people's walks.
     """
-    features_of_people = examples_of_people(read_people(), range(read_people().count))[0]
-    spread = features_of_people.std(axis=0)
+    spread = examples_of_people()[0].std(axis=0)
     a, b = (np.array(list(features(*pair).values())) for pair in ((walk, healthy), (other, other_healthy)))
     return float(np.sqrt(np.mean(((a - b) / spread) ** 2)))
 

@@ -20,7 +20,7 @@ from hobble.channels.injury.limp.captured_limps import HURT_VERSION
 from hobble.channels.injury.recognition.results import RecognisedWindows, Recognition
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
-from hobble.gait.discriminant import Discriminant, learn
+from hobble.gait.recognise import Discriminant, learn
 from hobble.hurt.body_parts import part_of_link
 from hobble.measures.measure import MeasureInputs, Outcome, Row, SampleOptions
 from hobble.measures.sample import captured_motion, sample_to_measure, with_sample
