@@ -8,13 +8,12 @@ from pathlib import Path
 
 from hobble.core.errors import HobbleError
 from hobble.core.files import write_text
-from hobble.motion.doubt import Doubt
-from hobble.motion.draft import draft_skeleton_file, guess_roles
-from hobble.motion.find_body import find_body
+from hobble.motion.limbs import Doubt, find_body
 from hobble.motion.look import format_table, picture_of_file, summarise_clips
 from hobble.motion.make import raw_clip, rig_in_file
 from hobble.motion.options import ClipMotion
 from hobble.motion.read import read_bvh
+from hobble.motion.skeleton_file import draft_skeleton_file, guess_roles
 
 SKELETONS = Path("config/skeletons")  # the folder of the skeleton files
 
@@ -24,7 +23,7 @@ def skeleton_draft(file: Path) -> str:
     bvh = read_bvh(file)
     skeleton = rig_in_file(bvh)
     try:
-        body = find_body(skeleton.joints, skeleton.parents, raw_clip(bvh).positions).body
+        body, _ = find_body(skeleton.joints, skeleton.parents, raw_clip(bvh).positions)
         roles = body.roles(skeleton.joints)
     except Doubt as doubt:
         print(f"{file}: {doubt}. The roles are guessed from the names of the joints.", file=sys.stderr)

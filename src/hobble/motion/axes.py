@@ -1,10 +1,12 @@
-"""Finds which way is up, the handedness of the coordinates and where the rest pose faces, and corrects them.
+"""Directions and rotations of bodies, and the axes of a file: which way is up, handedness, facing.
 
-Hobble's clips are right-handed with Y up. Their rest poses face +Z, with the left at +X.
+Hobble's clips are right-handed with Y up. Their rest poses face +Z, with the left at +X. Rotations are
+quaternions (4,).
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,18 +16,115 @@ from hobble.core.clip import Clip
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton, rest_positions
 
+LEFT, UP, AHEAD = np.eye(3)  # of a figure that faces +Z
 # Factors that mirror at the plane x = 0: FLIP for a position (3,), MIRROR for a quaternion (4,).
 FLIP = np.array([-1.0, 1.0, 1.0])
 MIRROR = np.array([1.0, 1.0, -1.0, -1.0])
 # cm: a figure crawls or climbs along an axis only if its lowest joint moves by more than this along the axis.
 # The movement is measured between the quartiles of the joint's places.
 CLIMB = 20.0
-# Cosine of 20 degrees. If all axes of the body in the rest pose are within this angle of coordinate axes, the
-# rest pose counts as exactly along the coordinate axes.
-UPRIGHT = np.cos(np.radians(20.0))
 DIRECTIONS = {  # name of an axis, such as "-X" -> (3,) unit vector
     sign + axis: np.eye(3)["XYZ".index(axis)] * (1 if sign == "+" else -1) for sign in "+-" for axis in "XYZ"
 }
+
+
+def unit_vectors(vectors: Array) -> Array:
+    """The vectors (..., 3), scaled to length 1. A zero vector stays zero."""
+    return vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-9)
+
+
+def degrees_between(a: Array, b: Array) -> float:
+    """Angle in degrees between two vectors (3,) of any length."""
+    return float(np.degrees(np.arccos(np.clip(unit_vectors(a) @ unit_vectors(b), -1.0, 1.0))))
+
+
+def rotation_aligning(first: Array, from_first: Array, second: Array, from_second: Array) -> Array:
+    """The rotation (4,) that turns one direction exactly, and a second one as nearly as possible.
+
+    It turns `from_first` to `first`. Among the rotations that do this, it is the one that turns `from_second`
+    nearest to `second`. All are vectors (3,) of any length.
+    """
+    return quat.from_matrix(_right_angles(first, second) @ _right_angles(from_first, from_second).T)
+
+
+def _right_angles(first: Array, second: Array) -> Array:
+    """(3, 3) matrix whose columns are unit vectors at right angles: x along `first`, y towards `second`."""
+    x = unit_vectors(first)
+    y = unit_vectors(second - x * (second @ x))
+    if np.linalg.norm(y) < 0.5:  # zero, because the two are parallel: take any y at right angles to x
+        k = int(np.argmin(np.abs(x)))
+        y = unit_vectors(np.eye(3)[k] - x * x[k])
+    return np.stack([x, y, np.cross(x, y)], axis=1)
+
+
+def snapped_to_axes(rotation: Array) -> Array:
+    """The rotation (4,), made exact if it turns each of the X, Y and Z axes to within 20 degrees of an axis.
+
+    The exact rotation turns each axis to the axis that it was near, positive or negative. Any other rotation
+    is returned unchanged.
+    """
+    axes = quat.to_matrix(rotation)
+    snapped = np.round(axes)
+    near = np.sum(axes * snapped, axis=0).min() > np.cos(np.radians(20.0))
+    return quat.from_matrix(snapped) if near and np.all(np.abs(snapped).sum(axis=0) == 1) else rotation
+
+
+def rotation_pointing_along(rotation: Array, axis: Array, bone: Array) -> Array:
+    """The rotation (4,), changed as little as possible so that it turns `axis` to the direction of `bone`.
+
+    axis, bone: vectors (3,).
+    """
+    return quat.mul(quat.between(quat.rotate(rotation, axis), bone), rotation)
+
+
+def robust_mean(vectors: Array) -> Array:
+    """Mean (3,) of vectors (S, 3), without those that lie unusually far from their median."""
+    distances = np.linalg.norm(vectors - np.median(vectors, axis=0), axis=-1)
+    return vectors[distances <= 3 * np.median(distances) + 1e-9].mean(axis=0)
+
+
+def mean_rotation(rotations: Array) -> Array:
+    """Mean (4,) of rotations (S, 4), without outliers.
+
+    It is computed twice. The second time, rotations that lie unusually far from the first mean are left out.
+    """
+    for _ in range(2):
+        # The mean of quaternions is the eigenvector with the largest eigenvalue (Markley et al. 2007).
+        _, vectors = np.linalg.eigh(rotations.T @ rotations)
+        mean = vectors[:, -1]
+        angles = quat.angle(rotations, mean)
+        rotations = rotations[angles <= 2.5 * np.median(angles) + 1e-9]
+    return mean
+
+
+def bend_direction(hip: Array, knee: Array, heel: Array) -> Array:
+    """(..., 3) how far the middle joint of a limb lies out from the line between the ends (positions)."""
+    line = unit_vectors(heel - hip)
+    return knee - hip - line * np.sum((knee - hip) * line, axis=-1, keepdims=True)
+
+
+def body_axes(skeleton: Skeleton, positions: Array) -> tuple[Array, Array, Array]:
+    """Unit vectors (..., 3): from right to left, from hips to head, and forward.
+
+    Forward is the direction of the feet or, on a rig without toes, the direction in which the knees point.
+    positions: (..., J, 3) of the joints.
+    """
+    at = {role: positions[..., skeleton.role(role), :] for role in skeleton.roles}
+    left = at["left_hip"] - at["right_hip"] + at["left_shoulder"] - at["right_shoulder"]
+    ahead = sum(
+        at[f"{side}_toe"] - at[f"{side}_heel"]
+        if f"{side}_toe" in at
+        else bend_direction(*(at[f"{side}_{part}"] for part in ("hip", "knee", "heel")))
+        for side in ("left", "right")
+    )
+    return unit_vectors(left), unit_vectors(at["head"] - at["hips"]), unit_vectors(np.asarray(ahead))
+
+
+def rest_frame(skeleton: Skeleton) -> Array:
+    """(4,) rotation that turns X to the body's left in the rest pose, Y to its up, and Z to its front."""
+    left, up, _ = body_axes(skeleton, rest_positions(skeleton))
+    up = unit_vectors(up - left * (up @ left))
+    return snapped_to_axes(quat.from_matrix(np.stack([left, up, np.cross(left, up)], axis=1)))
 
 
 @dataclass(frozen=True)
@@ -40,54 +139,6 @@ class RigAxes:
     up: str
     handedness: str
     facing: str
-
-
-def nearest_axis(direction: Array) -> tuple[str, float]:
-    """The axis nearest to a direction (3,), such as "+Y", and the cosine of the angle to it."""
-    unit = direction / max(float(np.linalg.norm(direction)), 1e-9)
-    k = int(np.argmax(np.abs(unit)))
-    return ("+" if unit[k] > 0 else "-") + "XYZ"[k], float(abs(unit[k]))
-
-
-def body_axes(skeleton: Skeleton, positions: Array) -> tuple[Array, Array, Array]:
-    """Unit vectors (..., 3): from right to left, from hips to head, and forward.
-
-    Forward is the direction of the feet or, on a rig without toes, the direction in which the knees point.
-    positions: (..., J, 3) of the joints.
-    """
-    at = {role: positions[..., skeleton.role(role), :] for role in skeleton.roles}
-    left = at["left_hip"] - at["right_hip"] + at["left_shoulder"] - at["right_shoulder"]
-    up = at["head"] - at["hips"]
-    ahead = _foot_direction(at, "left") + _foot_direction(at, "right")
-    return _unit(left), _unit(up), _unit(ahead)
-
-
-def _foot_direction(at: dict[str, Array], side: str) -> Array:
-    """(..., 3) vector from ankle to ball or, on a rig without toes, from the line hip to ankle to the knee.
-
-    at: role -> (..., 3) positions.
-    """
-    if f"{side}_toe" in at:
-        return at[f"{side}_toe"] - at[f"{side}_heel"]
-    hip, knee, heel = (at[f"{side}_{part}"] for part in ("hip", "knee", "heel"))
-    line = _unit(heel - hip)
-    return knee - hip - line * np.sum((knee - hip) * line, axis=-1, keepdims=True)
-
-
-def _unit(v: Array) -> Array:
-    """Vectors (..., 3) of length 1."""
-    return v / np.maximum(np.linalg.norm(v, axis=-1, keepdims=True), 1e-9)
-
-
-def rest_frame(skeleton: Skeleton) -> Array:
-    """(4,) rotation that turns X to the body's left in the rest pose, Y to its up, and Z to its front."""
-    left, up, _ = body_axes(skeleton, rest_positions(skeleton))
-    up = _unit(up - left * (up @ left))
-    axes = np.stack([left, up, np.cross(left, up)], axis=1)
-    snapped = np.round(axes)
-    if np.all(np.abs(snapped).sum(axis=0) == 1) and np.sum(axes * snapped, axis=0).min() > UPRIGHT:
-        axes = snapped
-    return quat.from_matrix(axes)
 
 
 @dataclass(frozen=True)
@@ -119,33 +170,42 @@ def straighten(clip: Clip, up: str, handedness: str, standing: bool = True) -> U
     """
     up_axis, notes, unsure = _up_axis(clip, standing) if up == "auto" else (f"+{up}", [], [])
     if handedness == "auto":
-        handedness = _handedness_of(clip)
+        left, upward, feet = body_axes(clip.skeleton, clip.positions)
+        # In right-handed coordinates, the cross product of left and up points forward, like the feet.
+        cosine = np.mean(np.sum(np.cross(left, upward) * feet, axis=-1))
+        handedness = "left" if cosine < -0.2 else "right"
     if handedness == "left":
-        clip = _with_x_negated(clip)
+        clip = _changed(clip, lambda v: v * FLIP, clip.rotations * MIRROR, clip.root * FLIP)
         up_axis = {"+X": "-X", "-X": "+X"}.get(up_axis, up_axis)
-    world = quat.between(DIRECTIONS[up_axis], DIRECTIONS["+Y"])
     rest = rest_frame(clip.skeleton)
-    facing, cosine = nearest_axis(quat.rotate(rest, np.array([0.0, 0.0, 1.0])))
+    facing, cosine = _nearest_axis(quat.rotate(rest, AHEAD))
     along_axis = cosine > 1 - 1e-9
-    turn = quat.inv(rest) if along_axis else quat.IDENTITY
     axes = RigAxes(up_axis, handedness, facing if along_axis else "oblique")
-    return UprightClip(_with_world_and_rest_turned(clip, world, turn), axes, notes, unsure)
+    world = quat.between(DIRECTIONS[up_axis], UP)
+    return UprightClip(
+        _turned(clip, world, quat.inv(rest) if along_axis else quat.IDENTITY), axes, notes, unsure
+    )
+
+
+def _nearest_axis(direction: Array) -> tuple[str, float]:
+    """The axis nearest to a direction (3,), such as "+Y", and the cosine of the angle to it."""
+    unit = unit_vectors(direction)
+    k = int(np.argmax(np.abs(unit)))
+    return ("+" if unit[k] > 0 else "-") + "XYZ"[k], float(abs(unit[k]))
 
 
 def _up_axis(clip: Clip, standing: bool) -> tuple[str, list[str], list[str]]:
     """The axis that points up, and the lists `notes` and `unsure` of `UprightClip`."""
-    # The axes nearest to the line from feet to head, in the motion and in the rest pose.
     in_motion, in_rest = (
-        nearest_axis(_along_body(clip.skeleton, positions).mean(axis=0))[0]
+        _nearest_axis(_along_body(clip.skeleton, positions).mean(axis=0))[0]
         for positions in (clip.positions, rest_positions(clip.skeleton)[None])
     )
     crawls = _crawls(clip, in_motion)
     if not standing and crawls:
-        why = (
+        raise ValueError(
             f"the body moves along the line from its feet to its head ({in_motion}) as if it crawled, and "
             "nobody could stand in its zero pose"
         )
-        raise ValueError(why)
     if in_motion == in_rest or not standing:
         return in_motion, [], []
     up, why = (in_rest, "the body crawls") if crawls else (in_motion, "the motion is more reliable")
@@ -157,15 +217,14 @@ def _up_axis(clip: Clip, standing: bool) -> tuple[str, list[str], list[str]]:
 
 
 def _along_body(skeleton: Skeleton, positions: Array) -> Array:
-    """(F, 3) sum of the unit vectors from the feet to the hips and from the hips to the head.
+    """(F, 3) sum of the unit vectors from the feet (toes, or else heels) to the hips and on to the head.
 
     positions: (F, J, 3).
     """
-    # The toe of each side, or its heel if the rig has no toe.
-    roles = [f"{side}_{part}" for side in ("left", "right") for part in ("toe", "heel")]
-    feet = [next(role for role in roles[i : i + 2] if role in skeleton.roles) for i in (0, 2)]
-    head, hips, left, right = (positions[:, skeleton.role(name)] for name in ("head", "hips", *feet))
-    return _unit(head - hips) + _unit(hips - 0.5 * (left + right))
+    ends = ("toe" if f"{side}_toe" in skeleton.roles else "heel" for side in ("left", "right"))
+    roles = ("head", "hips", *(f"{side}_{end}" for side, end in zip(("left", "right"), ends, strict=True)))
+    head, hips, left, right = (positions[:, skeleton.role(role)] for role in roles)
+    return unit_vectors(head - hips) + unit_vectors(hips - 0.5 * (left + right))
 
 
 def _crawls(clip: Clip, axis: str) -> bool:
@@ -175,41 +234,19 @@ def _crawls(clip: Clip, axis: str) -> bool:
     upright figures climb less far than they move over the ground. A jump does not count: its lowest joint is
     on the ground most of the time, so its quartiles differ by less than CLIMB.
     """
-    along = clip.positions @ DIRECTIONS[axis]
-    low, high = np.percentile(along.min(axis=1), [25, 75])
+    low, high = np.percentile((clip.positions @ DIRECTIONS[axis]).min(axis=1), [25, 75])
     travel = np.ptp(clip.root, axis=0)
     return bool(high - low > CLIMB and travel @ np.abs(DIRECTIONS[axis]) >= 0.9 * travel.max())
 
 
 def _travels(clip: Clip, axis: str) -> bool:
     """Whether the figure moves further over the ground than it is tall. axis: the axis that points up."""
-    up, level = DIRECTIONS[axis], 1 - np.abs(DIRECTIONS[axis])
-    height = float(np.median(np.ptp(clip.positions @ up, axis=1)))
+    height = float(np.median(np.ptp(clip.positions @ DIRECTIONS[axis], axis=1)))
+    level = 1 - np.abs(DIRECTIONS[axis])
     return bool(np.linalg.norm(np.ptp(clip.root * level, axis=0)) > height)
 
 
-def _handedness_of(clip: Clip) -> str:
-    """The handedness of the coordinates, "right" or "left".
-
-    If they are right-handed, the cross product of left and up points forward, like the feet.
-    """
-    left, up, feet = body_axes(clip.skeleton, clip.positions)
-    return "left" if np.mean(np.sum(np.cross(left, up) * feet, axis=-1)) < -0.2 else "right"
-
-
-def _with_x_negated(clip: Clip) -> Clip:
-    """The clip with x negated, which changes left-handed to right-handed coordinates."""
-    ends = {name: (-x, y, z) for name, (x, y, z) in clip.skeleton.end_sites.items()}
-    return replace(
-        clip,
-        skeleton=replace(clip.skeleton, offsets=clip.skeleton.offsets * FLIP, end_sites=ends),
-        rotations=clip.rotations * MIRROR,
-        root=clip.root * FLIP,
-        translations=None if clip.translations is None else clip.translations * FLIP,
-    )
-
-
-def _with_world_and_rest_turned(clip: Clip, world: Array, rest: Array) -> Clip:
+def _turned(clip: Clip, world: Array, rest: Array) -> Clip:
     """The clip with its world turned by `world` (4,), and its rest pose turned by `rest` (4,).
 
     Turning the rest pose also turns the joints' own axes, so that no joint of the motion moves.
@@ -218,19 +255,18 @@ def _with_world_and_rest_turned(clip: Clip, world: Array, rest: Array) -> Clip:
         return clip
     rotations = quat.mul(quat.mul(rest, clip.rotations), quat.inv(rest))
     rotations[:, 0] = quat.mul(quat.mul(world, clip.rotations[:, 0]), quat.inv(rest))
-    ends = {
-        name: (float(x), float(y), float(z))
-        for name, offset in clip.skeleton.end_sites.items()
-        for x, y, z in [quat.rotate(rest, np.array(offset))]
-    }
-    offsets = quat.rotate(rest, clip.skeleton.offsets)
-    return replace(
-        clip,
-        skeleton=replace(clip.skeleton, offsets=offsets, end_sites=ends),
-        rotations=rotations,
-        root=quat.rotate(world, clip.root),
-        translations=None if clip.translations is None else quat.rotate(rest, clip.translations),
-    )
+    return _changed(clip, lambda v: quat.rotate(rest, v), rotations, quat.rotate(world, clip.root))
+
+
+def _changed(clip: Clip, vectors: Callable[[Array], Array], rotations: Array, root: Array) -> Clip:
+    """The clip with other rotations and roots. vectors: changes all vectors (..., 3) in axes of joints."""
+    ends = {}
+    for name, offset in clip.skeleton.end_sites.items():
+        x, y, z = vectors(np.array(offset)).tolist()
+        ends[name] = (x, y, z)
+    skeleton = replace(clip.skeleton, offsets=vectors(clip.skeleton.offsets), end_sites=ends)
+    translations = None if clip.translations is None else vectors(clip.translations)
+    return replace(clip, skeleton=skeleton, rotations=rotations, root=root, translations=translations)
 
 
 def turned_about_vertical(clip: Clip, angle: float) -> Clip:

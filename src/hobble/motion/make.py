@@ -20,8 +20,6 @@ from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton, rest_positions
 from hobble.motion.axes import RigAxes, straighten, turned_about_vertical
 from hobble.motion.body import Body, body_by_roles, match_joints
-from hobble.motion.body_in_file import body_in_file, notes_on_names
-from hobble.motion.doubt import check_height
 from hobble.motion.edit import (
     Repaired,
     loop_clip,
@@ -29,9 +27,9 @@ from hobble.motion.edit import (
     repair_defects,
     resample,
 )
-from hobble.motion.floor import put_on_floor
-from hobble.motion.four_legs import on_four_legs
+from hobble.motion.ground import check_tilt, put_on_floor
 from hobble.motion.hips_root import below_hips, decode_below
+from hobble.motion.limbs import on_four_legs
 from hobble.motion.options import ClipMotion
 from hobble.motion.physics import check_pace
 from hobble.motion.read import (
@@ -43,24 +41,23 @@ from hobble.motion.read import (
     frame_rate,
     read_bvh,
 )
+from hobble.motion.rest_pose import UprightMotion, why_not_standing, with_upright_rest
 from hobble.motion.retarget import check_difference, check_knees, compare_motions, plan, retarget_clip
 from hobble.motion.rig import (
-    KnownSkeleton,
     RigMatch,
+    body_in_file,
     clean_names,
     find_hips,
     leg_length,
     likely_unit,
-    load_skeleton,
     match_rig,
     missing_bone,
 )
 from hobble.motion.root import facing_directions
-from hobble.motion.standing import why_not_standing
-from hobble.motion.tilt import check_tilt
-from hobble.motion.upright_rest import with_upright_rest
+from hobble.motion.skeleton_file import KnownSkeleton, load_skeleton
 
 STILL = 0.1  # cm: a joint that stays this close to its offset counts as fixed to its parent
+MOST_HEIGHT_ERROR = 3.0  # cm (two standard deviations): a clip whose height is more uncertain is refused
 UNKNOWN_RIG = "found"  # stands in reports instead of the rig's name if the rig is no known skeleton
 
 
@@ -161,8 +158,7 @@ def _load_unknown_rig(
     decoded = _decode(file)
     # In the file's unit and axes. The frame rate does not matter here.
     raw = Clip(file.path.stem, rig, 1.0, decoded.rotations, decoded.root, decoded.translations)
-    found = body_in_file(file, rig, raw, known, options)
-    body = found.body
+    body, how_found = body_in_file(file.path, raw, known, options.handedness)
     for start, end in (bone for leg in body.legs.values() for bone in pairwise(leg[:3])):
         if np.median(np.linalg.norm(raw.positions[:, end] - raw.positions[:, start], axis=-1)) < 1e-6:
             raise _no_length_error(file, f"{rig.joints[start]} to {rig.joints[end]}")
@@ -188,14 +184,14 @@ def _load_unknown_rig(
     named = known.followed_joints if known is not None and known.rig == target.skeleton.name else {}
     named_joints = [rig.index(joint) for joint in named.values()]
     standing_clip = with_upright_rest(straight.clip, body, target.skeleton, named_joints)
-    check_height(file.path, standing_clip.height_error, standing_clip.doubts, options.accept_doubt)
+    _check_height(file.path, standing_clip, options.accept_doubt)
     match = RigMatch(
         known.rig if known else UNKNOWN_RIG,
         standing_clip.clip.skeleton.roles,
         False,
         named or match_joints(standing_clip.clip.skeleton, standing_clip.body, target.skeleton, target_body),
     )
-    notes = decoded.notes + straight.notes + ([] if known else notes_on_names(found, options.handedness))
+    notes = decoded.notes + straight.notes + how_found
     source = FileMotion(
         standing_clip.clip,
         match,
@@ -211,6 +207,17 @@ def _load_unknown_rig(
         unsure=straight.unsure + standing_clip.doubts,
     )
     return _repair_and_ground(file, source, options)
+
+
+def _check_height(path: Path, motion: UprightMotion, accept: bool) -> None:
+    """Raise InputError if the height of a figure is too uncertain. accept: take the clip anyway."""
+    if motion.height_error > MOST_HEIGHT_ERROR and not accept:
+        raise InputError(
+            path,
+            " ".join(motion.doubts),
+            fix="Use a clip in which both feet stand flat, or one with a zero pose (all rotations zero) in "
+            "which a person could stand. To use this clip anyway, set motion.accept_doubt: true.",
+        )
 
 
 def _repair_and_ground(file: Bvh, source: FileMotion, options: ClipMotion) -> FileMotion:

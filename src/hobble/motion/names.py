@@ -6,74 +6,42 @@ import re
 from collections.abc import Sequence
 
 # Words for left and right, in several languages.
-LEFT = {
-    "left",
-    "l",
-    "lft",
-    "lt",
-    "lf",
-    "links",
-    "linke",
-    "linker",
-    "linkes",
-    "gauche",
-    "izquierda",
-    "izquierdo",
-}
-LEFT |= {"izquierdo", "sinistra", "sinistro", "sx", "hidari", "esq", "esquerda", "izq"}
-RIGHT = {"right", "r", "rgt", "rt", "rght", "rechts", "rechte", "rechter", "rechtes", "droite", "droit"}
-RIGHT |= {"derecha", "derecho", "destra", "destro", "dx", "migi", "dir", "direita", "der"}
-# (part of the body, words in names that mean it). The first part with a matching word counts. So "forearm"
+LEFT, RIGHT = (
+    frozenset(text.split())
+    for text in (
+        "left l lft lt lf links linke linker linkes gauche izquierda izquierdo izq sinistra sinistro sx hidari "
+        "esq esquerda",
+        "right r rgt rt rght rechts rechte rechter rechtes droite droit derecha derecho der destra destro dx "
+        "migi dir direita",
+    )
+)
+# Part of the body -> words in names that mean it. The first part with a matching word counts. So "forearm"
 # comes before "arm", which it contains. What `shoulder`, `arm`, `hip` and `leg` mean depends on the other
 # joints of the limb: see `limb_parts`.
-WORDS = (
-    ("twist", ("twist", "roll", "tweak", "helper", "corrective", "muscle")),
-    (
-        "finger",
-        ("finger", "thumb", "index", "middle", "ring", "pinky", "pinkie", "little", "palm", "metacarp"),
-    ),
-    ("finger", ("carpal", "inhand")),
-    ("toe", ("toe", "ball", "orteil", "zeh")),
-    ("clavicle", ("clavicle", "collar", "scapula", "clav")),
-    (
-        "forearm",
-        ("forearm", "lowerarm", "unterarm", "lowarm", "loarm", "elbow", "armlower", "radius", "ulna"),
-    ),
-    ("upperarm", ("upperarm", "oberarm", "uparm", "upprarm", "armupper", "shldr", "humerus", "bicep")),
-    (
-        "shank",
-        (
-            "lowerleg",
-            "unterschenkel",
-            "lowleg",
-            "loleg",
-            "leglower",
-            "calf",
-            "shin",
-            "shank",
-            "knee",
-            "tibia",
-            "fibula",
-        ),
-    ),
-    (
-        "thigh",
-        ("thigh", "oberschenkel", "cuisse", "muslo", "upperleg", "upleg", "legupper", "upprleg", "femur"),
-    ),
-    ("ankle", ("ankle", "heel")),
-    ("wrist", ("wrist",)),
-    ("hand", ("hand",)),
-    ("foot", ("foot", "feet", "fuss")),
-    ("shoulder", ("shoulder", "schulter", "hombro")),
-    ("head", ("head", "skull", "kopf")),
-    ("neck", ("neck", "cervical", "hals")),
-    ("chest", ("chest", "thorax", "ribcage", "sternum", "torso")),
-    ("hips", ("hips", "pelvis", "becken", "cog")),
-    ("spine", ("spine", "back", "abdomen", "waist", "lumbar", "belly", "stomach", "vertebra")),
-    ("arm", ("arm",)),
-    ("leg", ("leg",)),
-    ("hip", ("hip", "buttock", "femoral")),
-)
+WORDS = {
+    "twist": "twist roll tweak helper corrective muscle",
+    "finger": "finger thumb index middle ring pinky pinkie little palm metacarp carpal inhand",
+    "toe": "toe ball orteil zeh",
+    "clavicle": "clavicle collar scapula clav",
+    "forearm": "forearm lowerarm unterarm lowarm loarm elbow armlower radius ulna",
+    "upperarm": "upperarm oberarm uparm upprarm armupper shldr humerus bicep",
+    "shank": "lowerleg unterschenkel lowleg loleg leglower calf shin shank knee tibia fibula",
+    "thigh": "thigh oberschenkel cuisse muslo upperleg upleg legupper upprleg femur",
+    "ankle": "ankle heel",
+    "wrist": "wrist",
+    "hand": "hand",
+    "foot": "foot feet fuss",
+    "shoulder": "shoulder schulter hombro",
+    "head": "head skull kopf",
+    "neck": "neck cervical hals",
+    "chest": "chest thorax ribcage sternum torso",
+    "hips": "hips pelvis becken cog",
+    "spine": "spine back abdomen waist lumbar belly stomach vertebra",
+    "arm": "arm",
+    "leg": "leg",
+    "hip": "hip buttock femoral",
+}
+SPELLINGS = {part: tuple(known.split()) for part, known in WORDS.items()}
 # Words in the names of joints that are no part of the body but move other joints.
 CONTROLS = ("ik", "mch", "ctrl", "control", "ctl", "pole", "target", "effector")
 ENDS = ("end", "nub", "site", "tip", "top")  # words in the names of joints that only mark the end of a bone
@@ -94,10 +62,9 @@ def side_of(name: str) -> str | None:
     >>> side_of("LeftUpLeg"), side_of("thigh.R"), side_of("rForeArm"), side_of("LLeg"), side_of("Spine")
     ('left', 'right', 'right', 'left', None)
     """
-    found = words(name)
-    left, right = any(w in LEFT for w in found), any(w in RIGHT for w in found)
+    found, text = set(words(name)), name.lower()
+    left, right = bool(found & LEFT), bool(found & RIGHT)
     if not left and not right:
-        text = name.lower()
         left, right = "left" in text or "左" in text, "right" in text or "右" in text
     if not left and not right and (glued := re.match(r"([LR])[A-Z][a-z]", name)):
         left, right = glued[1] == "L", glued[1] == "R"
@@ -114,11 +81,9 @@ def side_of_pair(name: str, other: str) -> str | None:
     >>> side_of_pair("lfemur", "rfemur"), side_of_pair("toe_r2", "toe_l2"), side_of_pair("armA", "armB")
     ('left', 'right', None)
     """
-    own_side, other_side = side_of(name), side_of(other)
-    if own_side is not None or other_side is not None:
-        if own_side == other_side:
-            return None
-        return own_side or ("left" if other_side == "right" else "right")
+    own, opposite = side_of(name), side_of(other)
+    if own or opposite:
+        return None if own == opposite else own or ("left" if opposite == "right" else "right")
     if len(name) != len(other):
         return None
     unlike = [pair for pair in zip(name.lower(), other.lower(), strict=True) if pair[0] != pair[1]]
@@ -133,17 +98,15 @@ def are_twins(name: str, other: str) -> bool:
     """
     if side_of_pair(name, other) is None:
         return False
-    if side_of(name) is None and side_of(other) is None:
-        return True
-    return _without_side(name) == _without_side(other)
+    told_together = side_of(name) is None and side_of(other) is None
+    return told_together or _without_side(name) == _without_side(other)
 
 
 def _without_side(name: str) -> list[str]:
     """The words and numbers of a name in lower case, without the words for left and right."""
-    parts = re.findall(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|[0-9]+", re.sub("[左右]", " ", name))
-    if glued := re.match(r"[LR](?=[A-Z][a-z])", name):
-        parts = [parts[0].removeprefix(glued[0]), *parts[1:]]
-    return [part.lower() for part in parts if part and part.lower() not in LEFT | RIGHT]
+    name = re.sub(r"^[LR](?=[A-Z][a-z])", "", re.sub("[左右]", " ", name))
+    parts = re.findall(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|[0-9]+", name)
+    return [part.lower() for part in parts if part.lower() not in LEFT | RIGHT]
 
 
 def part_of(name: str) -> str | None:
@@ -153,10 +116,7 @@ def part_of(name: str) -> str | None:
     ('forearm', 'shoulder', 'shank', None)
     """
     text = "".join(w for w in words(name) if w not in LEFT | RIGHT)
-    for part, spellings in WORDS:
-        if any(word in text for word in spellings):
-            return part
-    return None
+    return next((part for part, known in SPELLINGS.items() if any(word in text for word in known)), None)
 
 
 def is_end(name: str) -> bool:
@@ -181,24 +141,21 @@ def limb_parts(names: Sequence[str]) -> dict[str, int]:
     """
     parts = [part_of(name) for name in names]
     out: dict[str, int] = {}
-    for i, part in enumerate(parts):
-        before, after = parts[:i], parts[i + 1 :]
-        if part == "shoulder":
-            part = "clavicle" if {"upperarm", "arm"} & set(after) else "upperarm"
-        elif part == "arm":
-            part = "forearm" if "upperarm" in before else "upperarm"
-        elif part in ("hip", "hips"):
-            part = None if {"thigh", "leg"} & set(after) else "thigh"
-        elif part == "leg":
-            part = "shank" if {"thigh", "hip"} & set(before) or "leg" in before else "thigh"
-        elif part == "ankle":
-            part = "foot"
-        elif part == "foot":
-            part = "toe" if "ankle" in before else "foot"
-        elif part == "wrist":
-            part = "hand"
-        elif part == "hand":
-            part = "finger" if "wrist" in before else "hand"
+    for i, word in enumerate(parts):
+        before, after = set(parts[:i]), set(parts[i + 1 :])
+        hip = None if after & {"thigh", "leg"} else "thigh"
+        meaning: dict[str, str | None] = {
+            "shoulder": "clavicle" if after & {"upperarm", "arm"} else "upperarm",
+            "arm": "forearm" if "upperarm" in before else "upperarm",
+            "hip": hip,
+            "hips": hip,
+            "leg": "shank" if before & {"thigh", "hip", "leg"} else "thigh",
+            "ankle": "foot",
+            "foot": "toe" if "ankle" in before else "foot",
+            "wrist": "hand",
+            "hand": "finger" if "wrist" in before else "hand",
+        }
+        part = meaning.get(word, word) if word else None
         # The first joint of a part counts. A joint like Hand_End is not where the hand begins.
         if part is not None and part not in out and not (is_end(names[i]) and part in ("hand", "foot")):
             out[part] = i

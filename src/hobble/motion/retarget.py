@@ -26,7 +26,7 @@ from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton, local_rotations, rest_positions
 from hobble.motion.axes import rest_frame
 from hobble.motion.body import SIDES
-from hobble.motion.heel_tilt import steady_heels
+from hobble.motion.ground import steady_heels
 from hobble.motion.rig import leg_length, missing_bone
 
 # Bones of limbs, without the side: role of the joint that turns the bone -> role of the joint at its end.

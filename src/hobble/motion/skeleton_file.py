@@ -1,0 +1,244 @@
+"""Skeleton files (`config/skeletons/<name>.yaml`): reads and checks them, and drafts one for a strange rig.
+
+The file lists the joints of a rig, and tells which joint has which role. A role names a part of the body.
+Users write these files by hand, so each error names the line of the mistake.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from difflib import get_close_matches
+from functools import lru_cache
+from itertools import pairwise
+from pathlib import Path
+from typing import Any, NoReturn
+
+import numpy as np
+
+from hobble.core.errors import InputError
+from hobble.core.skeleton import Skeleton
+from hobble.core.untrusted import printable, read_text, read_yaml
+from hobble.motion.body import ARM, LEG, SIDES, TRUNK, lowest_common_ancestor, path_between, path_to_root
+from hobble.motion.names import limb_parts, part_of, side_of
+
+FARTHEST = 1e5  # cm: each component of a joint's offset from its parent is at most this large
+# The roles of each limb, from the trunk outward, and all roles that there are.
+LIMBS = [tuple(f"{side}_{part}" for part in limb) for side in SIDES for limb in (ARM, LEG)]
+ROLES = (*TRUNK, *(role for limb in LIMBS for role in limb))
+OPTIONAL = ("spine", "chest", "neck", "left_toe", "right_toe")  # roles that a file may leave out
+ORDER = (  # advice in error messages
+    "The order in the trunk is hips, spine, chest, neck, head; in an arm shoulder, elbow, wrist; in a leg "
+    "hip, knee, heel, toe."
+)
+APART = 0.25  # leg lengths: the joint from which the legs hang may be at most this far from the hips
+# A part of a limb (as `names.part_of` calls it) -> the role of the joint at which it begins.
+ROLE_OF_PART = {
+    "arm": {"upperarm": "shoulder", "forearm": "elbow", "hand": "wrist"},
+    "leg": {"thigh": "hip", "shank": "knee", "foot": "heel", "toe": "toe"},
+}
+WORDS = {  # what parts of a limb are called in names
+    "arm": ("clavicle", "shoulder", "upperarm", "arm", "forearm", "wrist", "hand"),
+    "leg": ("hip", "thigh", "leg", "shank", "ankle", "foot", "toe"),
+}
+
+
+@dataclass(frozen=True)
+class KnownSkeleton:
+    """A skeleton that has a file in `config/skeletons`, with its maps to other skeletons.
+
+    maps: name of another skeleton -> {joint of this skeleton: joint of the other}.
+    """
+
+    skeleton: Skeleton
+    maps: Mapping[str, Mapping[str, str]]
+
+
+def load_skeleton(path: str | Path, name: str | None = None) -> KnownSkeleton:
+    """Read a skeleton file. Raises InputError if it is missing or wrong."""
+    path = Path(path)
+    if not path.is_file():
+        raise InputError(path, "no such skeleton file")
+    state = path.stat()
+    return _load(path, name or path.stem, state.st_mtime_ns, state.st_size)
+
+
+@lru_cache(maxsize=32)
+def _load(path: Path, name: str, changed: int, size: int) -> KnownSkeleton:
+    """Read a skeleton file, once as long as its time of change and its size stay the same."""
+    data: Any = read_yaml(path)
+    _Check(path, data, read_text(path)).run()
+    try:
+        return KnownSkeleton(Skeleton.from_dict({**data, "name": name}), data.get("maps") or {})
+    except (AttributeError, KeyError, TypeError, ValueError, OverflowError) as error:
+        raise InputError(path, f"not a skeleton file: {printable(error)}") from None
+
+
+class _Check:
+    """Checks a skeleton file. `run` raises InputError with the line of the first mistake, if it is found.
+
+    Each joint but the first needs a parent that is listed above it. Each joint needs an offset of three
+    numbers. Only the roles in ROLES are allowed, and no two roles may have the same joint (except spine and
+    chest). The joints of the roles must be in order from the trunk outward, and a name that says a side must
+    say the side of the joint's role. All roles but those in OPTIONAL are required, and both toes or none.
+    The legs must hang from a joint at or near the hips. If there is a chest, the arms must hang from it or
+    from the neck.
+
+    data: the file's content as plain data. text: its content as it is written, to find the line of a mistake.
+    """
+
+    def __init__(self, path: Path, data: Any, text: str) -> None:
+        self.path, self.data, self.text = path, data, text
+
+    def run(self) -> None:
+        for key in ("joints", "roles"):
+            if (
+                not isinstance(self.data, Mapping)
+                or not isinstance(self.data.get(key), Mapping)
+                or not self.data[key]
+            ):
+                fix = "config/skeletons/README.md describes it."
+                self._refuse(f"a skeleton file needs a section `{key}`", fix=fix)
+        self.roles: Mapping[str, str] = self.data["roles"]
+        self.names = list(self.data["joints"])
+        self._check_joints()
+        self.parents = [
+            -1 if joint.get("parent") is None else self.names.index(joint["parent"])
+            for joint in self.data["joints"].values()
+        ]
+        self._check_roles()
+        self._check_order()
+        self._check_hubs()
+
+    def _refuse(self, problem: str, section: str = "", name: str = "", fix: str | None = None) -> NoReturn:
+        """Raise InputError with the line of the key `name` of a section, or of the section itself."""
+        found, inside = None, False
+        key = re.compile(rf"""^\s+(['"]?){re.escape(name)}\1\s*:""")
+        for number, line in enumerate(self.text.split("\n"), 1):
+            if re.match(r"\w", line):
+                inside = bool(section) and line.startswith(f"{section}:")
+            if found is None and inside and (key.match(line) if name else True):
+                found = number
+        raise InputError(self.path, printable(problem, 400), line=found, fix=fix)
+
+    def _check_joints(self) -> None:
+        above: set[str] = set()
+        for name, joint in self.data["joints"].items():
+            if not isinstance(name, str) or not isinstance(joint, Mapping):
+                self._refuse(
+                    f"joint {name}: expected {{parent: ..., offset: [x, y, z]}}", "joints", str(name)
+                )
+            parent = joint.get("parent")
+            if parent is None and above:
+                self._refuse(f"joint {name}: only the first joint may have no parent", "joints", name)
+            if parent is not None and (not isinstance(parent, str) or parent not in above):
+                self._refuse(f"joint {name}: its parent {parent!r} must be listed above it", "joints", name)
+            if not _is_offset(joint.get("offset")):
+                problem = f"joint {name}: its offset must be three numbers of {FARTHEST:g} cm at most"
+                self._refuse(problem, "joints", name)
+            above.add(name)
+
+    def _check_roles(self) -> None:
+        role_of: dict[str, str] = {}
+        for role, joint in self.roles.items():
+            if role not in ROLES:
+                self._refuse(f"there is no role {role}{_guess(role, ROLES, '{}')}", "roles", str(role))
+            if not isinstance(joint, str) or joint not in self.names:
+                guess = _guess(joint, self.names, "{!r}")
+                self._refuse(f"{role}: there is no joint {joint!r}{guess}", "roles", role)
+            if joint in role_of and {role, role_of[joint]} != {"spine", "chest"}:
+                self._refuse(f"{role} and {role_of[joint]} are the same joint, {joint}", "roles", role)
+            role_of[joint] = role
+        toes = {"left_toe", "right_toe"}
+        needed = [role for role in ROLES if role not in OPTIONAL or (role in toes and toes & set(self.roles))]
+        if missing := [role for role in needed if role not in self.roles]:
+            self._refuse(f"these roles are missing: {', '.join(missing)}", "roles")
+
+    def _path_up(self, role: str) -> list[str]:
+        """The names of the joint of a role and of all joints above it."""
+        return [self.names[j] for j in path_to_root(self.parents, self.names.index(self.roles[role]))]
+
+    def _check_order(self) -> None:
+        """Each joint hangs from the one before it, the hips from no role, and names say no other side."""
+        for chain in (*LIMBS, TRUNK[1:]):
+            for first, second in pairwise(role for role in chain if role in self.roles):
+                if self.roles[first] not in self._path_up(second):
+                    problem = f"which does not hang from {self.roles[first]}, the {first}"
+                    self._refuse(f"{second} is {self.roles[second]}, {problem}", "roles", second, ORDER)
+        for role, joint in self.roles.items():
+            if joint in self._path_up("hips")[1:]:
+                problem = f"hips is {self.roles['hips']}, which hangs from {joint}, the {role}"
+                self._refuse(problem, "roles", "hips", ORDER)
+            side, named = role.partition("_")[0], side_of(joint)
+            if side in SIDES and named is not None and named != side:
+                fix = "Swap left and right. If the name is wrong, rename the joint here and in the clips."
+                self._refuse(f"{role} is {joint}, whose name says {named}", "roles", role, fix)
+
+    def _check_hubs(self) -> None:
+        """The arms hang from the chest or the neck, and the legs from a joint near the hips."""
+        index = {role: self.names.index(joint) for role, joint in self.roles.items()}
+        arms, legs = (
+            lowest_common_ancestor(self.parents, [index[f"{side}_{part}"] for side in SIDES])
+            for part in ("shoulder", "hip")
+        )
+        if "chest" in index and arms not in (index["chest"], index.get("neck")):
+            problem = f"chest is {self.roles['chest']}, but the arms hang from {self.names[arms]}"
+            self._refuse(problem, "roles", "chest")
+        lengths = [float(np.linalg.norm(joint["offset"])) for joint in self.data["joints"].values()]
+        # A bone's length is the offset of its lower joint, which may be either end: the path may go up.
+        bones = pairwise(path_between(self.parents, index["hips"], legs))
+        distance = sum(lengths[a if self.parents[a] == b else b] for a, b in bones)
+        if distance > APART * (lengths[index["left_knee"]] + lengths[index["left_heel"]]):
+            problem = f"hips is {self.roles['hips']}, but the legs hang from {self.names[legs]}"
+            self._refuse(problem, "roles", "hips")
+
+
+def _guess(word: Any, known: Any, shown: str) -> str:
+    """A question that names the known word nearest to a wrong one, or nothing if none is near."""
+    near = get_close_matches(str(word), known, 1)
+    return f" (is it {shown.format(near[0])}?)" if near else ""
+
+
+def _is_offset(offset: Any) -> bool:
+    """Whether a value is a list of three numbers that are not larger than FARTHEST."""
+    is_triple = isinstance(offset, list | tuple) and len(offset) == 3
+    return is_triple and all(type(x) in (int, float) and abs(x) <= FARTHEST for x in offset)
+
+
+def draft_skeleton_file(rig: Skeleton, roles: Mapping[str, str]) -> str:
+    """The text of a skeleton file (YAML): the rig's joints and their roles.
+
+    roles: role -> name of its joint. The roles that are not in `roles` are left out if they are optional.
+    Otherwise they get `?` as their joint.
+    """
+    lines = ["# Role: joint. Fill in each ?. Leave out roles that the rig does not have.", "roles:"]
+    known = {role: "?" for role in ROLES if role not in OPTIONAL} | dict(roles)
+    lines += [f"  {role}: {_quoted(known[role])}" for role in ROLES if role in known]
+    lines.append("joints:")
+    for name, parent, offset in zip(rig.joints, rig.parents, rig.offsets, strict=True):
+        parent_name = "null" if parent < 0 else _quoted(rig.joints[parent])
+        # x + 0.0 turns -0.0 into 0.0.
+        numbers = ", ".join(f"{x + 0.0:.6g}" for x in (offset if parent >= 0 else 0 * offset))
+        lines.append(f"  {_quoted(name)}: {{parent: {parent_name}, offset: [{numbers}]}}")
+    return "\n".join(lines) + "\n"
+
+
+def guess_roles(rig: Skeleton) -> dict[str, str]:
+    """Role -> name of the joint, for the roles that the names of the joints suggest."""
+    parts, sides = ({name: about(name) for name in rig.joints} for about in (part_of, side_of))
+    out: dict[str, str] = {}
+    for name, part in parts.items():
+        if sides[name] is None and part in TRUNK:
+            out.setdefault(part, name)
+    for side in SIDES:
+        for limb, role_of in ROLE_OF_PART.items():
+            joints = [name for name in rig.joints if sides[name] == side and parts[name] in WORDS[limb]]
+            found = {part: joints[i] for part, i in limb_parts(joints).items()}
+            out |= {f"{side}_{role_of[part]}": name for part, name in found.items() if part in role_of}
+    return out
+
+
+def _quoted(name: str) -> str:
+    """A name as a YAML string in single quotes."""
+    return "'" + name.replace("'", "''") + "'"
