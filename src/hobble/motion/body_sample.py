@@ -300,7 +300,7 @@ class BodySample:
 
     @cached_property
     def feet_tilt(self) -> FeetTilt:
-        """The tilt of flat feet: from the zero pose if that shows it, else from frames in which they stand."""
+        """The tilt of flat feet: from the zero pose if it shows it, else from frames in which they stand."""
         feet = [side for side in SIDES if self.body.legs[side][3] is not None]
         if not feet:
             return FeetTilt({}, {}, 0.0)

@@ -9,8 +9,8 @@ from collections.abc import Sequence
 LEFT, RIGHT = (
     frozenset(text.split())
     for text in (
-        "left l lft lt lf links linke linker linkes gauche izquierda izquierdo izq sinistra sinistro sx hidari "
-        "esq esquerda",
+        "left l lft lt lf links linke linker linkes gauche izquierda izquierdo izq sinistra sinistro sx "
+        "hidari esq esquerda",
         "right r rgt rt rght rechts rechte rechter rechtes droite droit derecha derecho der destra destro dx "
         "migi dir direita",
     )
