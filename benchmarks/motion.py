@@ -23,7 +23,8 @@ from hobble.motion.make import make_clip
 from hobble.motion.options import ClipMotion
 from hobble.motion.read import read_bvh
 from hobble.motion.retarget import plan, retarget_pose
-from hobble.motion.rig import joint_pairs, load_skeleton
+from hobble.motion.rig import joint_pairs
+from hobble.motion.skeleton_file import load_skeleton
 
 SKELETONS = Path(__file__).resolve().parents[1] / "config/skeletons"
 

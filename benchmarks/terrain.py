@@ -32,7 +32,7 @@ from hobble.labels.label import label_clip, mirror_labels
 from hobble.motion.edit import mirror_clip
 from hobble.motion.make import make_clip
 from hobble.motion.options import ClipMotion
-from hobble.motion.rig import load_skeleton
+from hobble.motion.skeleton_file import load_skeleton
 from hobble.synthetic.generate_clip import write_clip
 from hobble.terrain import search
 from hobble.terrain.clip_fits import clip_fits

@@ -20,7 +20,7 @@ from hobble.core.files import load_npz, read_json
 from hobble.core.untrusted import read_yaml
 from hobble.models import checks
 from hobble.models.load import load_network
-from hobble.motion.rig import load_skeleton
+from hobble.motion.skeleton_file import load_skeleton
 from hobble.terrain.heightmaps import heightmaps, read_heights
 from hobble.terrain.options import HeightmapOptions
 

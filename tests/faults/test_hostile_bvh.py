@@ -12,10 +12,10 @@ import pytest
 from hobble.core.errors import InputError
 from hobble.core.untrusted import read_bytes
 from hobble.motion import read as bvh
-from hobble.motion.draft import MOST_SHOWN
 from hobble.motion.make import make_clip
 from hobble.motion.read import MOST_JOINTS
-from hobble.motion.rig import load_skeleton
+from hobble.motion.rig import MOST_SHOWN
+from hobble.motion.skeleton_file import load_skeleton
 
 from .refusals import HEADER, MB, refused, write
 from .texts import OPTIONS, SKELETON

@@ -12,7 +12,7 @@ import yaml
 from hobble.channels.injury.table import write_statuses
 from hobble.config.load_configuration import Catalogue
 from hobble.core.errors import HobbleError, InputError
-from hobble.motion.rig import load_skeleton
+from hobble.motion.skeleton_file import load_skeleton
 from hobble.workflow.project import Project
 from hobble.workflow.targets import check_targets
 

@@ -21,7 +21,7 @@ from hobble.core.untrusted import read_yaml
 from hobble.labels.read_files import SourceTime, read_gait_keys
 from hobble.models.load import load_network
 from hobble.motion import read as bvh
-from hobble.motion.rig import load_skeleton
+from hobble.motion.skeleton_file import load_skeleton
 from hobble.terrain.heightmaps import read_heights
 
 from .refusals import write

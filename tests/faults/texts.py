@@ -15,7 +15,7 @@ from hobble.channels.injury.status import read_status
 from hobble.core.errors import InputError
 from hobble.motion.make import make_clip
 from hobble.motion.options import ClipMotion
-from hobble.motion.rig import load_skeleton
+from hobble.motion.skeleton_file import load_skeleton
 
 from . import bvh_grammar, status_grammar
 from .grammar import Case, cases

@@ -64,7 +64,7 @@ def outcome(file: Path, seed: int, folder: Path, frames: int | None = None) -> O
     from hobble.core.errors import HobbleError
     from hobble.motion.make import load_source, make_clip
     from hobble.motion.read import read_bvh
-    from hobble.motion.rig import load_skeleton
+    from hobble.motion.skeleton_file import load_skeleton
 
     maps = Path(__file__).parents[2] / "config" / "skeletons"
     options, how, target = ClipMotion(), Scramble.drawn(seed), maps / "holden31.yaml"

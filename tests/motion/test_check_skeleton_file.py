@@ -9,10 +9,9 @@ import numpy as np
 import pytest
 
 from hobble.core.errors import InputError
-from hobble.motion.draft import draft_skeleton_file, guess_roles
 from hobble.motion.make import rig_in_file
 from hobble.motion.read import read_bvh
-from hobble.motion.rig import load_skeleton
+from hobble.motion.skeleton_file import draft_skeleton_file, guess_roles, load_skeleton
 
 
 def role(name: str, joint: str):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from hobble.core.skeleton import Skeleton
-from hobble.motion.fingers import pointing_fingers
+from hobble.motion.body import pointing_fingers
 
 
 def hand(wrist: str, *fingers: tuple[str, float]) -> Skeleton:

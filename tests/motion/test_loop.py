@@ -11,8 +11,8 @@ from hobble.core import quat
 from hobble.core.errors import HobbleError
 from hobble.motion.edit import loop_clip
 from hobble.motion.retarget import plan, retarget_clip
-from hobble.motion.rig import load_skeleton
 from hobble.motion.root import root_frames, vectors_to_root
+from hobble.motion.skeleton_file import load_skeleton
 
 
 def part(clip, first, last):

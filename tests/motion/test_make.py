@@ -10,7 +10,7 @@ import pytest
 
 from hobble.core import quat
 from hobble.core.errors import InputError
-from hobble.motion.rig import load_skeleton
+from hobble.motion.skeleton_file import load_skeleton
 
 
 def test_a_clip_on_the_target_skeleton_is_unchanged(walk, bvh, make):

@@ -11,7 +11,7 @@ from hobble.core.clip import load_clip, save_clip
 from hobble.core.errors import HobbleError
 from hobble.motion.edit import mirror_clip, mirror_report
 from hobble.motion.make import first_facing
-from hobble.motion.rig import load_skeleton
+from hobble.motion.skeleton_file import load_skeleton
 
 FLIP = np.array([-1.0, 1.0, 1.0])
 

@@ -16,7 +16,7 @@ from hobble.core.errors import InputError
 from hobble.motion.make import load_source
 from hobble.motion.options import ClipMotion
 from hobble.motion.read import read_bvh
-from hobble.motion.rig import load_skeleton
+from hobble.motion.skeleton_file import load_skeleton
 from tests.motion.other_rigs import (
     CLOTHES,
     GAME,

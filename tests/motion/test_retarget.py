@@ -17,7 +17,8 @@ from hobble.motion.make import load_source
 from hobble.motion.options import ClipMotion
 from hobble.motion.read import read_bvh
 from hobble.motion.retarget import plan, retarget_clip, retarget_pose
-from hobble.motion.rig import joint_pairs, load_skeleton
+from hobble.motion.rig import joint_pairs
+from hobble.motion.skeleton_file import load_skeleton
 
 NAMES = ("holden31", "ava191", "mixamo55", "rig22")
 FEET = [f"{side}_{part}" for side in ("left", "right") for part in ("heel", "toe")]

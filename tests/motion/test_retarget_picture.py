@@ -12,7 +12,7 @@ import pytest
 from hobble.core.bvh import write_bvh
 from hobble.motion.__main__ import main
 from hobble.motion.look import PICTURES, WRONG, retarget_picture
-from hobble.motion.rig import load_skeleton
+from hobble.motion.skeleton_file import load_skeleton
 
 ROWS = 4
 

@@ -10,8 +10,8 @@ import pytest
 from hobble.core import quat
 from hobble.core.clip import Clip
 from hobble.core.errors import InputError
+from hobble.motion.ground import world_tilt
 from hobble.motion.physics import find_balance
-from hobble.motion.tilt import world_tilt
 
 X, Z = np.eye(3)[0], np.eye(3)[2]
 

@@ -16,7 +16,7 @@ from hobble.core.skeleton import Skeleton, forward_kinematics, rest_positions
 from hobble.motion.make import load_source
 from hobble.motion.options import ClipMotion
 from hobble.motion.read import decode_channels, read_bvh
-from hobble.motion.rig import load_skeleton
+from hobble.motion.skeleton_file import load_skeleton
 from tests.motion.other_rigs import PLAIN, rigged
 from tests.motion.scramble import compare, outcome
 

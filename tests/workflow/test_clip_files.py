@@ -123,7 +123,7 @@ def test_a_clip_depends_on_the_skeleton_that_it_is_retargeted_from(complete: Pat
 def test_plan_and_job_use_the_same_skeleton_file(root: Path, shared: Path) -> None:
     from hobble.motion.make import load_source
     from hobble.motion.read import read_bvh
-    from hobble.motion.rig import load_skeleton
+    from hobble.motion.skeleton_file import load_skeleton
 
     project = Project(root, {"mocap": str(shared / "mocap")})
     target = load_skeleton(root / "config/skeletons/holden31.yaml")

@@ -11,7 +11,7 @@ from tqdm import tqdm
 
 from hobble.core.clip_files import find_clips, require_single_file
 from hobble.core.errors import HobbleError, InputError
-from hobble.motion.rig import KnownSkeleton, load_skeleton
+from hobble.motion.skeleton_file import KnownSkeleton, load_skeleton
 
 
 def add_folders(parser: argparse.ArgumentParser, out: str) -> None:

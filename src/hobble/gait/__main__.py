@@ -19,7 +19,7 @@ from hobble.motion.edit import resample
 from hobble.motion.make import load_source
 from hobble.motion.options import ClipMotion
 from hobble.motion.read import read_bvh
-from hobble.motion.rig import load_skeleton
+from hobble.motion.skeleton_file import load_skeleton
 
 SKELETONS = "config/skeletons"  # folder of the skeleton files
 NO_HEALTHY = (

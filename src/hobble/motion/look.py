@@ -26,8 +26,9 @@ from hobble.motion.options import ClipMotion
 from hobble.motion.physics import times_too_fast
 from hobble.motion.read import read_bvh
 from hobble.motion.retarget import ANGLES, BONES, most_different
-from hobble.motion.rig import leg_length, load_skeleton
+from hobble.motion.rig import leg_length
 from hobble.motion.root import facing_directions
+from hobble.motion.skeleton_file import load_skeleton
 
 # cm: two clips show the same motion if their joints are on average less than this apart. The release of
 # Holden et al. (2017) contains two mirrored clips, which are 1.2 and 1.3 cm from the mirror images of their
