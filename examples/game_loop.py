@@ -8,7 +8,7 @@ import sys
 import numpy as np
 
 from hobble.runtime import ProceduralAnimation
-from hobble.runtime.caller_axes import Axes
+from hobble.runtime.caller_targets import Axes
 
 # axes: handedness, up axis and unit, here those of Unity. For Unreal use Axes("left", "Z"), for Blender
 # Axes("right", "Z", "m").

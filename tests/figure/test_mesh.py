@@ -14,7 +14,7 @@ from scipy.spatial import cKDTree
 
 from hobble.core import quat
 from hobble.core.skeleton import Skeleton, forward_kinematics
-from hobble.figure.fit_rotations import fitted_rotations
+from hobble.figure.gltf import fitted_rotations
 from hobble.figure.mesh import Mesh, body_mesh, mesh_key
 from hobble.figure.pack import links_of_bones, part_spheres, whole_weights
 

@@ -8,7 +8,7 @@ import pytest
 from hobble.core import quat
 from hobble.core.skeleton import forward_kinematics
 from hobble.runtime import ProceduralAnimation
-from hobble.runtime.caller_axes import MATRICES, Axes
+from hobble.runtime.caller_targets import MATRICES, Axes
 from hobble.runtime.ground import CELL, Heightmap
 from tests.runtime.walking import hills, walk
 

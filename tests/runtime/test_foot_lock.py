@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from hobble.core.skeleton import Skeleton
-from hobble.runtime.foot_lock import (
+from hobble.runtime.feet import (
     LOCK_AT,
     MISSED,
     RELEASE,

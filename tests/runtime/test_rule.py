@@ -7,7 +7,7 @@ import pytest
 import torch
 from numba import njit
 
-from hobble.runtime import advance, network_rows, rule
+from hobble.runtime import controller, network_rows, rule
 
 
 def test_places_standing_and_phase_follow_the_formulas() -> None:
@@ -22,7 +22,7 @@ def test_the_rule_is_the_same_compiled_and_in_python() -> None:
 
     @njit
     def compiled(a: float, b: float) -> tuple[float, float, float]:
-        return network_rows.joint_place(a, b), advance.movement_share(a), advance.phase_change(a, b)
+        return network_rows.joint_place(a, b), controller.movement_share(a), controller.phase_change(a, b)
 
     for a, b in rng.random((100, 2)):
         assert compiled(a, b) == (rule.joint_place(a, b), rule.movement_share(a), rule.phase_change(a, b))

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hobble.rows.layout import RowLayout
-from hobble.runtime import advance, trajectory
+from hobble.runtime import controller, trajectory
 
 LAYOUT = RowLayout(31)
 LENGTH, MIDDLE = 2 * LAYOUT.window, LAYOUT.window
@@ -51,9 +51,9 @@ def move(
     pull: float = 0.0,
 ) -> np.ndarray:
     phase = np.zeros(1) if phase is None else phase
-    columns = advance.advance_columns(LAYOUT)
+    columns = controller.advance_columns(LAYOUT)
     targets = np.array([target], float)
-    advance.advance(y, columns, targets, loss, recorded_poses, pull, (position, direction, gait), phase)
+    controller.advance(y, columns, targets, loss, recorded_poses, pull, (position, direction, gait), phase)
     return phase
 
 

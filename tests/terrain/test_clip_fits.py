@@ -14,11 +14,10 @@ from hobble.core.skeleton import Skeleton
 from hobble.motion.options import ClipMotion
 from hobble.motion.root import RootFrames, root_frames
 from hobble.terrain.clip_fits import clip_fits, heights_under, sample_points, save_fits
-from hobble.terrain.cycle_ground import fit_cycle
+from hobble.terrain.cycle_ground import IS_HEEL, find_soles, fit_cycle, heel_above_toe
 from hobble.terrain.heightmaps import heightmaps
 from hobble.terrain.options import HeightmapOptions
 from hobble.terrain.patches import Patches, draw_patches
-from hobble.terrain.soles import IS_HEEL, find_soles, heel_above_toe
 from tests.terrain.grounds import GROUNDS
 
 

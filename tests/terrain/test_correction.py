@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hobble.terrain.correction import (
+from hobble.terrain.clip_fits import (
     WALL_STEEPNESS,
     Stances,
     dig_pits,

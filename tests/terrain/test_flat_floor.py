@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from hobble.terrain.clip_fits import clip_fits
+from hobble.terrain.cycle_ground import Feet, is_above_other_joint
 from hobble.terrain.patches import Patches
-from hobble.terrain.soles import Feet, is_above_other_joint
 from tests.terrain.grounds import GROUNDS
 
 

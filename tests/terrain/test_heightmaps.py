@@ -10,8 +10,7 @@ from PIL import Image
 from PIL.TiffImagePlugin import ImageFileDirectory_v2
 
 from hobble.core.errors import InputError
-from hobble.terrain.generate import KINDS, generate_heights
-from hobble.terrain.heightmaps import heightmaps, landscape_heights, read_heights
+from hobble.terrain.heightmaps import KINDS, generate_heights, heightmaps, landscape_heights, read_heights
 from hobble.terrain.options import HeightmapOptions
 
 CELL = 3.937007874

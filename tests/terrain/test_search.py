@@ -10,8 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hobble.terrain.heightmaps import TerrainMap
+from hobble.terrain.kernels import FootPoints, best_patches, patch_errors
 from hobble.terrain.patches import Patches, draw_patches
-from hobble.terrain.search import FootPoints, best_patches, patch_errors
 
 CELL = 3.937007874
 

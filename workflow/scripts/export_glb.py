@@ -1,7 +1,7 @@
 """Creates results/<configuration>/export/character.glb: the body, its skeleton and the scripted motion."""
 
 from hobble.models.load import load_network
-from hobble.runtime.glb import export_glb
+from hobble.runtime.export import export_glb
 from hobble.workflow.job import job
 
 with job(snakemake) as log:

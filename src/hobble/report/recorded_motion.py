@@ -15,7 +15,7 @@ from hobble.core.array_parts import ArrayParts
 from hobble.core.files import load_npz
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
-from hobble.figure.fit_rotations import fitted_rotations
+from hobble.figure.gltf import fitted_rotations
 from hobble.figure.mesh import body_mesh, mesh_key
 from hobble.figure.pack import packed_turns
 from hobble.models.network import Network
@@ -268,7 +268,7 @@ def in_world(points: Array, root: Array, yaw: Array, ground: Array) -> Array:
 
 STEPS_PER_CM = 10  # lengths are stored as 16-bit integers, in steps of a millimetre
 MOST_VIEWS = 24  # the page has at most this many views
-# The arrays of a view: fields of `hobble.terrain.fit_picture.FitPicture`. In the file they are called
+# The arrays of a view: fields of `hobble.terrain.clip_fits.FitPicture`. In the file they are called
 # picture<number>_<field>.
 ARRAYS = ("cycle", "x", "z", "ground", "soles", "contacts", "pose")
 

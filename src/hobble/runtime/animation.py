@@ -17,15 +17,14 @@ from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 from hobble.models.load import load_network
 from hobble.models.network import Network
-from hobble.runtime.caller_axes import Axes
-from hobble.runtime.caller_targets import CallerTargets
-from hobble.runtime.channel_values import ChannelValues
+from hobble.runtime.bounds import SpeedLimiter
+from hobble.runtime.caller_targets import Axes, CallerTargets
 from hobble.runtime.character import Character, Snapshot, start_characters
 from hobble.runtime.controller import Controller, ControllerOptions
 from hobble.runtime.ground import as_ground
-from hobble.runtime.limits import SpeedLimiter
+from hobble.runtime.network_rows import ChannelValues
+from hobble.runtime.scenarios import Follower, Waypoint
 from hobble.runtime.trajectory import target_facing
-from hobble.runtime.waypoints import Follower, Waypoint
 
 # Largest x or z of a start position, cm (100 km). Farther from the origin, floats are imprecise.
 FARTHEST = 1e7

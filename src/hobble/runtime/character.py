@@ -32,7 +32,7 @@ class Character:
     smoothed_velocity, smoothed_direction (C, 2), strafe (C,), correction (C, 2): the smoothed target, see
     `Smoothed` in `hobble.runtime.trajectory`.
     foot_lock (C, 2), foot_hold (C, 2, 2), foot_step (C, 2), foot_missed (C, 2): where and how firmly feet are
-    held, see `Hold` in `hobble.runtime.foot_lock`.
+    held, see `Hold` in `hobble.runtime.feet`.
     foot_lift (C, 2), foot_added (C, 2, 2, 4), leg_shown (C, 2, 3, 3), body_lift (C,): the rest of foot
     placement, see `Feet` and `carry_body` in `hobble.runtime.feet`.
     placed: (C,) bool, whether the joints have been lifted to the ground, which happens once, at the start.

@@ -10,7 +10,7 @@ import numpy as np
 
 from hobble.core.compiled import njit
 from hobble.core.quat import Array
-from hobble.runtime.caller_axes import Axes
+from hobble.runtime.caller_targets import Axes
 
 CELL = 3.937007874  # cm, the cell size of the heightmaps of Holden et al. (2017)
 

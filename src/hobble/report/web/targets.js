@@ -1,6 +1,6 @@
 // Converts the caller's target for the trajectory. A target is that of `ProceduralAnimation.next_pose` in Python: velocity ([x, z], cm a frame),
 // facing ([x, z], or null to look where the character goes) and gait (its name, or null to choose by speed). The limits of the body are those
-// of `hobble.runtime.limits`: a highest speed, and a walk instead of a jog if the body cannot jog.
+// of `hobble.runtime.bounds`: a highest speed, and a walk instead of a jog if the body cannot jog.
 import { wrap } from "./numbers.js";
 
 export const createTargets = (spec, c) => {

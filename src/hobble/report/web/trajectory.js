@@ -1,4 +1,4 @@
-// The path of the root over two seconds, half past and half future, as in `hobble.runtime.trajectory` and `hobble.runtime.advance`. It has T
+// The path of the root over two seconds, half past and half future, as in `hobble.runtime.trajectory` and `hobble.runtime.controller`. It has T
 // entries, one for each frame; entry M is the present. The network gets S samples of it, F of them from the present on. G: number of gaits.
 // k: the constants of the Python runtime. c: the state of the character, see state.js.
 import { wrap } from "./numbers.js";
