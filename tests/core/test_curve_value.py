@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hobble.core.curve_value import interpolate_curve
+from hobble.core.smooth import interpolate_curve
 
 
 def test_it_is_what_numpy_gives_for_the_whole_curve() -> None:

@@ -18,7 +18,7 @@ from hobble.core.clip import load_clip
 from hobble.core.errors import InputError
 from hobble.core.files import load_npz, read_json
 from hobble.core.untrusted import read_yaml
-from hobble.labels.read_files import SourceTime, read_gait_keys
+from hobble.labels.label_files import SourceTime, read_gait_keys
 from hobble.models.load import load_network
 from hobble.motion import read as bvh
 from hobble.motion.skeleton_file import load_skeleton

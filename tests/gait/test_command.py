@@ -14,7 +14,7 @@ from hobble.gait.profile import healthy_profile
 from hobble.gait.recognise import compare_clip, shares_of_answers
 from hobble.motion.edit import mirror_clip
 from hobble.synthetic.generate_clip import walk_from_plan
-from hobble.synthetic.recipes import WALK, Segment
+from hobble.synthetic.plan import WALK, Segment
 
 
 @pytest.fixture(scope="module")

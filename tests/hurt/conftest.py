@@ -19,7 +19,7 @@ from hobble.labels.options import LabelOptions
 from hobble.motion.make import make_clip
 from hobble.motion.options import ClipMotion
 from hobble.synthetic.generate_clip import walk_from_plan
-from hobble.synthetic.recipes import Segment
+from hobble.synthetic.plan import Segment
 
 # The tests of this folder share these measurements. Tests are no package, so the module is loaded by path.
 SPEC = importlib.util.spec_from_file_location("hurt_gait", Path(__file__).with_name("gait.py"))

@@ -10,10 +10,9 @@ import pytest
 import yaml
 
 from hobble.core.errors import HobbleError
-from hobble.hurt.body_parts import part_of_link
+from hobble.hurt.effects import part_of_link
 from hobble.hurt.options import Hurt
-from hobble.hurt.schedule import ARMS, schedule_severities
-from hobble.hurt.version import UNCUT_SECONDS
+from hobble.hurt.version import ARMS, UNCUT_SECONDS, schedule_severities
 from hobble.workflow.project import Project
 
 

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hobble.core.errors import InputError
-from hobble.labels.read_files import (
+from hobble.labels.label_files import (
     SourceTime,
     read_footsteps,
     read_gait,

@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 
 from hobble.labels.label import label_clip
+from hobble.labels.label_files import SourceTime, footsteps_text, write_label_files
 from hobble.labels.options import LabelOptions
-from hobble.labels.read_files import SourceTime
-from hobble.labels.write_files import footsteps_text, write_label_files
 
 NAMES = ("w_footsteps.txt", "w_gait.txt", "w.phase")
 

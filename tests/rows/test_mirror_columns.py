@@ -18,7 +18,7 @@ from hobble.rows.clip_rows import ClipRows, Pairs, pair_batches
 from hobble.rows.layout import RowLayout
 from hobble.rows.mirror_columns import ColumnMirror, mirror_of_x, mirror_of_y
 from hobble.synthetic.generate_clip import walk_from_plan
-from hobble.synthetic.recipes import Segment
+from hobble.synthetic.plan import Segment
 
 OPTIONS = {"window": 60, "step": 10, "facing_sigma": 20.0}
 SEGMENTS = [Segment("walk", 120, 60, 4), Segment("walk", 110, -20, 4)]

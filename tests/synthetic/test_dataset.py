@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 import yaml
 
-from hobble.synthetic.planned_path import GAITS
-from hobble.synthetic.recipes import GROUND, RECIPES, plan
+from hobble.synthetic.plan import GAITS, GROUND, RECIPES, plan
 
 
 def plans(data):

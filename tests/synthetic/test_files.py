@@ -10,11 +10,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hobble.core.errors import HobbleError
-from hobble.synthetic.generate_clip import write_clip
-from hobble.synthetic.label_files import footsteps_text, gait_text
+from hobble.synthetic.generate_clip import footsteps_text, gait_text, write_clip
 from hobble.synthetic.options import Synthetic
-from hobble.synthetic.planned_path import gait_keys
-from hobble.synthetic.recipes import Segment
+from hobble.synthetic.plan import Segment, gait_keys
 
 RECIPES = ["walk-straight", "walk", "jog", "walk-jog-walk", "uneven", "crouch"]
 

@@ -9,7 +9,7 @@ import pytest
 
 from hobble.core import quat
 from hobble.synthetic.generate_clip import generate_walk, walk_from_plan
-from hobble.synthetic.recipes import Segment
+from hobble.synthetic.plan import Segment
 
 SIDES = ("Left", "Right")
 FEET = [(side, joint) for side in SIDES for joint in ("Foot", "ToeBase")]

@@ -19,9 +19,8 @@ from hobble.core.errors import InputError
 from hobble.core.section import Gait
 from hobble.labels.clip_labels import GAITS
 from hobble.labels.label import label_clip
+from hobble.labels.label_files import SourceTime, write_label_files
 from hobble.labels.options import LabelOptions
-from hobble.labels.read_files import SourceTime
-from hobble.labels.write_files import write_label_files
 from hobble.motion.make import make_clip
 from hobble.motion.options import ClipMotion
 

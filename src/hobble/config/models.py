@@ -59,7 +59,7 @@ class ClipEntry(s.Section):
     recipe: str | None = Field(
         None,
         description="for synthetic clips: what the generated walker does, a key of "
-        "`hobble.synthetic.recipes.RECIPES`",
+        "`hobble.synthetic.plan.RECIPES`",
     )
     share: s.PositiveFloat = Field(1.0, description="for synthetic clips: length relative to the other clips")
     source_fps: s.PositiveFloat | None = Field(None, description="overrides the file's Frame Time")

@@ -59,3 +59,25 @@ def _windows(values: Array, width: int) -> Array:
     """(F, ..., width) the values in the `width` frames around each frame."""
     padding = [(width // 2, width // 2)] + [(0, 0)] * (np.ndim(values) - 1)
     return np.lib.stride_tricks.sliding_window_view(np.pad(values, padding, mode="edge"), width, axis=0)
+
+
+# The value of a curve between its frames.
+
+
+def interpolate_curve(curve: Array, when: Array | float) -> Array:
+    """The values of a curve (F,) at the times `when`, interpolated linearly. They have the shape of `when`.
+
+    when: times in frames. Before frame 0 and after the last frame the curve is constant. The result is that
+    of `np.interp(when, np.arange(F), curve)`. np.interp reads the whole curve at every call, which is slow
+    for many calls with a long curve. This function reads only the frames around `when`.
+
+    >>> float(interpolate_curve(np.array([0.0, 10.0, 40.0]), 1.5))
+    25.0
+    """
+    times = np.asarray(when, float)
+    if not times.size:
+        return np.zeros(times.shape)
+    last = len(curve) - 1
+    first = min(max(int(times.min()), 0), last)
+    near = curve[first : min(max(int(times.max()), 0), last) + 2]
+    return np.asarray(np.interp(times, np.arange(first, first + len(near)), near))

@@ -1,20 +1,77 @@
-"""How much a hurt part of the body changes the motion at severity 10.
+"""How much a hurt part changes the motion at severity 10, from profiles of impaired people.
 
-Two tables decide this. MIXES mixes impairment profiles, which were derived from recordings of people.
-ADDED_CHANGES has the changes that the recordings do not show, because their feet and toes are inaccurate, and
-arms, shoulders, neck and back were not hurt. With a hurt back, the body leans and bends its knees (`forward`,
-`crouch`) about as in clip 105_26 of CMU, which counts as severity 7. Values of one side are
-for a part that is hurt on the right. Names that end with `_sound` are changes of the other side.
+A profile says how real impaired walks differ from the same people's normal walks.
+
+`people.json` was derived with `benchmarks/impairment_profiles.py` from the recordings of Jun et al.
+2020 ("Pathological gait classification using Kinect v2 and gated recurrent neural networks", IEEE Access 8).
+Ten people each walked normally and imitated five impairments of the right leg. The file holds only means over
+these people.
 """
 
 from __future__ import annotations
 
 import functools
+from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
+from hobble.core.files import read_json
 from hobble.core.quat import Array
-from hobble.hurt.impairment_profiles import CURVES, HARMONICS, read_profiles
+
+PROFILES_FILE = Path(__file__).with_name("people.json")
+# Angles over a gait cycle, in degrees. A profile says how each of them changes. The names are those of
+# `hobble.gait.cycles`.
+CURVES = ("trunk_forward", "trunk_left", "pelvis_left_up", "pelvis_turn_left", "shoulders_turn_left")
+HARMONICS = 2  # a profile has the mean and this many harmonics of each curve
+
+
+@dataclass(frozen=True)
+class Profile:
+    """A walk with an impairment of the right leg, compared with the same people's normal walk.
+
+    Ratios of the impaired walk to the normal walk: speed; stride (time of a cycle); step_hurt, step_sound
+    (length of the step onto the hurt and onto the sound foot); knee (range of the hurt knee's flexion);
+    arm_hurt, arm_sound (how far the arm of the hurt and of the sound side swings).
+
+    Differences: strike: cycles by which the sound foot lands later. stance_hurt, stance_sound: cycles by
+    which a stance is longer. width: leg lengths by which steps are wider. curves: name of CURVES -> 5 numbers
+    in degrees: the change of the curve's mean, then the changes of the factors of cosine and sine of each
+    harmonic. The curve begins when the hurt foot lands. Its time is warped so that the sound foot lands half
+    a cycle later.
+    """
+
+    speed: float
+    stride: float
+    strike: float
+    stance_hurt: float
+    stance_sound: float
+    step_hurt: float
+    step_sound: float
+    width: float
+    knee: float
+    arm_hurt: float
+    arm_sound: float
+    curves: dict[str, list[float]]
+
+    def harmonics(self) -> Array:
+        """(5, 1 + 2 * HARMONICS) the values of `curves`: one row for each of CURVES."""
+        return np.array([self.curves[name] for name in CURVES])
+
+
+@functools.cache
+def read_profiles() -> dict[str, Profile]:
+    """The profiles in PROFILES_FILE by name: antalgic, stiff_legged, steppage, trendelenburg, lurch."""
+    return {name: Profile(**values) for name, values in read_json(PROFILES_FILE)["profiles"].items()}
+
+
+# How much a hurt part of the body changes the motion at severity 10.
+#
+# Two tables decide this. MIXES mixes impairment profiles, which were derived from recordings of people.
+# ADDED_CHANGES has the changes that the recordings do not show, because their feet and toes are inaccurate,
+# and arms, shoulders, neck and back were not hurt. With a hurt back, the body leans and bends its knees
+# (`forward`, `crouch`) about as in clip 105_26 of CMU, which counts as severity 7. Values of one side are for
+# a part that is hurt on the right. Names that end with `_sound` are changes of the other side.
 
 # Part -> impairment profiles and their weights. Parts that are not here have only ADDED_CHANGES.
 MIXES: dict[str, dict[str, float]] = {
@@ -111,7 +168,7 @@ def changes_of_hurt_part(part: str) -> dict[str, float | Array]:
     `arm_sound`: ratios of each arm's swing. `off`, `off_sound`, `land_sound`: cycles by which a foot leaves
     or lands later. `step`: ratio of the length of the step onto the hurt foot, minus the ratio that speed and
     stride time alone would give. `width`: leg lengths by which steps are wider. `curves`: (5, 5) factors of
-    CURVES, as described in `Profile` of `hobble.hurt.impairment_profiles`.
+    CURVES, as described in `Profile` of `hobble.hurt.amounts`.
     """
     changes = dict(ADDED_CHANGES[part])
     out: dict[str, float | Array] = {"curves": np.zeros((len(CURVES), 1 + 2 * HARMONICS))}

@@ -1,4 +1,4 @@
-"""Combines the severities of several links into the changes of each frame of a clip."""
+"""Turns the severities of the links into the changes of each frame of a clip."""
 
 from __future__ import annotations
 
@@ -11,7 +11,64 @@ from hobble.core.several_effects import SUM_NORM
 from hobble.core.skeleton import Skeleton
 from hobble.core.smooth import gaussian
 from hobble.hurt.amounts import changes_of_hurt_part
-from hobble.hurt.body_parts import LEFT, RIGHT, part_of_link
+
+LEFT, RIGHT = 0, 1
+SIDES = ("left", "right")
+# (role, part): the part reaches down to the joint with this role. It begins at the joint with the previous
+# role; the first part begins at the hips (LEG) or the chest (ARM).
+LEG = (("hip", "hip"), ("knee", "thigh"), ("heel", "shank"))
+ARM = (("shoulder", "shoulder"), ("elbow", "upper arm"), ("wrist", "forearm"))
+
+
+@dataclass(frozen=True)
+class BodyPart:
+    """A part of the body: pelvis, hip, thigh, shank, foot, back, neck, shoulder, upper arm, forearm or hand.
+
+    side: LEFT, RIGHT, or None on the midline.
+    """
+
+    name: str
+    side: int | None
+
+
+def part_of_link(skeleton: Skeleton, link: tuple[str, str]) -> BodyPart:
+    """The part of the body that a link (parent joint, child joint) belongs to."""
+    child = skeleton.index(link[1])
+    for side, word in enumerate(SIDES):
+        for top, limb, last_part in (("hips", LEG, "foot"), ("chest", ARM, "hand")):
+            upper = skeleton.role(top)
+            for role, name in limb:
+                lower = skeleton.role(f"{word}_{role}")
+                if child in _chain(skeleton, lower, upper):
+                    # Joints between the hips and the hip joint belong to the pelvis.
+                    above_hip = role == "hip" and child != lower
+                    return BodyPart("pelvis" if above_hip else name, side)
+                upper = lower
+            if upper in joint_and_ancestors(skeleton, child):  # below the ankle or the wrist
+                return BodyPart(last_part, side)
+    if child in _chain(skeleton, skeleton.role("chest"), skeleton.role("hips")):
+        return BodyPart("back", None)
+    if skeleton.role("chest") in joint_and_ancestors(skeleton, child):
+        return BodyPart("neck", None)
+    return BodyPart("back", None)
+
+
+def joint_and_ancestors(skeleton: Skeleton, joint: int) -> list[int]:
+    """Indices of the joint itself, its parent, and so on to the root."""
+    out = [joint]
+    while skeleton.parents[out[-1]] >= 0:
+        out.append(skeleton.parents[out[-1]])
+    return out
+
+
+def _chain(skeleton: Skeleton, joint: int, above: int) -> list[int]:
+    """The joints from `joint` up to the one below `above`. Empty if `above` is not an ancestor."""
+    path = joint_and_ancestors(skeleton, joint)
+    return path[: path.index(above)] if above in path else []
+
+
+# Combines the severities of several links into the changes of each frame of a clip.
+
 
 HIGHEST_SEVERITY = 10.0
 STRENGTH_POWER = 0.78  # strength = (severity / 10) ** STRENGTH_POWER: .39 at 3, .58 at 5, .76 at 7
@@ -40,7 +97,7 @@ SIDED = (
     *("upper", "fore", "carry"),
 )
 SOUND_SUFFIX = "_sound"  # names of changes of the side that is not hurt end with this
-# Factors on the CURVES (see `hobble.hurt.impairment_profiles`) that mirror the body. All curves but the first
+# Factors on the CURVES (see `hobble.hurt.amounts`) that mirror the body. All curves but the first
 # are measured to the left or on the left, so their sign changes.
 MIRROR_SIGNS = np.array([1.0, -1.0, -1.0, -1.0, -1.0])
 # Signs of a curve's factors (mean, then cosine and sine of each of the two harmonics) when the curve is
@@ -55,7 +112,7 @@ class Effects:
     """The changes of each of F frames of a clip, named as in `hobble.hurt.amounts`.
 
     body_changes: name -> (F,). side_changes: name -> (F, 2), left and right. curves: (F, 5, 5) factors of
-    CURVES, as in `Profile` of `hobble.hurt.impairment_profiles`. strength: (F,) of the worst link, 0 to
+    CURVES, as in `Profile` of `hobble.hurt.amounts`. strength: (F,) of the worst link, 0 to
     1 (see STRENGTH_POWER). shown_severity: (F, L) severities of the L links, as the motion shows them: after
     a change of the requested severity they follow over about a second.
     """

@@ -12,15 +12,29 @@ from hobble.core.errors import HobbleError
 from hobble.core.quat import Array
 from hobble.core.skeleton import local_rotations
 from hobble.core.smooth import gaussian
-from hobble.hurt.body_parts import LEFT, RIGHT, SIDES
-from hobble.hurt.effects import HIGHEST_SEVERITY, Effects, effects_of_severities
-from hobble.hurt.foot_path import HurtFoot, footprints_of, move_foot, reduce_pitch
-from hobble.hurt.healthy_clip import HealthyClip, measure_healthy_clip
-from hobble.hurt.interpolate import interpolate_rotations, interpolate_values
-from hobble.hurt.legs import Leg, hips_height, knee_flexion, place_leg, reach_at_flexion, read_leg
-from hobble.hurt.relabel import relabel
-from hobble.hurt.shortened_path import ShortenedPath, ground_below, shorten
-from hobble.hurt.timing import Timing, retime
+from hobble.hurt.effects import HIGHEST_SEVERITY, LEFT, RIGHT, SIDES, Effects, effects_of_severities
+from hobble.hurt.healthy_clip import (
+    HealthyClip,
+    interpolate_rotations,
+    interpolate_values,
+    measure_healthy_clip,
+)
+from hobble.hurt.legs import (
+    HurtFoot,
+    Leg,
+    ShortenedPath,
+    footprints_of,
+    ground_below,
+    hips_height,
+    knee_flexion,
+    move_foot,
+    place_leg,
+    reach_at_flexion,
+    read_leg,
+    reduce_pitch,
+    shorten,
+)
+from hobble.hurt.timing import Timing, relabel, retime
 from hobble.hurt.upper_body import change_body
 from hobble.labels.clip_labels import Labels
 

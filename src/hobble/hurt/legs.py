@@ -1,10 +1,8 @@
-"""Sets the height of the hips so that the standing knee has the desired bend, and places the knees.
-
-The ankle is the joint with the role heel.
-"""
+"""Changes path and legs of a healthy clip (the source): shorter steps, other feet, hips and knees."""
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -14,9 +12,286 @@ from hobble.core.clip import Clip
 from hobble.core.ik import two_bone_knee
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
-from hobble.core.smooth import gaussian, smooth_above
-from hobble.hurt.body_parts import SIDES
-from hobble.hurt.interpolate import interpolate_rotations, interpolate_values
+from hobble.core.smooth import gaussian, interpolate_curve, smooth_above
+from hobble.hurt.effects import SIDES, Effects
+from hobble.hurt.healthy_clip import (
+    UP,
+    HealthyClip,
+    SourceStance,
+    interpolate_rotations,
+    interpolate_values,
+    smoothstep,
+)
+
+SLOPE_SECONDS = 0.3  # sigma of the Gaussian that smooths the height of the ground over time
+
+
+@dataclass(frozen=True)
+class ShortenedPath:
+    """The path of the body before (old) and after (new) it is shortened, in each of F source frames, cm.
+
+    old, new: (F, 2) horizontal path, x and z. old_ground, new_ground: (F,) height of the ground below the
+    body. If the ground is flat, its height is 0. On other ground, climbs and descents shrink like the path,
+    so that slopes keep their angle.
+    """
+
+    old: Array = field(repr=False)
+    new: Array = field(repr=False)
+    old_ground: Array = field(repr=False)
+    new_ground: Array = field(repr=False)
+
+    def move_point(self, point: Array, when: float) -> Array:
+        """Move a point (3,) by as much as the body's path has moved in source frame `when`. Returns (3,)."""
+        first = min(int(when), len(self.old) - 1)
+        near = slice(first, first + 2)  # two frames; to read all frames for each footprint would take long
+        shift = self.new[near] - self.old[near]
+        curves = shift[:, 0], self.new_ground[near] - self.old_ground[near], shift[:, 1]
+        return point + np.array([interpolate_curve(curve, when - first) for curve in curves])
+
+
+def shorten(
+    source: HealthyClip, effects: Effects, stride_ratio: Array, ground: Array | None
+) -> ShortenedPath:
+    """Shorten the path of the body so that its speed changes as `effects` says.
+
+    stride_ratio: (F,) new duration of a stride / old duration. ground: (F,) height of the ground below the
+    body; None if flat.
+    """
+    share = effects.ratio("speed") * stride_ratio  # length of a stride = speed * duration
+    flat = np.zeros(len(source))
+    return ShortenedPath(
+        source.path,
+        _shrink(source.path, share[:, None]),
+        flat if ground is None else ground,
+        flat if ground is None else _shrink(ground, share),
+    )
+
+
+def ground_below(source: HealthyClip, heights: list[list[tuple[float, float]]]) -> Array:
+    """(F,) height of the ground below the body, cm, from the heights of the standing feet.
+
+    heights: for each foot a list of (middle frame of a stance, height of the ankle). The median height of
+    each foot counts as 0. Otherwise, if one ankle is higher than the other in stance, flat ground would seem
+    to rise and fall with each step.
+    """
+    points = sorted(
+        (when, y - float(np.median([h for _, h in of_foot]))) for of_foot in heights for when, y in of_foot
+    )
+    height = np.interp(np.arange(len(source)), [p[0] for p in points], [p[1] for p in points])
+    return gaussian(height, SLOPE_SECONDS * source.clip.fps)
+
+
+def _shrink(values: Array, share: Array) -> Array:
+    """Multiply the changes of a curve from frame to frame by `share`. The first value stays the same."""
+    steps = np.diff(values, axis=0) * (share[1:] + share[:-1]) / 2
+    return values[:1] + np.concatenate([np.zeros_like(values[:1]), np.cumsum(steps, axis=0)])
+
+
+# Moves the feet: makes steps shorter, the roll over the toe smaller, and swings lower or wider.
+#
+# All arrays over frames have the F frames of the healthy clip (the source).
+
+
+OUTWARD_SIGN = (1.0, -1.0)  # sign of X on the left and on the right side of the figure
+# The foot's pitch is multiplied by the effect `strike` while its toe is up, by `push` while its heel is up.
+# The factor changes from `strike` to `push` as the heel rises by this angle, radians.
+BLEND_PITCH = np.radians(8.0)
+# The progress of a swing is measured mainly by time if the swing is shorter than this, else mainly by the
+# distance that the foot has covered.
+SHORT_SWING_CM = 12.0
+# In mid-swing the toe joint stays at least this much above its height in stance. If it is lower in the
+# source, it stays at least at its height there.
+CLEARANCE_CM = 1.3
+# A swing is lowered less if the stances before and after it differ in height. At this difference, it is
+# lowered 1 / e times as much as on flat ground.
+UNEVEN_CM = 4.0
+JOGGING = 0.65  # in a jog, the change of a step's length is smaller by this share
+# The lower height of a swing is blended in over this share of its frames, and out over as many at its end.
+BLEND_SHARE = 0.22
+
+
+@dataclass(frozen=True)
+class HurtFoot:
+    """One foot over F source frames.
+
+    ankle, ball: (F, 3) positions of the joints with the roles heel and toe, cm. rotation: (F, 4) of the foot
+    in the world. toe_rotation: (F, 4) of the toe joint, local.
+    """
+
+    ankle: Array = field(repr=False)
+    ball: Array = field(repr=False)
+    rotation: Array = field(repr=False)
+    toe_rotation: Array = field(repr=False)
+
+
+def reduce_pitch(source: HealthyClip, effects: Effects, side: int) -> HurtFoot:
+    """The source's foot with less pitch: turned about its ball while the heel is up, else about its ankle."""
+    clip, skeleton = source.clip, source.clip.skeleton
+    heel, toe = (skeleton.role(f"{SIDES[side]}_{role}") for role in ("heel", "toe"))
+    ankle, ball, rotation = clip.positions[:, heel], clip.positions[:, toe], clip.global_rotations[:, heel]
+    along = ball - ankle
+    axis = _pitch_axis(rotation, along, ~source.swinging[:, side])
+    ahead = np.cross(UP, axis)
+    pitch = np.arctan2(np.sum(along * np.cross(axis, ahead), axis=1), np.sum(along * ahead, axis=1))
+    stances = source.stances[side]
+    middles = np.array([stance.middle for stance in stances])
+    flat_pitch = np.interp(
+        np.arange(len(clip)), middles, [_median_in_stance(pitch, stance) for stance in stances]
+    )
+    toe_up = pitch - flat_pitch  # radians; negative while the heel is up
+    heel_up = smoothstep(-toe_up / BLEND_PITCH)  # 0..1
+    push, strike = (effects.ratio(name)[:, side] for name in ("push", "strike"))
+    # Toes also point down before landing, when they reach for the ground. This is reduced like a push-off.
+    pitch_ratio = strike + (push - strike) * heel_up
+    tilt = quat.from_axis_angle(axis, toe_up * (pitch_ratio - 1))
+    new_along = quat.rotate(tilt, along)
+    # While the heel is up, the ankle moves so that the ball stays in its place.
+    ankle = ankle + np.where(toe_up < 0, 1.0, 0.0)[:, None] * (along - new_along)
+    ankle = ankle - UP * _push_off_lowering(source, ball[:, 1], push, side)[:, None]
+    # The toe joint bends less, too: its rotation is closer to its mean over about a second.
+    mean_rotation = quat.normalize(gaussian(quat.continuous(clip.rotations[:, toe]), 0.5 * clip.fps))
+    toe_rotation = quat.slerp(mean_rotation, clip.rotations[:, toe], pitch_ratio)
+    return HurtFoot(ankle, ankle + new_along, quat.mul(tilt, rotation), toe_rotation)
+
+
+def _push_off_lowering(source: HealthyClip, ball: Array, push: Array, side: int) -> Array:
+    """(F,) cm by which a foot with less push-off is lower.
+
+    A healthy foot rolls over its toes, so its ball rises before the foot leaves the ground. With less
+    push-off, the ball rises less. Over the swing, the foot returns to its old height. ball: (F,) height of
+    the ball, cm. push: (F,) ratio of the push-off.
+    """
+    lowering, stances = np.zeros(len(ball)), source.stances[side]
+    for stance, following in itertools.zip_longest(stances, stances[1:]):
+        middle, off = int(stance.middle), int(stance.off)
+        frames = slice(middle, off + 1)
+        rise = np.maximum.accumulate(np.maximum(ball[frames] - _median_in_stance(ball, stance), 0.0))
+        lowering[frames] = (1 - push[frames]) * rise
+        if following and following.land > off:
+            land = int(following.land)
+            lowering[off : land + 1] = lowering[off] * smoothstep(np.linspace(1.0, 0.0, land + 1 - off))
+    return lowering
+
+
+def _pitch_axis(rotation: Array, along: Array, stands: np.ndarray) -> Array:
+    """(F, 3) unit axis about which the foot pitches. Positive angles raise the toe.
+
+    The axis is fixed in the foot: on average over the standing foot, it is horizontal and across the foot.
+    rotation: (F, 4) of the foot. along: (F, 3) from ankle to ball. stands: (F,) bool.
+    """
+    across = np.cross(along, UP)
+    size = np.linalg.norm(across, axis=1)
+    not_steep = size > 0.3 * np.linalg.norm(along, axis=1)  # a steep foot tells little about its axis
+    across_in_foot = quat.rotate(quat.inv(rotation), across)[stands & not_steep]
+    mean_axis = across_in_foot.sum(axis=0) if len(across_in_foot) else np.array([-1.0, 0.0, 0.0])
+    return quat.rotate(rotation, mean_axis / max(float(np.linalg.norm(mean_axis)), 1e-9))
+
+
+def _median_in_stance(values: Array, stance: SourceStance) -> Array:
+    """Median of values (F, ...) over the middle half of a stance."""
+    first = stance.land + 0.25 * (stance.off - stance.land)
+    last = stance.land + 0.75 * (stance.off - stance.land)
+    return np.median(values[int(first) : int(np.ceil(last)) + 1], axis=0)
+
+
+def footprints_of(foot: HurtFoot, stances: list[SourceStance]) -> list[Array]:
+    """The footprint of each stance: the position (3,) of the ankle, cm."""
+    return [_median_in_stance(foot.ankle, stance) for stance in stances]
+
+
+def move_foot(
+    source: HealthyClip, effects: Effects, path: ShortenedPath, foot: HurtFoot, side: int
+) -> HurtFoot:
+    """The foot that `reduce_pitch` returned, moved so that it follows the body's new path."""
+    stances = source.stances[side]
+    old_footprints = footprints_of(foot, stances)
+    new_footprints = [
+        _new_footprint(old, stance.middle, source, effects, path, side)
+        for old, stance in zip(old_footprints, stances, strict=True)
+    ]
+    yaw = quat.yaw(np.radians(OUTWARD_SIGN[side] * effects.side_changes["toe_out"][:, side]))
+    ankle, least_ball = np.empty_like(foot.ankle), np.empty(len(source))
+    ball = source.clip.positions[:, source.clip.skeleton.role(f"{SIDES[side]}_toe"), 1]
+    # Of each stance: height of the ball in the source, cm by which the footprint rises, first and last frame.
+    soles = [float(_median_in_stance(ball, stance)) for stance in stances]
+    rises = [float(new[1] - old[1]) for old, new in zip(old_footprints, new_footprints, strict=True)]
+    spans = [(int(stance.land), int(stance.off)) for stance in stances]
+    for (first, last), old, new, sole, rise in zip(
+        spans, old_footprints, new_footprints, soles, rises, strict=True
+    ):
+        frames = slice(first, last + 1)
+        least_ball[frames] = sole + rise + np.minimum(ball[frames] - sole, 0.0)
+        ankle[frames] = new + quat.rotate(yaw[frames], foot.ankle[frames] - old)
+    along = quat.rotate(yaw, foot.ball - foot.ankle)
+    lift = effects.ratio("lift")[:, side]
+    out = effects.side_changes["out"][:, side] * source.leg_length * OUTWARD_SIGN[side]
+    outward = quat.rotate(source.heading, np.array([1.0, 0.0, 0.0])) * out[:, None]
+    for i, ((_, off), (land, _)) in enumerate(itertools.pairwise(spans)):
+        if land - off < 2:
+            continue
+        frames = slice(off, land + 1)
+        progress = _progress(foot.ankle[frames])
+        # The ankle keeps its distance from the straight line between two footprints, but the line moves.
+        line = foot.ankle[off] + (foot.ankle[land] - foot.ankle[off]) * progress
+        swing = ankle[off] + (ankle[land] - ankle[off]) * progress + foot.ankle[frames] - line
+        u = np.linspace(0.0, 1.0, land - off + 1)  # share of the swing's time
+        blend = smoothstep(u / BLEND_SHARE) * smoothstep((1 - u) / BLEND_SHARE)
+        evenness = np.exp(-abs(foot.ankle[land, 1] - foot.ankle[off, 1]) / UNEVEN_CM)
+        swing[:, 1] -= (1 - lift[frames]) * evenness * blend * (foot.ankle[frames, 1] - line[:, 1])
+        swing += outward[frames] * (np.sin(np.pi * u) ** 2)[:, None]
+        ground = soles[i] + (soles[i + 1] - soles[i]) * progress[:, 0]
+        rise_in_swing = rises[i] + (rises[i + 1] - rises[i]) * progress[:, 0]
+        above = ball[frames] - ground
+        clearance = np.minimum(above, CLEARANCE_CM * np.sin(np.pi * u))
+        least_ball[frames] = ground + rise_in_swing + clearance
+        ankle[frames] = swing
+    # Raise the foot where its ball would be too low.
+    ankle[:, 1] += smooth_above(np.maximum(least_ball - ankle[:, 1] - along[:, 1], 0.0), 1)
+    return HurtFoot(ankle, ankle + along, quat.mul(yaw, foot.rotation), foot.toe_rotation)
+
+
+def _progress(ankle: Array) -> Array:
+    """(n, 1) progress of a swing in each frame, from 0 to 1.
+
+    In long swings it is mainly the share of the horizontal distance that the ankle has covered. In short
+    swings it is mainly the share of the time that has passed. ankle: (n, 3).
+    """
+    over_ground = ankle * [1, 0, 1]
+    whole = over_ground[-1] - over_ground[0]
+    time = smoothstep(np.linspace(0.0, 1.0, len(ankle)))
+    time_weight = SHORT_SWING_CM**2  # the share of the distance has the weight whole @ whole
+    covered = (over_ground - over_ground[0]) @ whole
+    return ((covered + time_weight * time) / (whole @ whole + time_weight))[:, None]
+
+
+def _new_footprint(
+    old: Array, when: float, source: HealthyClip, effects: Effects, path: ShortenedPath, side: int
+) -> Array:
+    """The new position (3,) of a footprint that is at `old` (3,) in source frame `when`, cm.
+
+    Footprints move with the body. Besides, the hurt foot lands less far ahead, and the feet land further
+    apart sideways.
+    """
+    nearest = min(round(when), len(source) - 1)
+    # Only the frames around `when` are read, because a long clip has thousands of footprints.
+    near = slice(max(nearest - 1, 0), nearest + 2)
+    velocity = (
+        np.gradient(source.path[near], axis=0)[nearest - near.start] if len(source) > 1 else np.zeros(2)
+    )
+    step = effects.side_changes["step"][near] * (1 - JOGGING * source.jog_share[near])[:, None]
+    change = interpolate_curve(step[:, side] - step[:, 1 - side], when - near.start)
+    # A step lasts half a cycle. Half of its change is made by this foot, the other half by the other foot.
+    ahead = change / 2 * velocity * source.cycle_frames[nearest] / 2
+    widening = interpolate_curve(effects.side_changes["width"][near].max(axis=1), when - near.start)
+    width = widening * source.leg_length / 2
+    outward = quat.rotate(source.heading[nearest], np.array([OUTWARD_SIGN[side] * width, 0.0, 0.0]))
+    return path.move_point(old, when) + np.array([ahead[0], 0.0, ahead[1]]) + outward
+
+
+# Sets the height of the hips so that the standing knee has the desired bend, and places the knees.
+#
+# The ankle is the joint with the role heel.
+
 
 # Radians of knee flexion. Below the first value, the bend is too small to tell in which direction the knee
 # points. Above the second value, the bend is large enough. Between them, it counts partly.

@@ -9,10 +9,9 @@ from hobble.core.ik import aim_bone
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 from hobble.core.smooth import gaussian
-from hobble.hurt.body_parts import LEFT, RIGHT, SIDES, joint_and_ancestors
-from hobble.hurt.effects import Effects
+from hobble.hurt.amounts import HARMONICS
+from hobble.hurt.effects import LEFT, RIGHT, SIDES, Effects, joint_and_ancestors
 from hobble.hurt.healthy_clip import HealthyClip
-from hobble.hurt.impairment_profiles import HARMONICS
 
 X, Y, Z = np.eye(3)
 PELVIS_LEAN = 0.35  # the pelvis tilts forward by this share of the trunk's lean
@@ -118,7 +117,7 @@ def _positions_in_trunk(skeleton: Skeleton) -> list[tuple[str, float]]:
 def _added_rotations(source: HealthyClip, effects: Effects) -> tuple[Array, Array, Array]:
     """World rotations to add to pelvis, chest and head, (F, 4) each."""
     phase, known = source.phase, np.clip(source.phase_known, 0.0, 1.0)
-    # The harmonics of the curves, see `Profile` of `hobble.hurt.impairment_profiles`. Without steps there is
+    # The harmonics of the curves, see `Profile` of `hobble.hurt.amounts`. Without steps there is
     # no phase, so only the mean of each curve counts.
     waves = [np.ones(len(source))]
     for h in range(1, HARMONICS + 1):

@@ -12,12 +12,11 @@ import numpy as np
 from hobble.core.clip import Clip
 from hobble.core.files import write_json
 from hobble.core.quat import Array
-from hobble.labels import read_files
-from hobble.labels.clip_labels import GAITS, LabelReport, Labels
+from hobble.labels.clip_labels import GAITS, LabelReport, Labels, make_label_picture
 from hobble.labels.contacts import find_contacts, find_stance_contacts
 from hobble.labels.footfall import Swing, find_landings, find_swings
 from hobble.labels.gait import automatic_gait, overwrite_crouch
-from hobble.labels.label_picture import make_label_picture
+from hobble.labels.label_files import SourceTime, read_footsteps, read_gait, read_gait_keys, read_phase
 from hobble.labels.options import LabelOptions as Options
 from hobble.labels.phase import (
     MARGINS,
@@ -28,7 +27,6 @@ from hobble.labels.phase import (
     phase_of_footsteps,
     rows_of_landings,
 )
-from hobble.labels.read_files import SourceTime
 
 
 def label_clip(
@@ -160,9 +158,9 @@ def _find_phase(
     """
     frames = len(clip)
     if "footsteps" in files:
-        footsteps = read_files.read_footsteps(files["footsteps"], time)
+        footsteps = read_footsteps(files["footsteps"], time)
     if "phase" in files:
-        phase = read_files.read_phase(files["phase"], time, frames)
+        phase = read_phase(files["phase"], time, frames)
         from_phase, known = footsteps_of_phase(phase)
         return phase, known, footsteps if "footsteps" in files else from_phase
     if "footsteps" not in files:
@@ -176,7 +174,7 @@ def _find_gait(
 ) -> Array:
     """(F, 6) gait shares from files or, without files, from the motion. dominant: main gait, if known."""
     if "gait" in files:
-        return read_files.read_gait(files["gait"], time, len(clip))
+        return read_gait(files["gait"], time, len(clip))
     if "gait_keys" in files:
-        return read_files.read_gait_keys(files["gait_keys"], time, len(clip))
+        return read_gait_keys(files["gait_keys"], time, len(clip))
     return automatic_gait(clip, find_stance_contacts(clip, options), dominant)

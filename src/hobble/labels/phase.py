@@ -16,7 +16,7 @@ import itertools
 import numpy as np
 
 from hobble.core.quat import Array
-from hobble.labels.read_files import whole_frame
+from hobble.labels.label_files import whole_frame
 
 END_OF_BOUT_ROW = (np.nan, np.nan, 1.0)  # the row that ends a bout of walking
 # Cycles a frame. At this rate the phase advances where nobody walks: a tenth of the usual rate, as for a

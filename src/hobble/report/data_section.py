@@ -264,7 +264,7 @@ def clip_strips(material: ReportMaterial, clips: frozenset[str]) -> list[dict[st
 
     clips: names of the clips to show. Clips without label curves are left out, and mirrored clips if the clip
     that they mirror is in the data set. A strip has the keys that `make_label_picture` of
-    `hobble.labels.label_picture` returns, and
+    `hobble.labels.clip_labels` returns, and
 
     - `clip`: its name. `length`: seconds
     - `channels`: a dict for each column with a value above 0. Its keys are `name`; `spans`, the stretches

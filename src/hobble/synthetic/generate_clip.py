@@ -5,8 +5,10 @@ The motion follows a plan: a list of segments, each with a gait, a speed, a turn
 
 from __future__ import annotations
 
+import itertools
 import math
 import pathlib
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,14 +19,19 @@ from hobble.core.clip import Clip
 from hobble.core.errors import HobbleError
 from hobble.core.files import write_text
 from hobble.core.skeleton import Skeleton
-from hobble.synthetic import label_files
-from hobble.synthetic.foot_motion import move_foot
-from hobble.synthetic.footsteps import landing_frames, phase_curve, plan_stances
+from hobble.synthetic.feet import landing_frames, move_foot, phase_curve, plan_stances
 from hobble.synthetic.options import Synthetic
-from hobble.synthetic.planned_ground import Ground, make_ground
-from hobble.synthetic.planned_path import gait_keys, plan_path
+from hobble.synthetic.plan import (
+    GROUND,
+    Ground,
+    Segment,
+    gait_keys,
+    make_ground,
+    plan,
+    plan_path,
+    random_generator,
+)
 from hobble.synthetic.pose import pose_figure
-from hobble.synthetic.recipes import GROUND, Segment, plan, random_generator
 from hobble.synthetic.style import LEFT, RIGHT, healthy_style
 
 SHORTEST = 60  # frames at 60 Hz: least length of a clip, so that a foot lands in it
@@ -52,7 +59,7 @@ def generate_walk(
     """Generate a clip from a recipe. Equal arguments give equal motion.
 
     clip: name of the clip. frames: its length, in frames at 60 Hz. recipe: a key of
-    `hobble.synthetic.recipes.RECIPES`; None: "walk-straight". fps: frame rate of the clip. seed: number that
+    `hobble.synthetic.plan.RECIPES`; None: "walk-straight". fps: frame rate of the clip. seed: number that
     decides all random choices.
 
     Raises HobbleError for an unknown recipe.
@@ -116,5 +123,28 @@ def write_clip(
     rig = Skeleton.from_dict(skeleton)
     walk = generate_walk(clip, rig, frames, recipe, options.fps, options.seed)
     write_bvh(bvh, walk.clip)
-    write_text(footsteps, label_files.footsteps_text(walk.right, walk.left))
-    write_text(gait, label_files.gait_text(walk.gait))
+    write_text(footsteps, footsteps_text(walk.right, walk.left))
+    write_text(gait, gait_text(walk.gait))
+
+
+# The texts of the two label files of a clip: footsteps and gaits.
+
+
+def footsteps_text(right: Sequence[int], left: Sequence[int]) -> str:
+    """Lines `right left`: a frame in which the right foot lands, and the frame of the next left landing.
+
+    A landing of the right foot has no line if the left foot does not land before the right foot lands again.
+    right, left: frames in which each foot lands. Frames count from 0 in the arguments, from 1 in the file.
+    """
+    lines = []
+    lefts = np.asarray(left)
+    for landing, next_landing in itertools.pairwise([*right, np.inf]):
+        later_lefts = lefts[lefts > landing]
+        if len(later_lefts) and later_lefts[0] < next_landing:
+            lines.append(f"{landing + 1} {later_lefts[0] + 1}")
+    return "".join(f"{line}\n" for line in lines)
+
+
+def gait_text(keys: Sequence[tuple[int, str]]) -> str:
+    """A line `frame label` for each of `keys`. Frames count from 0 in the argument, from 1 in the file."""
+    return "".join(f"{frame + 1} {label}\n" for frame, label in keys)

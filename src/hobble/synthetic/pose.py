@@ -10,9 +10,8 @@ from hobble.core.ik import two_bone_knee
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton, local_rotations
 from hobble.core.smooth import smooth_above
-from hobble.synthetic.foot_motion import FootPoses
-from hobble.synthetic.planned_ground import Ground, flat
-from hobble.synthetic.planned_path import PlannedPath
+from hobble.synthetic.feet import FootPoses
+from hobble.synthetic.plan import Ground, PlannedPath, flat
 from hobble.synthetic.style import LEFT, RIGHT, SIDE_SIGN, Style
 
 X, Y, Z = np.eye(3)  # the three axes

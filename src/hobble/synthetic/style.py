@@ -12,7 +12,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from hobble.core.quat import Array
-from hobble.synthetic.planned_path import GAITS, PlannedPath
+from hobble.synthetic.plan import GAITS, PlannedPath
 
 LEFT, RIGHT = 0, 1  # sides of the body, also as indices
 

@@ -180,7 +180,7 @@ def _check_entry(where: str, entry: ClipEntry) -> None:
     where: place of the entry, for messages.
     """
     if entry.recipe is not None:
-        from hobble.synthetic.recipes import RECIPES  # imports numpy, which takes longer than all checks
+        from hobble.synthetic.plan import RECIPES  # imports numpy, which takes longer than all checks
 
         if entry.recipe not in RECIPES:
             raise InputError(

@@ -37,7 +37,7 @@ from hobble.gait.profile import (
     profile_of_walk,
 )
 from hobble.gait.recognise import SIDES, compare_walk, examples_of_people
-from hobble.hurt.body_parts import part_of_link
+from hobble.hurt.effects import part_of_link
 from hobble.measures.measure import MeasureInputs, Outcome
 from hobble.measures.sample import clip_parts, sample_to_measure, with_sample
 from hobble.measures.walks import spearman

@@ -21,7 +21,7 @@ from hobble.channels.injury.recognition.results import RecognisedWindows, Recogn
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 from hobble.gait.recognise import Discriminant, learn
-from hobble.hurt.body_parts import part_of_link
+from hobble.hurt.effects import part_of_link
 from hobble.measures.measure import MeasureInputs, Outcome, Row, SampleOptions
 from hobble.measures.sample import captured_motion, sample_to_measure, with_sample
 from hobble.measures.walks import FPS, CrowdTarget, gait_features, generate_walks

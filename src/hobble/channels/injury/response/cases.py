@@ -19,7 +19,7 @@ from hobble.channels.injury.response.results import Divided, IntoAJog, SecondInj
 from hobble.channels.injury.response.sweep import WALK_IN
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
-from hobble.hurt.body_parts import part_of_link
+from hobble.hurt.effects import part_of_link
 from hobble.measures.walks import (
     FPS,
     CrowdTarget,

@@ -1,69 +1,23 @@
-"""Profiles of impairments: how real impaired walks differ from the same people's normal walks.
+"""Derives people.json, the profiles of impaired walks, from recordings of people.
 
-`people.json` was derived with `python -m hobble.hurt IMPAIRED_WALKS.npz` from the recordings of Jun et al.
-2020 ("Pathological gait classification using Kinect v2 and gated recurrent neural networks", IEEE Access 8).
-Ten people each walked normally and imitated five impairments of the right leg. The file holds only means over
-these people.
+python benchmarks/impairment_profiles.py IMPAIRED_WALKS.npz
 """
 
 from __future__ import annotations
 
-import functools
-from dataclasses import asdict, dataclass
+import sys
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from hobble.core.files import load_npz, read_json, write_json
+from hobble.core.files import load_npz, write_json
 from hobble.core.quat import Array
+from hobble.hurt.amounts import CURVES, HARMONICS, PROFILES_FILE, Profile
 
-PROFILES_FILE = Path(__file__).with_name("people.json")
-# Angles over a gait cycle, in degrees. A profile says how each of them changes. The names are those of
-# `hobble.gait.cycles`.
-CURVES = ("trunk_forward", "trunk_left", "pelvis_left_up", "pelvis_turn_left", "shoulders_turn_left")
-HARMONICS = 2  # a profile has the mean and this many harmonics of each curve
 NORMAL = "normal"  # name of the walk without an impairment
 SOURCE = "Jun et al. 2020, IEEE Access 8: means over ten people who imitated impairments of the right leg"
-
-
-@dataclass(frozen=True)
-class Profile:
-    """A walk with an impairment of the right leg, compared with the same people's normal walk.
-
-    Ratios of the impaired walk to the normal walk: speed; stride (time of a cycle); step_hurt, step_sound
-    (length of the step onto the hurt and onto the sound foot); knee (range of the hurt knee's flexion);
-    arm_hurt, arm_sound (how far the arm of the hurt and of the sound side swings).
-
-    Differences: strike: cycles by which the sound foot lands later. stance_hurt, stance_sound: cycles by
-    which a stance is longer. width: leg lengths by which steps are wider. curves: name of CURVES -> 5 numbers
-    in degrees: the change of the curve's mean, then the changes of the factors of cosine and sine of each
-    harmonic. The curve begins when the hurt foot lands. Its time is warped so that the sound foot lands half
-    a cycle later.
-    """
-
-    speed: float
-    stride: float
-    strike: float
-    stance_hurt: float
-    stance_sound: float
-    step_hurt: float
-    step_sound: float
-    width: float
-    knee: float
-    arm_hurt: float
-    arm_sound: float
-    curves: dict[str, list[float]]
-
-    def harmonics(self) -> Array:
-        """(5, 1 + 2 * HARMONICS) the values of `curves`: one row for each of CURVES."""
-        return np.array([self.curves[name] for name in CURVES])
-
-
-@functools.cache
-def read_profiles() -> dict[str, Profile]:
-    """The profiles in PROFILES_FILE by name: antalgic, stiff_legged, steppage, trendelenburg, lurch."""
-    return {name: Profile(**values) for name, values in read_json(PROFILES_FILE)["profiles"].items()}
 
 
 def derive_profiles(walks: str | Path, path: str | Path = PROFILES_FILE) -> None:
@@ -152,3 +106,7 @@ def _round(value: Any) -> Any:
     if isinstance(value, dict):
         return {name: [round(float(x), 2) for x in row] for name, row in value.items()}
     return round(float(value), 3)
+
+
+if __name__ == "__main__":
+    derive_profiles(sys.argv[1])
