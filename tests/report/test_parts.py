@@ -19,7 +19,7 @@ from hobble.report.parts import (
     Table,
     join_sections,
 )
-from hobble.report.templates import chart_specs, load_template, measured_sections
+from hobble.report.templates import chart_specs, load_template, measured_by
 
 
 def chart(name: str) -> Chart:
@@ -42,7 +42,7 @@ def test_sections_with_one_name_are_joined_and_their_parts_sorted() -> None:
     first, second = join_sections([guest, nothing, owner, alone])
     assert (first.name, first.title, first.nav) == ("laps", "Laps", "Laps")
     assert (second.title, second.nav, second.order, second.long) == ("Errors", "E", 10, True)
-    assert [part.kind for part in second.parts] == ["words", "chart", "table"]
+    assert [part.content.kind for part in second.parts] == ["words", "chart", "table"]
 
 
 def test_a_pair_without_charts_is_left_out() -> None:
@@ -53,14 +53,14 @@ def test_a_pair_without_charts_is_left_out() -> None:
         == []
     )
     [shown] = join_sections([PageSection("s", [SectionPart(0, ChartPair([None, chart("a")]))])])
-    assert [part.kind for part in shown.parts] == ["pair"]
+    assert [part.content.kind for part in shown.parts] == ["pair"]
 
 
 @pytest.mark.parametrize("found", [{}, {"applies": False, "reason": "no such input"}])
 def test_a_measurement_that_found_nothing_leaves_no_section(found: dict[str, Any], material: Any) -> None:
     nothing = replace(material, measurements={one.name: found for one in all_measures()})
-    assert measured_sections(material) != []
-    assert measured_sections(nothing) == []
+    assert join_sections(measured_by(material, "section")) != []
+    assert join_sections(measured_by(nothing, "section")) == []
 
 
 def test_charts_are_found_wherever_they_stand() -> None:

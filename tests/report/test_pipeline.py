@@ -7,6 +7,7 @@ import pytest
 
 from hobble.core.errors import InputError
 from hobble.report.provenance import read_benchmark, summarise_pipeline
+from hobble.workflow.kept_files import recorded_seconds
 
 HEADER = "s\th:m:s\tmax_rss\tmax_vms\tmax_uss\tmax_pss\tio_in\tio_out\tmean_load\tcpu_time\n"
 
@@ -74,7 +75,7 @@ def test_times_of_clips_from_earlier_calls_are_counted(tmp_path: Path) -> None:
         record = {"fingerprint": "x", "files": [1], "seconds": seconds}
         (made / f"motion/.{clip}.kept").write_text(json.dumps(record))
     places = {"benchmarks": [str(folder)], "files": [], "batches": ["00"], "made": [str(made)]}
-    (motion,) = summarise_pipeline("c", {"motion": places})["stages"]
+    (motion,) = summarise_pipeline("c", {"motion": places}, recorded_seconds)["stages"]
     assert {rule["rule"]: rule["seconds"] for rule in motion["rules"]} == {"motion_clips": 4.5, "other": 1.0}
     assert (motion["jobs"], motion["seconds"]) == (2, 5.5)
 

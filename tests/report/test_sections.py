@@ -20,7 +20,7 @@ from hobble.rows.clip_rows import load_clip_rows, save_clip_rows
 
 
 def test_sections_of_a_pass_are_spread_evenly_on_the_axis(material: ReportMaterial) -> None:
-    x = sections.passes_axis(material)
+    x = sections.passes_axis(material.history)
     assert (x[0], x[9], x[10], x[-1]) == (pytest.approx(0.1), 1.0, pytest.approx(1.1), 20.0)
 
 

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import base64
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -22,7 +21,6 @@ from hobble.gait.profile import Profile, features, healthy_profile, profile_of_w
 from hobble.gait.recognise import LEANING, PARTS, SIDES, STRENGTHS, Grader, grader_of_all_people
 from hobble.models.network import Network, inverse_or_0
 from hobble.models.packing import to_base64
-from hobble.rows.layout import RowLayout
 from hobble.runtime import (
     bounds,
     caller_targets,
@@ -68,8 +66,12 @@ def playable_data(network: Network, runtime: Runtime) -> dict[str, Any]:
         return {}
     layout = network.layout
     turning = turning_joints(skeleton)
-    outputs, scale = _used_outputs(layout, turning), inverse_or_0(network.x_std)
+    scale = inverse_or_0(network.x_std)
     inputs = np.flatnonzero(scale > NO_EFFECT)
+    # Of the rotations, which are the last block, only those of the joints `turning` are used.
+    rotations = layout.y_joint_rotation.start
+    of_joints = rotations + 3 * np.asarray(turning)[:, None] + np.arange(3)
+    outputs = np.concatenate([np.arange(rotations), of_joints.ravel()])
     legs = feet.leg_joints(skeleton)
     sole = feet.sole_heights(network, legs).tolist()
     parts = feet.foot_parts(skeleton, legs)
@@ -77,10 +79,10 @@ def playable_data(network: Network, runtime: Runtime) -> dict[str, Any]:
         "network": {"kind": network.kind, **network.page_data(inputs, outputs)},
         "recordedPoses": network.plays_recorded_poses,
         "inputColumns": inputs.tolist(),
-        "xMean": to_base64(network.x_mean[inputs].astype(np.float32)),
-        "xScale": to_base64(scale[inputs].astype(np.float32)),
-        "yMean": to_base64(network.y_mean[outputs].astype(np.float32)),
-        "yStd": to_base64(network.y_std[outputs].astype(np.float32)),
+        "xMean": _floats(network.x_mean[inputs]),
+        "xScale": _floats(scale[inputs]),
+        "yMean": _floats(network.y_mean[outputs]),
+        "yStd": _floats(network.y_std[outputs]),
         "turning": turning,
         "joints": layout.joints,
         "names": list(skeleton.joints),
@@ -169,34 +171,27 @@ def turning_joints(skeleton: Skeleton) -> list[int]:
     return sorted(needed)
 
 
-def _used_outputs(layout: RowLayout, turning: Sequence[int]) -> NDArray[np.int64]:
-    """Indices of the outputs that the page uses.
-
-    Of the rotations, which are the last block, only those of the joints `turning` are used. All other outputs
-    are used.
-    """
-    start = layout.y_joint_rotation.start
-    rotations = start + 3 * np.asarray(turning)[:, None] + np.arange(3)
-    return np.concatenate([np.arange(start), rotations.ravel()])
-
-
 def skeleton_of(spec: Mapping[str, Any]) -> Skeleton:
     """The skeleton of a character that `playable_data` packed. It has all that is needed to draw the body."""
     joints, parents = tuple(spec["names"]), tuple(spec["parents"])
     return Skeleton("", joints, parents, np.array(spec["offsets"]), spec["roles"])
 
 
-def _bounds(network: Network, outputs: NDArray[np.int64]) -> dict[str, Any]:
-    """The ranges to which the page clips inputs and outputs, from `hobble.runtime.bounds`.
+def _floats(values: NDArray) -> str:
+    """Numbers as 32-bit floats, packed."""
+    return to_base64(np.asarray(values).astype(np.float32))
 
-    outputs: indices of the outputs that the page uses. The ranges of all inputs are packed.
-    """
-    bounds = Bounds.of(network)
-    y_low, y_high = bounds.y_low[outputs], bounds.y_high[outputs]
-    arrays = {"xLow": bounds.x_low, "xHigh": bounds.x_high, "yLow": y_low, "yHigh": y_high}
-    return {name: to_base64(array.astype(np.float32)) for name, array in arrays.items()} | {
-        "fastest": bounds.fastest,
-        "hips": list(bounds.hips),
+
+def _bounds(network: Network, outputs: NDArray[np.int64]) -> dict[str, Any]:
+    """The ranges to which the page clips all inputs, and the outputs with the indices `outputs`."""
+    found = Bounds.of(network)
+    return {
+        "xLow": _floats(found.x_low),
+        "xHigh": _floats(found.x_high),
+        "yLow": _floats(found.y_low[outputs]),
+        "yHigh": _floats(found.y_high[outputs]),
+        "fastest": found.fastest,
+        "hips": list(found.hips),
     }
 
 
@@ -204,52 +199,16 @@ def _start(network: Network) -> dict[str, Any]:
     """The state in which a character begins, at the origin and facing ahead."""
     state = start_characters(network, 1, np.zeros((1, 2)), np.zeros(1))
     names = ("position", "direction", "gait", "joint_position", "joint_velocity", "joint_rotation")
-    arrays = {name: to_base64(getattr(state, name)[0].astype(np.float32)) for name in names}
-    return {**arrays, "phase": float(state.phase[0])}
+    return {name: _floats(getattr(state, name)[0]) for name in names} | {"phase": float(state.phase[0])}
 
 
 def _constants() -> dict[str, float]:
-    """The constants of the Python runtime, packed so that the page does not define them a second time."""
-    return {
-        "targetMix": trajectory.TARGET_MIX,
-        "gaitMix": trajectory.GAIT_MIX,
-        "still": trajectory.STILL,
-        "steeringLimit": trajectory.STEERING_LIMIT,
-        "correctionRate": trajectory.CORRECTION_RATE,
-        "correctionWithin": trajectory.CORRECTION_WITHIN,
-        "mostCorrection": trajectory.MOST_CORRECTION,
-        "backwardLoss": controller.BACKWARD_LOSS,
-        "pull": controller.PULL,
-        "pullAhead": controller.PULL_AHEAD,
-        "furthestTurn": float(trajectory.FURTHEST_TURN),
-        "strafeFrom": float(trajectory.STRAFE_FROM),
-        "turnInPlace": float(caller_targets.TURN_IN_PLACE),
-        "jogFrom": bounds.JOG_FROM,
-        "lameBelow": bounds.LAME_BELOW,
-        "hurryFactor": bounds.HURRY_FACTOR,
-        "slowestShare": SLOWEST,
-        "sumNorm": SUM_NORM,
-        "lockAt": feet.LOCK_AT,
-        "release": feet.RELEASE,
-        "tooFar": feet.TOO_FAR,
-        "tooFarAlone": feet.TOO_FAR_ALONE,
-        "missed": feet.MISSED,
-        "missedAlone": feet.MISSED_ALONE,
-        "stepFrames": feet.STEP_FRAMES,
-        "stepHeight": feet.STEP_HEIGHT,
-        "fastestTurn": float(network_rows.FASTEST_TURN),
-        "heightMix": feet.HEIGHT_MIX,
-        "fastestLift": feet.FASTEST_LIFT,
-        "floating": feet.FLOATING,
-        "bodyMix": feet.BODY_MIX,
-        "bodyFree": feet.BODY_FREE,
-        "bodyMinContact": feet.BODY_MIN_CONTACT,
-        "mostClimb": network_rows.MOST_CLIMB,
-        "mostAdded": leg_reach.MOST_ADDED,
-        "kneeAhead": leg_reach.KNEE_AHEAD,
-        "stretch": feet.STRETCH,
-        "behind": feet.BEHIND,
-    }
+    """The constants of the Python runtime in camel case, so that the page does not define them again."""
+    found: dict[str, Any] = {"SUM_NORM": SUM_NORM, "SLOWEST_SHARE": SLOWEST}
+    for module in (trajectory, caller_targets, network_rows, controller, bounds, leg_reach, feet):
+        found |= {name: value for name, value in vars(module).items() if name.isupper()}
+    numbers = {name: value for name, value in found.items() if isinstance(value, int | float)}
+    return {_camel_case(name): float(value) for name, value in numbers.items()}
 
 
 # Value of the slider when the page opens, in tenths of the highest: easy to see, but not the maximum.
@@ -341,22 +300,18 @@ def opening_walk(
 ) -> dict[str, Any]:
     """The result of `opening_slider` and, under `walked`, the states of the characters.
 
-    playable, measurements: the arguments of `opening_slider`, which chooses one slider of a channel and its
-    value. A channel is a group of inputs of the network, for example one input for each part of the body.
-
-    The characters have walked straight on for OPENING_FRAMES frames on flat ground. If the network has a
+    playable, measurements: the arguments of `opening_slider`. The characters have walked straight on for
+    OPENING_FRAMES frames on flat ground, so they already walk when the page opens. If the network has a
     channel with sliders, there are two: the first has the slider's value, the second the value 0 everywhere.
     Otherwise there is only one. Names and units in a state are those of the page's state of a character.
     """
     chosen, channel = opening_slider(playable, measurements), opening_channel(playable)
-    if channel is None:
-        return chosen | {"walked": [_state_after_walk(network, runtime, {})]}
-    column = channel["columns"][channel["sliders"][chosen["part"]]]
-    # The value is in tenths of the highest value of the channel.
-    opening_values = {channel["name"]: {column: chosen["value"] / 10 * channel["highest"]}}
-    return chosen | {
-        "walked": [_state_after_walk(network, runtime, values) for values in (opening_values, {})]
-    }
+    values: list[Mapping[str, Mapping[str, float]]] = [{}]
+    if channel is not None:
+        column = channel["columns"][channel["sliders"][chosen["part"]]]
+        # The value is in tenths of the highest value of the channel.
+        values.insert(0, {channel["name"]: {column: chosen["value"] / 10 * channel["highest"]}})
+    return chosen | {"walked": [_state_after_walk(network, runtime, each) for each in values]}
 
 
 def _state_after_walk(
@@ -365,18 +320,17 @@ def _state_after_walk(
     """The state of a character after the opening walk. channels: channel -> column -> value."""
     *_, (animation, pose) = walk_straight(network, runtime, OPENING_FRAMES, channels)  # only the last frame
     state = animation.state
-    out = {_camel_case(name): _plain(np.ravel(getattr(state, name)[0])) for name in FLAT_FIELDS}
-    out |= {_camel_case(name): _plain(getattr(state, name)[0]) for name in NESTED_FIELDS}
-    for axis, (position_key, direction_key) in enumerate((("px", "dx"), ("pz", "dz"))):
-        out[position_key] = _plain(state.position[0, :, axis])
-        out[direction_key] = _plain(state.direction[0, :, axis])
-    out["posePosition"] = _plain(np.ravel(pose.positions))
-    out["poseRotation"] = _plain(np.ravel(pose.rotations))
-    return out | {"contacts": _plain(pose.contacts), "root": _plain(pose.root)}
+    values = {name: np.ravel(getattr(state, name)[0]) for name in FLAT_FIELDS}
+    values |= {name: getattr(state, name)[0] for name in NESTED_FIELDS}
+    for axis, name in enumerate("xz"):
+        values |= {f"p{name}": state.position[0, :, axis], f"d{name}": state.direction[0, :, axis]}
+    values |= {"pose_position": np.ravel(pose.positions), "pose_rotation": np.ravel(pose.rotations)}
+    values |= {"contacts": pose.contacts, "root": pose.root}
+    return {_camel_case(name): _plain(value) for name, value in values.items()}
 
 
 def _camel_case(name: str) -> str:
-    first, *others = name.split("_")
+    first, *others = name.lower().split("_")
     return first + "".join(map(str.title, others))
 
 
@@ -465,10 +419,6 @@ def kind_in_words(label: str, side: str) -> str:
 # for a whole row the error doubles.
 GROUP = 64
 LARGEST_INTEGER = 127
-ROUNDING_WARM_UP, ROUNDING_MEASURED = (
-    60,
-    180,
-)  # frames of walking to get up to speed, and frames that are measured
 
 
 def round_weights(spec: Mapping[str, Any]) -> dict[str, Any]:
@@ -481,36 +431,6 @@ def round_weights(spec: Mapping[str, Any]) -> dict[str, Any]:
         for key, value in spec["network"].items()
     }
     return {**spec, "network": network}
-
-
-def has_weights(spec: Mapping[str, Any]) -> bool:
-    """Whether a character's network has weights, so that `round_weights` changes it."""
-    return any(map(_are_layers, spec["network"].values()))
-
-
-def rounding_error(network: Network, runtime: Runtime) -> float:
-    """The mean distance by which 8-bit weights move a predicted joint, cm, over 3 s of a walk.
-
-    The network must have weights: `has_weights` must be true for its data from `hobble.report.character`.
-    """
-    weights: Any = network.weights  # type: ignore[attr-defined]
-    rounded_weights = type(weights)(_join_groups(*_round_in_groups(w), w.shape) for w in weights)
-    rounded_network = replace(network, weights=rounded_weights)  # type: ignore[call-arg]
-    # The inputs and phases with which the network is evaluated in the measured frames. A frame is evaluated
-    # at the phase that the frame before it ended with.
-    rows, phases, phase_before = [], [], 0.0
-    for frame, (animation, _) in enumerate(
-        walk_straight(network, runtime, ROUNDING_WARM_UP + ROUNDING_MEASURED, {})
-    ):
-        if frame >= ROUNDING_WARM_UP:
-            rows.append(animation.last_inputs[0].copy())
-            phases.append(phase_before)
-        phase_before = float(animation.state.phase[0])
-    x, phase = np.array(rows), np.array(phases)
-    change = (rounded_network.predict(x, phase) - network.predict(x, phase))[
-        :, network.layout.y_joint_position
-    ]
-    return float(np.linalg.norm(change.reshape(len(x), -1, 3), axis=-1).mean())
 
 
 def _are_layers(value: Any) -> bool:
@@ -544,9 +464,3 @@ def _round_in_groups(weights: Array) -> tuple[Array, Array]:
     padded = padded.reshape(*weights.shape[:-1], groups, GROUP)
     factors = np.maximum(np.abs(padded).max(axis=-1) / LARGEST_INTEGER, 1e-30).astype(np.float32)
     return np.round(padded / factors[..., None]).astype(np.int8), factors
-
-
-def _join_groups(integers: Array, factors: Array, shape: tuple[int, ...]) -> Array:
-    """The rounded weights, in their first shape. integers, factors: from `_round_in_groups`."""
-    padded = (integers * factors[..., None]).reshape(*shape[:-1], -1)
-    return np.ascontiguousarray(padded[..., : shape[-1]], np.float32)

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from hobble.figure.pack import packed_body
-from hobble.report.character import body_channel, has_weights, round_weights, skeleton_of
+from hobble.report.character import body_channel, round_weights, skeleton_of
 from hobble.report.parts import (
     Chart,
     Column,
@@ -27,16 +27,8 @@ from hobble.report.parts import (
     line_trace,
     log_axis,
 )
-from hobble.report.provenance import git_commit, machine, versions
-from hobble.report.sections import log_range
-from hobble.report.templates import (
-    FOLDER,
-    chart_specs,
-    compared_by,
-    load_template,
-    mark_safe,
-    page_style,
-)
+from hobble.report.sections import passes_axis, stage_axes
+from hobble.report.templates import chart_specs, compared_by, render_page
 
 LARGEST_PAGE = 19_850_000  # bytes; the page must stay under 20 MB
 RESERVED = 60_000  # bytes of LARGEST_PAGE that are kept free for the page's text, style and tables
@@ -47,7 +39,6 @@ def render_comparison(
     compared: Mapping[str, Any],
     playables: Mapping[str, Mapping[str, Any]] | None = None,
     bundle: str = "",
-    errors: Mapping[str, float] | None = None,
     measures: Sequence[Any] = (),
 ) -> str:
     """The comparison as one HTML document.
@@ -55,49 +46,44 @@ def render_comparison(
     compared: the content of compare.json. playables: configuration -> data of a character that its network
     moves in the page, from `playable_data` in `hobble.report.character`. If these characters do not all fit
     into the page, the weights of all of them are rounded to 8 bits. Characters that still do not fit are left
-    out. bundle: all scripts of the page as one script. errors: configuration -> mean distance in cm by which
-    rounding the weights moves a predicted joint. measures: all measurements, for what they show.
+    out. bundle: all scripts of the page as one script. measures: all measurements, for what they show.
     """
-    errors = errors or {}
-    columns = compared_by(measures, "compared_columns", compared)
+    columns = [column for each in compared_by(measures, "compared_columns", compared) for column in each]
     verdicts = [v for each in compared_by(measures, "compared_verdicts", compared) for v in each]
     sections: dict[str, dict[str, Any]] = {
         "overview": {
             "verdicts": sorted(verdicts, key=lambda verdict: verdict.order),
-            "table": configuration_table(compared, [column for each in columns for column in each]),
+            "table": configuration_table(compared, columns),
             "published": published_table(compared),
         },
         "training": {"curves": training_curves(compared)},
         "stages": {"charts": stage_charts(compared)},
     }
+    playables = playables or {}
     measurements = join_sections(compared_by(measures, "compared_section", compared))
     names = configuration_names(compared)
     charts = chart_specs([sections, measurements])
     # Configurations with the same skeleton share a body. Its key is in the entry `body` of a character.
-    bodies = {spec["body"]: packed_body(skeleton_of(spec)) for spec in (playables or {}).values()}
+    bodies = {spec["body"]: packed_body(skeleton_of(spec)) for spec in playables.values()}
     used = len(bundle.encode()) + len(embedded(charts).encode()) + len(embedded(bodies).encode())
     on_page, left_out = select_fitting(playables or {}, LARGEST_PAGE - RESERVED - used)
-    rounded_names: list[str] = []
+    rounded = {name: round_weights(spec) for name, spec in playables.items()} if left_out else {}
     if left_out:
-        rounded_names = [name for name, spec in (playables or {}).items() if has_weights(spec)]
-        smaller = {name: round_weights(spec) for name, spec in (playables or {}).items()}
-        on_page, left_out = select_fitting(smaller, LARGEST_PAGE - RESERVED - used)
+        on_page, left_out = select_fitting(rounded, LARGEST_PAGE - RESERVED - used)
     bodies = {spec["body"]: bodies[spec["body"]] for spec in on_page.values()}
-    data = {"name": NAME, "charts": charts, "playable": on_page, "bodies": bodies}
-    return load_template("compare.html.j2").render(
+    return render_page(
+        "compare.html.j2",
+        {"name": NAME, "charts": charts, "playable": on_page, "bodies": bodies},
+        bundle,
         name=NAME,
         measured_sections=measurements,
         title=" and ".join(names) if len(names) < 3 else f"{len(names)} configurations",
         eyebrow="Hobble report · comparison of configurations",
         lead="The same measurements of " + ", ".join(names) + ", compared with published results.",
-        embedded={name: embedded(part) for name, part in data.items()},
         playable=list(on_page),
         left_out=left_out,
-        rounding=[(name, errors[name]) for name in rounded_names if name in on_page and name in errors],
+        rounded=any(rounded[name] != playables[name] for name in on_page if name in rounded),
         hurts=any(body_channel(spec) for spec in on_page.values()),
-        style=page_style(),
-        bundle=mark_safe("the bundle", bundle),
-        provenance={"commit": git_commit(FOLDER), "machine": machine(), "versions": versions()},
         **sections,
     )
 
@@ -132,21 +118,17 @@ def training_curves(compared: Compared) -> Chart | None:
     """Training and held-out error of all configurations. A menu selects the horizontal axis, see X_AXES."""
     options: dict[str, list[Trace]] = {}
     values: list[float | None] = []
+    colours = configuration_colours(compared)
     for key, label in X_AXES.items():
-        traces = []
         for entry in compared["training"]:
-            name = entry["configuration"]
-            x = _passes_done(entry) if key == "pass" else entry.get(key, [])
-            colour = configuration_colours(compared)[name]
-            held_out = entry.get("held_out_mse", [])
+            name, traces = entry["configuration"], options.setdefault(label, [])
+            x = passes_axis(entry) if key == "pass" else entry.get(key, [])
+            train, held_out = entry.get("train_mse", []), entry.get("held_out_mse", [])
             if any(v is not None for v in held_out):
-                traces.append(line_trace(f"{name}, held out", x, held_out, colour))
+                traces.append(line_trace(f"{name}, held out", x, held_out, colours[name]))
                 values += held_out
-            train = entry.get("train_mse", [])
-            traces.append(line_trace(f"{name}, training", x, train, colour, width=1.2, dash="dot"))
+            traces.append(line_trace(f"{name}, training", x, train, colours[name], width=1.2, dash="dot"))
             values += train
-        if traces:
-            options[label] = traces
     if not options:
         return None
     return Chart(
@@ -171,32 +153,15 @@ def stage_charts(compared: Compared) -> list[Chart]:
         ("seconds", "Time of each stage", "seconds, sum over all jobs", format_duration),
         ("bytes", "Size of each stage", "bytes on disk", format_bytes),
     ):
-        values = [stage.get(key) or 0 for stage in compared["stages"]]
         traces = []
         for name, colour in configuration_colours(compared).items():
             rows = [s for s in compared["stages"] if s["configuration"] == name and s.get(key)]
-            trace = dot_trace(
-                name, [s[key] for s in rows], [s["stage"] for s in rows], colour, "%{y}: %{text}"
-            )
-            traces.append(trace | {"text": [as_text(s[key]) for s in rows]})
-        layout = {
-            "xaxis": axis(label, type="log", tickformat="~s", dtick=1, range=log_range(values)),
-            "yaxis": {"automargin": True, "categoryorder": "array", "categoryarray": order},
-        }
+            x, y = [s[key] for s in rows], [s["stage"] for s in rows]
+            traces.append(dot_trace(name, x, y, colour, "%{y}: %{text}") | {"text": list(map(as_text, x))})
+        layout = stage_axes(label, [stage.get(key) or 0 for stage in compared["stages"]], order)
         caption = "The stages that prepare a data set run only once for all configurations that use it."
         charts.append(Chart(f"compare-{key}", title, caption, traces, layout, 110 + 32 * len(order)))
     return charts
-
-
-def _passes_done(entry: Mapping[str, Any]) -> list[float]:
-    """How many passes were done at the end of each section of training. A section is a part of a pass.
-
-    entry: an entry of `training` in compare.json.
-    """
-    sections = [s for s in entry.get("section", ()) if s is not None]
-    per_pass = max(sections, default=1)
-    passes = zip(entry.get("pass", ()), entry.get("section", ()), strict=True)
-    return [pass_number - 1 + section / per_pass for pass_number, section in passes]
 
 
 # Published measure -> a longer name, if its own name is unclear.
@@ -245,11 +210,5 @@ def published_table(compared: Compared) -> Table:
         measure = LONGER_NAMES.get(row["measure"], row["measure"])
         measure += ", mean" if row["unit"] == "ms" and not measure.startswith("standard") else ""
         rows.append([measure, row["configuration"], *texts, citation(row, sources)])
-    columns = [
-        Column("measure"),
-        Column("configuration"),
-        Column("published"),
-        Column("ours"),
-        Column("source"),
-    ]
-    return Table("compare-published", columns, rows, "Comparison with published results")
+    heads = [Column(label) for label in ("measure", "configuration", "published", "ours", "source")]
+    return Table("compare-published", heads, rows, "Comparison with published results")

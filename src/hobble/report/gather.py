@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -10,7 +10,6 @@ from typing import Any
 from hobble.core.files import Json, read_json, read_numbers
 from hobble.core.untrusted import read_yaml
 from hobble.models.load import load_network
-from hobble.report.pipeline_results import Pipeline
 
 PUBLISHED = Path(__file__).with_name("published.yaml")
 # Columns of the training history. Each further column has the held-out error of one block of the network's
@@ -38,7 +37,7 @@ class ReportMaterial:
     splits: Mapping[str, str] = field(repr=False)
     resolved: Mapping[str, Any] = field(repr=False)
     measurements: Mapping[str, Json] = field(repr=False)
-    pipeline: Pipeline = field(repr=False)
+    pipeline: Json = field(repr=False)
     history: Mapping[str, list[float | None]] = field(repr=False)
     network: Mapping[str, Any] = field(repr=False)
     motion: list[dict[str, Any]] = field(repr=False)
@@ -74,37 +73,30 @@ def gather(
     dataset: str,
     title: str | None,
     splits: Mapping[str, str],
-    configuration: str,
-    measurements: Iterable[str],
-    pipeline: str,
-    history: str,
-    weights: str,
-    motion: Iterable[str],
-    labels: Iterable[str],
-    channels: Iterable[str],
-    terrain: Iterable[str] = (),
-    rows: Iterable[str] = (),
     measures: Sequence[Any] = (),
+    **files: Any,
 ) -> ReportMaterial:
-    """Read the files of a report. All arguments after `splits` are paths, but `measures`.
+    """Read the files of a report. name, dataset, title, splits, measures: see `ReportMaterial`.
 
-    Raises InputError, which names the file, if one cannot be read.
+    files: paths, with the keys `configuration`, `pipeline`, `history` and `weights`, one path each, and
+    `measurements`, `motion`, `labels`, `channels`, `terrain` and `rows`, some paths each. Raises InputError,
+    which names the file, if one cannot be read.
     """
     return ReportMaterial(
         name=name,
         dataset=dataset,
         title=title,
         splits=dict(splits),
-        resolved=read_yaml(configuration) or {},
-        measurements={Path(path).stem: read_json(path) for path in measurements},
-        pipeline=read_json(pipeline),
-        history=read_numbers(history),
-        network=describe_network(weights),
-        motion=[read_json(path) for path in motion],
-        labels=[read_json(path) for path in labels],
-        channels=[read_json(path) for path in channels],
-        terrain_files=list(terrain),
-        row_files=list(rows),
+        resolved=read_yaml(files["configuration"]) or {},
+        measurements={Path(path).stem: read_json(path) for path in files["measurements"]},
+        pipeline=read_json(files["pipeline"]),
+        history=read_numbers(files["history"]),
+        network=describe_network(files["weights"]),
+        motion=list(map(read_json, files["motion"])),
+        labels=list(map(read_json, files["labels"])),
+        channels=list(map(read_json, files["channels"])),
+        terrain_files=list(files.get("terrain", ())),
+        row_files=list(files.get("rows", ())),
         published=read_yaml(PUBLISHED),
         measures=measures,
     )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -16,30 +16,25 @@ from hobble.figure.pack import packed_body
 from hobble.report import data_section as data
 from hobble.report import sections as own
 from hobble.report.character import body_channel, opening_channel, opening_slider
-from hobble.report.data_section import TURN_EDGES
 from hobble.report.gather import ReportMaterial
 from hobble.report.parts import (
     Hint,
     KeyFigure,
-    embedded,
     format_bytes,
     format_duration,
     format_number,
+    join_sections,
     json_data,
     with_order,
 )
-from hobble.report.provenance import git_commit, machine, versions
 from hobble.report.recorded_motion import ground_pictures
-from hobble.report.templates import (
-    FOLDER,
-    chart_specs,
-    load_template,
-    mark_safe,
-    measured_figures,
-    measured_hints,
-    measured_sections,
-    page_style,
-)
+from hobble.report.templates import chart_specs, measured_by, render_page
+
+# Degrees a second: slower turning is not counted, because the body sways that much in a straight walk.
+TURNING = 40.0
+LITTLE_TURNING = 0.01  # if turning takes less than this share of the time, the page warns
+LITTLE_OF_A_GAIT = 0.03  # the same for each gait
+KIND_ORDER = ("warn", "note", "good", "fact")  # kinds of hints, in the order of the page
 
 
 def render_report(
@@ -55,50 +50,52 @@ def render_report(
     scenes: from `recorded_motion.packed_scenes`. playable: from `character.playable_data` or
     `character.playable_with_recogniser`. captured_and_predicted: from `recorded_motion.packed_comparisons`.
     bundle: the page's scripts, from `bundle.bundle_page_scripts`. hero: the top of the page, from
-    `character.opening_walk`. A section without data is left out. Without `hero`,
-    the characters at the top begin in the network's start frame.
-
-    Texts from the user's files cannot become HTML: the template escapes every value, and the data for the
-    scripts is JSON without any "<".
+    `character.opening_walk`. A section without data is left out. Without `hero`, the characters at the top
+    begin in the network's start frame.
     """
     clips = data.choose_clips(material)
     terrain = data.files_of_clips(material.terrain_files, clips)
-    row_files = data.sample_files(material.row_files)
     # Seconds of data at each speed, turning speed and channel value.
+    row_files = data.sample_files(material.row_files)
     counted = data.seconds_of_data(row_files, material.splits, all_clips=len(material.row_files))
     sections = _sections(material, counted, clips, terrain)
-    measurements = measured_sections(material)
-    scenes, playable = dict(scenes or {}), playable or {}
-    captured_and_predicted = captured_and_predicted or {}
-    strips = data.clip_strips(material, clips)  # the labels of each clip over time
+    measured_sections = join_sections(measured_by(material, "section"))
+    scenes, playable, compared = dict(scenes or {}), playable or {}, captured_and_predicted or {}
+    strips = data.clip_strips(material, clips)
     grounds = ground_pictures(terrain, material.network["skeleton"])
-    playables = {material.name: playable} if playable else {}
-    embedded_data = {
-        "charts": chart_specs([sections, measurements]),
+    for_scripts = {
+        "charts": chart_specs([sections, measured_sections]),
         "bodies": _bodies(material),
         "hero": hero or opening_slider(playable, material.measurements.values()),
         "scenes": scenes,
         "strips": strips,
         "grounds": grounds,
         "name": material.name,
-        "playable": playables,
-        "compare": captured_and_predicted,
+        "playable": {material.name: playable} if playable else {},
+        "compare": compared,
     }
-    return load_template("page.html.j2").render(
+    resolved = json_data(dict(material.resolved))
+    return render_page(
+        "page.html.j2",
+        for_scripts,
+        bundle,
         material=material,
-        measured_sections=measurements,
+        name=material.name,
+        title=material.title or material.name,
+        titled=bool(material.title),
+        eyebrow=f"Hobble report · configuration {material.name} · data set {material.dataset}",
+        lead=lead_text(material),
+        hurts=body_channel(playable) is not None,  # whether the reader can hurt parts of the body
+        shown_channel=opening_channel(playable),
+        measured_sections=measured_sections,
         figures=key_figures(material),
         hints=hints(material, counted["turns"]),
-        embedded={name: embedded(part) for name, part in embedded_data.items()},
         scene_names=[scene["name"] for scene in scenes.get("scenarios", ())],
-        playable=playables,
-        captured_and_predicted=[clip["name"] for clip in captured_and_predicted.get("clips", ())],
+        playable=for_scripts["playable"],
+        captured_and_predicted=[clip["name"] for clip in compared.get("clips", ())],
         grounds=[picture["name"] for picture in grounds["pictures"]],
         strips=[strip["clip"] for strip in strips],
-        style=page_style(),
-        bundle=mark_safe("the bundle", bundle),
-        **_top_values(material, playable),
-        **_origin_values(material),
+        configuration=yaml.safe_dump(resolved, sort_keys=False, allow_unicode=True),
         **sections,
     )
 
@@ -111,40 +108,15 @@ def _bodies(material: ReportMaterial) -> dict[str, Any]:
     return {mesh_key(figure): packed_body(figure)}
 
 
-def _top_values(material: ReportMaterial, playable: Mapping[str, Any]) -> dict[str, Any]:
-    """The template's values for the part above the first section.
-
-    `hurts`: whether the reader can set a value for parts of the character's body. `shown_channel`: the
-    channel that the reader can set at the top, or None.
-    """
-    return {
-        "name": material.name,
-        "title": material.title or material.name,
-        "titled": bool(material.title),
-        "eyebrow": f"Hobble report · configuration {material.name} · data set {material.dataset}",
-        "lead": lead_text(material),
-        "hurts": body_channel(playable) is not None,
-        "shown_channel": opening_channel(playable),
-    }
-
-
-def _origin_values(material: ReportMaterial) -> dict[str, Any]:
-    """The template's values for the last sections: the configuration, and what the page was made with."""
-    resolved = json_data(dict(material.resolved))
-    return {
-        "configuration": yaml.safe_dump(resolved, sort_keys=False, allow_unicode=True),
-        "provenance": {"commit": git_commit(FOLDER), "machine": machine(), "versions": versions()},
-    }
-
-
 def _sections(
     material: ReportMaterial, counted: Mapping[str, Any], clips: frozenset[str], terrain: list[str]
 ) -> dict[str, dict[str, Any]]:
     """Section -> name in the template -> chart, table or list of charts; None if there is nothing to show.
 
-    counted: from `seconds_of_data`. clips: names of the clips that are shown one by one. terrain:
-    files of their terrain fits.
+    counted: from `seconds_of_data`. clips: names of the clips that are shown one by one. terrain: files of
+    their terrain fits.
     """
+    seconds, sizes = own.stage_charts(material)
     return {
         "training": {
             "curve": own.learning_curve(material),
@@ -152,10 +124,7 @@ def _sections(
             "table": own.history_table(material),
         },
         "terrain": own.terrain_section(terrain),
-        "stages": {
-            **dict(zip(("seconds", "bytes"), own.stage_charts(material), strict=True)),
-            "table": own.stage_table(material),
-        },
+        "stages": {"seconds": seconds, "bytes": sizes, "table": own.stage_table(material)},
         "data": {
             "gaits": data.gait_chart(material),
             "speeds": data.speed_chart(material),
@@ -169,76 +138,69 @@ def _sections(
     }
 
 
-# Degrees a second: slower turning is not counted, because the body sways that much in a straight walk.
-TURNING = 40.0
-LITTLE_TURNING = 0.01  # if turning takes less than this share of the time, the page warns
-# Kinds of hints, in the order of the page.
-KIND_ORDER = ("warn", "note", "good", "fact")
-
-
 def _training_options(material: ReportMaterial) -> Mapping[str, Any]:
     """The options of training in the configuration; empty if they are not known."""
     return (material.resolved.get("configuration") or {}).get("training") or {}
 
 
+def _held_out_count(material: ReportMaterial) -> int:
+    return sum(material.split_of(report["clip"]) == "held_out" for report in material.motion)
+
+
 def lead_text(material: ReportMaterial) -> str:
     """A sentence or two on the network and its training data."""
-    clips = [report["clip"] for report in material.motion]
-    held_out = sum(material.split_of(clip) == "held_out" for clip in clips)
-    frames = sum(report.get("frames", 0) for report in material.motion)
-    passes = _training_options(material).get("passes")
-    network = material.network
-    text = (
-        f"A {network['described']}, with {network['inputs']} inputs and {network['outputs']} outputs, trained"
-        if network["sizes"]
-        else f"A character driven by {network['described']}, built"
-    )
-    text += f" for {passes:g} passes" if passes and network["sizes"] else ""
-    text += f" on {len(clips) - held_out} clips of the data set {material.dataset}"
+    network, held_out, count = material.network, _held_out_count(material), len(material.motion)
+    text = f"A character driven by {network['described']}, built"
+    if network["sizes"]:
+        columns = f"{network['inputs']} inputs and {network['outputs']} outputs"
+        text = f"A {network['described']}, with {columns}, trained"
+        passes = _training_options(material).get("passes")
+        text += f" for {passes:g} passes" if passes else ""
+    text += f" on {count - held_out} clips of the data set {material.dataset}"
     text += f", and tested on {held_out} held-out clips" if held_out else ""
+    frames = sum(report.get("frames", 0) for report in material.motion)
     return f"{text}. All clips together have {frames:,} frames at 60\u00a0Hz."
 
 
 def key_figures(material: ReportMaterial) -> list[KeyFigure]:
     """The numbers at the top of the page, most important first."""
-    # The last argument of a KeyFigure is its place among the figures, which are sorted by it.
-    figures = measured_figures(material)
+    figures = [figure for shown in measured_by(material, "figures") for figure in shown]
     seconds = sum(report.get("seconds", 0) for report in material.motion)
     if seconds:
-        held_out = sum(material.split_of(report["clip"]) == "held_out" for report in material.motion)
-        note = f"{len(material.motion)} clips, {held_out} of them held out"
+        note = f"{len(material.motion)} clips, {_held_out_count(material)} of them held out"
         value, _, unit = format_duration(seconds).partition(" ")
-        figures.append(KeyFigure("Motion data", value, unit, note, 30))
-    network = material.network
-    # A PFNN has a set of weights at each control point, and `parameters` counts one of these sets. For other
-    # networks it counts all parameters. Motion matching has no layers, so its `sizes` are empty.
-    which = " at each control point" if "control points" in network["described"] else ""
-    note = f"parameters{which}; layers of {'–'.join(map(str, network['sizes']))}"
-    note = (
-        f"{note if network['sizes'] else 'numbers in its tables'}; {format_bytes(network['bytes'])} on disk"
-    )
-    figures.append(KeyFigure("Network", format_number(network["parameters"] / 1e6, 3), "M", note, 40))
-    total = material.pipeline.get("total_seconds")
-    if total:
+        figures.append(KeyFigure("Motion data", value, unit, note, order=30))
+    figures.append(_network_figure(material.network))
+    if total := material.pipeline.get("total_seconds"):
         value, _, unit = format_duration(total).partition(" ")
-        written = format_bytes(material.pipeline.get("total_bytes"))
         note = (
             "sum over all jobs, from clips to measurements; jobs can run in parallel, so the run can be "
-            f"shorter; {written} written"
+            f"shorter; {format_bytes(material.pipeline.get('total_bytes'))} written"
         )
-        figures.append(KeyFigure("Whole pipeline", value, unit, note, 50))
+        figures.append(KeyFigure("Whole pipeline", value, unit, note, order=50))
     return sorted(figures, key=lambda figure: figure.order)
+
+
+def _network_figure(network: Mapping[str, Any]) -> KeyFigure:
+    """Number of parameters, layers and size on disk. network: from `gather.describe_network`."""
+    # A PFNN has a set of weights at each control point, and `parameters` counts one of these sets. For other
+    # networks it counts all parameters. Motion matching has no layers, so its `sizes` are empty.
+    note = "numbers in its tables"
+    if network["sizes"]:
+        which = " at each control point" if "control points" in network["described"] else ""
+        note = f"parameters{which}; layers of {'–'.join(map(str, network['sizes']))}"
+    note += f"; {format_bytes(network['bytes'])} on disk"
+    return KeyFigure("Network", format_number(network["parameters"] / 1e6, 3), "M", note, order=40)
 
 
 def hints(material: ReportMaterial, turns: Mapping[str, Array] | None = None) -> list[Hint]:
     """Warnings and advice in the order in which to follow them, then what is good, then plain facts.
 
-    turns: split -> seconds in each bin of `coverage.TURN_EDGES`, if they were counted.
+    turns: split -> seconds in each bin of `data_section.TURN_EDGES`, if they were counted.
     """
-    # The first argument of `with_order` is the place among hints of the same kind, `order` in
-    # `hobble.report.parts.Hint`.
+    # The first argument of `with_order` is the place among hints of the same kind, see `parts.Hint`.
     found = [
-        *measured_hints(material),
+        *(hint for shown in measured_by(material, "hints") for hint in shown),
         *with_order(10, _gait_hints(material)),  # before training, which cannot make up for missing data
         *with_order(10, _turning_hints(turns or {})),
         *with_order(11, _repair_hints(material)),
@@ -250,14 +212,13 @@ def hints(material: ReportMaterial, turns: Mapping[str, Array] | None = None) ->
 
 def _training_hints(material: ReportMaterial) -> Iterator[Hint]:
     """Whether the held-out error rises, still falls, or has stopped falling."""
-    history = material.history
-    curve = zip(history.get("pass", ()), history.get("held_out_mse", ()), strict=False)
+    curve = zip(material.history.get("pass", ()), material.history.get("held_out_mse", ()), strict=False)
     points = [(p, error) for p, error in curve if p is not None and error is not None]
     if len(points) < 8:  # with fewer values, a trend is only noise
         return
-    passes, errors = zip(*points, strict=True)
+    passes, errors = np.array(points).T
     # The error is measured several times in a pass. One value is noisy, so compare means over passes.
-    means = {p: np.mean([error for q, error in points if q == p]) for p in passes}
+    means = {p: errors[passes == p].mean() for p in dict.fromkeys(passes)}
     best = min(means, key=lambda p: means[p])
     if means[passes[-1]] > 1.05 * means[best]:
         yield Hint(
@@ -266,12 +227,11 @@ def _training_hints(material: ReportMaterial) -> Iterator[Hint]:
             "The network overfits: train for fewer passes, with more dropout, or on more data.",
         )
         return
-    quarter = max(1, len(errors) // 4)
-    before, after = np.mean(errors[-2 * quarter : -quarter]), np.mean(errors[-quarter:])
-    fall = 1 - after / before
     if _training_options(material).get("schedule", "constant") != "constant":
         # The error fell because the learning rate fell, so it does not show whether more passes would help.
         return
+    quarter = max(1, len(errors) // 4)
+    fall = 1 - errors[-quarter:].mean() / errors[-2 * quarter : -quarter].mean()
     if fall > 0.03:
         yield Hint(
             "note",
@@ -288,23 +248,19 @@ def _gait_hints(material: ReportMaterial) -> Iterator[Hint]:
     for report in material.labels:
         for gait, seconds in (report.get("seconds") or {}).items():
             totals[gait] = totals.get(gait, 0.0) + seconds
-    everything = sum(totals.values())
-    if everything and not totals.get("stand"):
+    little = LITTLE_OF_A_GAIT * sum(totals.values())
+    if little and not totals.get("stand"):
         yield Hint(
             "warn",
             "Nobody stands, starts or stops in these clips.",
             "So the character steps on the spot when it should stand, and more training will not change "
             "that. Add clips in which somebody stands, starts and stops.",
         )
-    scarce = [
-        gait
-        for gait, seconds in totals.items()
-        if 0 < seconds < 0.03 * everything and gait not in ("jump", "bump")
-    ]
+    scarce = sorted(g for g, seconds in totals.items() if 0 < seconds < little and g not in ("jump", "bump"))
     if scarce:
         yield Hint(
             "note",
-            f"There is little data of {' and '.join(sorted(scarce))}:",
+            f"There is little data of {' and '.join(scarce)}:",
             f"less than three per cent of the time{' each' if len(scarce) > 1 else ''}. Add clips, or expect "
             "the character to be unsteady there.",
         )
@@ -315,7 +271,7 @@ def _turning_hints(turns: Mapping[str, Array]) -> Iterator[Hint]:
     seconds = np.sum(list(turns.values()), axis=0)
     if not np.any(seconds):
         return
-    middles = (TURN_EDGES[:-1] + TURN_EDGES[1:]) / 2  # of the bins, degrees a second
+    middles = (data.TURN_EDGES[:-1] + data.TURN_EDGES[1:]) / 2  # of the bins, degrees a second
     share = float(np.sum(seconds[np.abs(middles) > TURNING]) / np.sum(seconds))
     if share < LITTLE_TURNING:
         yield Hint(
@@ -329,23 +285,24 @@ def _turning_hints(turns: Mapping[str, Array]) -> Iterator[Hint]:
 
 def _repair_hints(material: ReportMaterial) -> Iterator[Hint]:
     """How many clips were repaired or have warnings."""
-    repaired = {report["clip"] for report in material.motion if report.get("repairs")}
-    with_warnings = (report for report in (*material.labels, *material.channels) if report.get("warnings"))
-    warned = {report["clip"] for report in with_warnings}
+
+    def clips_with(key: str, reports: Sequence[Mapping[str, Any]]) -> int:
+        return len({report["clip"] for report in reports if report.get(key)})
+
+    repaired = clips_with("repairs", material.motion)
+    warned = clips_with("warnings", [*material.labels, *material.channels])
     if repaired or warned:
         yield Hint(
             "note",
-            f"Some clips were repaired ({len(repaired)}) or have warnings ({len(warned)}).",
+            f"Some clips were repaired ({repaired}) or have warnings ({warned}).",
             "They are listed under Data. Look at them, because the network also learns the errors in a clip.",
         )
 
 
 def _cost_hints(material: ReportMaterial) -> Iterator[Hint]:
     """The stage that took more than half of the time, if any."""
-    stages = material.pipeline.get("stages") or []
     total = material.pipeline.get("total_seconds") or 0
-    if stages and total:
-        slowest = max(stages, key=lambda stage: stage["seconds"])
-        share = slowest["seconds"] / total
-        if share > 0.5:
-            yield Hint("fact", f"The {slowest['stage']} stage took {100 * share:.0f} % of the time.", "")
+    for stage in material.pipeline.get("stages") or ():
+        if stage["seconds"] > 0.5 * total > 0:
+            share = 100 * stage["seconds"] / total
+            yield Hint("fact", f"The {stage['stage']} stage took {share:.0f} % of the time.", "")

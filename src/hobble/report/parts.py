@@ -10,7 +10,7 @@ import json
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from markupsafe import Markup
@@ -71,15 +71,11 @@ def json_data(value: Any) -> Any:
     """`value` as plain JSON data: tuples and arrays become lists, NaN and infinities become None."""
     if isinstance(value, dict):
         return {str(key): json_data(item) for key, item in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [json_data(item) for item in value]
-    if isinstance(value, np.ndarray):
+    if isinstance(value, np.ndarray | np.generic):
         return json_data(value.tolist())
-    if isinstance(value, np.generic):
-        return json_data(value.item())
-    if isinstance(value, float):
-        return value if math.isfinite(value) else None
-    return value
+    if isinstance(value, list | tuple):
+        return [json_data(item) for item in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def embedded(value: Any) -> Markup:
@@ -107,6 +103,7 @@ class Chart:
     the menu's label. option_layouts: text in the menu -> changes of the layout.
     """
 
+    kind: ClassVar[str] = "chart"
     name: str
     title: str
     caption: str
@@ -139,6 +136,7 @@ class ChartGroup:
     "" for no menu.
     """
 
+    kind: ClassVar[str] = "family"
     name: str
     title: str
     caption: str
@@ -186,6 +184,22 @@ def line_trace(name: str, x: Sequence, y: Sequence, colour: str, **more: Any) ->
     return {"type": "scatter", "mode": mode, "name": name, "x": list(x), "y": list(y), "line": stroke, **more}
 
 
+def bar_trace(name: str, x: Sequence, y: Sequence, colour: str, hover: str) -> Trace:
+    """The trace of bars at x with heights y. hover: template of the text when the pointer is on a bar."""
+    trace: Trace = {"type": "bar", "name": name, "x": list(x), "y": list(y)}
+    return trace | {"marker": {"color": colour}, "hovertemplate": hover}
+
+
+def log_range(values: Iterable[float]) -> list[float]:
+    """The two ends of a logarithmic axis for `values`, as exponents of ten.
+
+    It begins with the whole decade below the smallest positive value. Beyond the largest value there is room
+    for a text.
+    """
+    powers = [math.log10(value) for value in values if value > 0] or [0.0, 1.0]
+    return [math.floor(min(powers)), max(powers) + 0.4 * (max(powers) - math.floor(min(powers)) + 1)]
+
+
 def reference_line(
     value: float, text: str, vertical: bool = True, colour: str = "@soft"
 ) -> tuple[dict, dict]:
@@ -225,6 +239,16 @@ class Column:
         """A column of whole numbers."""
         return cls(label, lambda value: f"{value:,.0f}", "n")
 
+    @classmethod
+    def duration(cls, label: str) -> Column:
+        """A column of seconds."""
+        return cls(label, lambda value: format_duration(float(value)), "n")
+
+    @classmethod
+    def size(cls, label: str) -> Column:
+        """A column of bytes."""
+        return cls(label, lambda value: format_bytes(float(value)), "n")
+
 
 @dataclass(frozen=True)
 class Table:
@@ -234,10 +258,22 @@ class Table:
     line above the table; a click on it folds or unfolds the table.
     """
 
+    kind: ClassVar[str] = "table"
     name: str
     columns: Sequence[Column]
     rows: Sequence[Sequence[Any]] = field(repr=False)
     title: str = "Table of the values"
+
+    @classmethod
+    def of(
+        cls,
+        name: str,
+        columns: Mapping[str, Column],
+        records: Iterable[Mapping[str, Any]],
+        title: str = "Table of the values",
+    ) -> Table:
+        """A table with a row for each of `records`. columns: key of the records -> column."""
+        return cls(name, list(columns.values()), [[r.get(key) for key in columns] for r in records], title)
 
     @property
     def cells(self) -> list[list[tuple[str, str, str]]]:
@@ -349,6 +385,7 @@ def verdict_on_lowest(
 class Paragraph:
     """A paragraph. Markup is not escaped, so only text from the source code may be Markup."""
 
+    kind: ClassVar[str] = "words"
     text: str | Markup
 
 
@@ -356,6 +393,7 @@ class Paragraph:
 class KeyFigures:
     """A row of key figures."""
 
+    kind: ClassVar[str] = "numbers"
     figures: Sequence[KeyFigure]
 
 
@@ -363,6 +401,7 @@ class KeyFigures:
 class ChartPair:
     """Charts side by side, if the window is wide enough. None: there is nothing to show in this place."""
 
+    kind: ClassVar[str] = "pair"
     charts: Sequence[Chart | None]
 
 
@@ -370,20 +409,11 @@ class ChartPair:
 class TemplatePart:
     """A part that a script of the page draws. template: file name of its HTML in this folder."""
 
+    kind: ClassVar[str] = "fragment"
     template: str
 
 
 Content = Chart | ChartGroup | Table | Paragraph | KeyFigures | ChartPair | TemplatePart
-# Type of content -> its kind, which the page's template reads.
-KINDS: dict[type, str] = {
-    Chart: "chart",
-    ChartGroup: "family",
-    Table: "table",
-    Paragraph: "words",
-    KeyFigures: "numbers",
-    ChartPair: "pair",
-    TemplatePart: "fragment",
-}
 
 
 @dataclass(frozen=True)
@@ -400,11 +430,6 @@ class SectionPart:
     tall: bool = False
     open: bool = False
     short: bool = False
-
-    @property
-    def kind(self) -> str:
-        """Name of the kind of content, for the template."""
-        return KINDS[type(self.content)]
 
 
 @dataclass(frozen=True)
@@ -435,9 +460,8 @@ def join_sections(sections: Iterable[PageSection]) -> list[PageSection]:
         by_name.setdefault(section.name, []).append(section)
     out = []
     for name, same_name in by_name.items():
-        parts = sorted(
-            (p for s in same_name for p in s.parts if _is_shown(p.content)), key=lambda part: part.order
-        )
+        parts = [p for s in same_name for p in s.parts if p.content is not None and _has_charts(p.content)]
+        parts.sort(key=lambda part: part.order)
         titled = next((s for s in same_name if s.title), same_name[0])
         title = titled.title or name.replace("_", " ").capitalize()
         if parts:
@@ -445,11 +469,9 @@ def join_sections(sections: Iterable[PageSection]) -> list[PageSection]:
     return sorted(out, key=lambda section: section.order)
 
 
-def _is_shown(content: Content | None) -> bool:
-    """Whether the content has anything to show."""
-    if isinstance(content, ChartPair):
-        return any(chart is not None for chart in content.charts)
-    return content is not None
+def _has_charts(content: Content) -> bool:
+    """False for a pair or group of charts without any chart."""
+    return any(getattr(content, "charts", (True,)))
 
 
 Compared = Mapping[str, Any]  # the content of compare.json
@@ -470,17 +492,10 @@ def configuration_colours(compared: Compared) -> dict[str, str]:
 
 
 def dot_trace(name: str, x: Sequence, y: Sequence, colour: str, hover: str) -> Trace:
-    """A plotly trace with a dot at each point x, y. name: the configuration. hover: template of the text that
-    appears when the pointer is on a dot."""
-    return {
-        "type": "scatter",
-        "mode": "markers",
-        "name": name,
-        "x": list(x),
-        "y": list(y),
-        "marker": {"color": colour, "size": 9, "opacity": 0.85},
-        "hovertemplate": f"{hover}<extra>%{{fullData.name}}</extra>",
-    }
+    """A dot at each point x, y. name: the configuration. hover: template of the text at a dot."""
+    trace: Trace = {"type": "scatter", "mode": "markers", "name": name, "x": list(x), "y": list(y)}
+    marker = {"color": colour, "size": 9, "opacity": 0.85}
+    return trace | {"marker": marker, "hovertemplate": f"{hover}<extra>%{{fullData.name}}</extra>"}
 
 
 @dataclass(frozen=True)

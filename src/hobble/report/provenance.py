@@ -1,4 +1,7 @@
-"""How a result was made: versions, commit and machine, and the time, memory and disk space of each stage."""
+"""How a result was made: versions, commit and machine, and the time, memory and disk space of each stage.
+
+Time and memory are from Snakemake's benchmark files, disk space from the sizes of the artefacts.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +11,7 @@ import os
 import platform
 import subprocess
 from collections import defaultdict
-from collections.abc import Container, Iterable, Mapping
+from collections.abc import Callable, Container, Iterable, Iterator, Mapping
 from importlib import metadata
 from pathlib import Path
 from typing import Any
@@ -18,9 +21,7 @@ from hobble.core.files import read_numbers
 from hobble.core.processors import processor_name
 from hobble.database.manifest import FILE as MANIFEST
 from hobble.database.manifest import Manifest
-from hobble.database.sizes import Sizes, database_sizes
-from hobble.report.pipeline_results import JobTotal, Machine, Pipeline, StageTotal
-from hobble.workflow.kept_files import recorded_seconds
+from hobble.database.sizes import database_sizes
 
 WEB = Path(__file__).parent / "web"  # the page's scripts
 # The Python packages whose versions are reported.
@@ -38,13 +39,17 @@ def versions() -> dict[str, str]:
     return found | json.loads((WEB / "package.json").read_text(encoding="utf-8"))["dependencies"]
 
 
-def machine() -> Machine:
+def machine() -> dict[str, Any]:
     """System, processor, cores and memory of this machine, but not the name of the host or the user."""
+    try:
+        memory_gb = round(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") / 1e9, 1)
+    except (ValueError, OSError, AttributeError):
+        memory_gb = None
     return {
         "system": f"{platform.system()} {platform.machine()}",
         "processor": processor_name(),
         "cores": os.cpu_count(),
-        "memory_gb": _memory_gb(),
+        "memory_gb": memory_gb,
     }
 
 
@@ -53,31 +58,24 @@ def git_commit(folder: Path) -> dict[str, Any] | None:
 
     None if `folder` is not in a git checkout, or if git is not installed.
     """
+
+    def git(*arguments: str) -> str:
+        command = ["git", "-C", str(folder), "--no-optional-locks", *arguments]
+        done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=10)
+        return done.stdout.strip()
+
     try:
-        head = _git(folder, "rev-parse", "HEAD")
-        return {
-            "commit": head,
-            "changed": bool(_git(folder, "status", "--porcelain", "--untracked-files=no")),
-        }
+        changes = git("status", "--porcelain", "--untracked-files=no")
+        return {"commit": git("rev-parse", "HEAD"), "changed": bool(changes)}
     except (OSError, subprocess.SubprocessError):
         return None
 
 
-def _git(folder: Path, *arguments: str) -> str:
-    """The output of a git command in `folder`."""
-    command = ["git", "-C", str(folder), "--no-optional-locks", *arguments]
-    done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=10)
-    return done.stdout.strip()
-
-
-def _memory_gb() -> float | None:
-    try:
-        return round(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") / 1e9, 1)
-    except (ValueError, OSError, AttributeError):
-        return None
-
-
-def summarise_pipeline(configuration: str, stages: Mapping[str, Mapping[str, Iterable[str]]]) -> Pipeline:
+def summarise_pipeline(
+    configuration: str,
+    stages: Mapping[str, Mapping[str, Iterable[str]]],
+    recorded_seconds: Callable[[Path], float] = lambda folder: 0.0,
+) -> dict[str, Any]:
     """The content of `pipeline.json`.
 
     stages: in the order of the pipeline, stage -> a dict with the keys
@@ -85,14 +83,14 @@ def summarise_pipeline(configuration: str, stages: Mapping[str, Mapping[str, Ite
     - "benchmarks": tsv files or folders of them;
     - "files": artefacts or folders of them;
     - "made", only for stages that make the clips of a data set in batches: for each rule with batches, a
-      folder that is named after the rule and has a record of each finished clip (see
-      `hobble.workflow.kept_files`);
+      folder that is named after the rule and has a record of each finished clip;
     - "batches", only for these stages: the names of the benchmarks of all present batches. For a rule in
       "made", other benchmarks do not count. They are left from batches that have changed since, for example
       because a clip was added.
 
-    A missing file is listed under `missing`. It is no error, because a stage may have been copied from
-    another machine without its benchmarks.
+    recorded_seconds: the time of all clips in a folder of "made" together. A missing file is listed under
+    `missing`. It is no error, because a stage may have been copied from another machine without its
+    benchmarks.
 
     If a job was stopped and started again, its benchmark covers only the last start. Its true time is also in
     the history of training (history.csv), or in the records in "made". The longer of both times counts.
@@ -103,36 +101,28 @@ def summarise_pipeline(configuration: str, stages: Mapping[str, Mapping[str, Ite
     `versions`. Raises InputError for a malformed benchmark or history.
     """
     missing: list[str] = []
-    entries: list[StageTotal] = []
+    entries: list[dict[str, Any]] = []
     for stage, paths in stages.items():
         clip_seconds = {Path(folder).name: recorded_seconds(Path(folder)) for folder in paths.get("made", ())}
-        jobs = _read_jobs(paths.get("benchmarks", ()), missing, clip_seconds, set(paths.get("batches", ())))
-        training_seconds = _training_seconds(paths.get("files", ()))
-        file_sizes = _file_sizes(paths.get("files", ()), missing)
-        by_rule: dict[str, list[dict[str, float]]] = defaultdict(list)
-        for rule, row in jobs:
-            if rule == "training":
-                row["s"] = max(row.get("s", 0.0), training_seconds)
-            by_rule[rule].append(row)
+        by_rule = _read_jobs(
+            paths.get("benchmarks", ()), missing, clip_seconds, set(paths.get("batches", ()))
+        )
+        for row in by_rule.get("training", ()):
+            row["s"] = max(row.get("s", 0.0), _training_seconds(paths.get("files", ())))
         for rule, seconds in clip_seconds.items():
             _scale_times(by_rule[rule], seconds)
-        entries.append(
-            {
-                "stage": stage,
-                **_total_of_jobs([row for _, row in jobs]),
-                "files": len(file_sizes),
-                "bytes": sum(file_sizes),
-                "rules": [
-                    {"rule": rule, **_total_of_jobs(rows)} for rule, rows in sorted(by_rule.items()) if rows
-                ],
-            }
-        )
+        file_sizes = _file_sizes(paths.get("files", ()), missing)
+        total = _total_of_jobs([row for rows in by_rule.values() for row in rows])
+        rules = [{"rule": rule, **_total_of_jobs(rows)} for rule, rows in sorted(by_rule.items()) if rows]
+        sizes = {"files": len(file_sizes), "bytes": sum(file_sizes)}
+        entries.append({"stage": stage, **total, **sizes, "rules": rules})
+    databases = [Path(p) for p in stages.get("database", {}).get("files", ()) if Path(p, MANIFEST).is_file()]
     return {
         "configuration": configuration,
         "stages": entries,
         "total_seconds": round(sum(entry["seconds"] for entry in entries), 3),
         "total_bytes": sum(entry["bytes"] for entry in entries),
-        "database": _database_sizes(stages.get("database", {}).get("files", ())),
+        "database": database_sizes(Manifest.load(databases[0])) if databases else None,
         "missing": sorted(missing),
         "machine": machine(),
         "versions": versions(),
@@ -161,27 +151,31 @@ def _number(text: str | None) -> float | None:
         return None
 
 
+def _files_in(paths: Iterable[str], pattern: str, missing: list[str]) -> Iterator[tuple[Path, Path]]:
+    """(root, file) of each file in `paths`, which are files or folders. Missing paths are added to `missing`.
+
+    pattern: of the files that are taken from folders. Hidden files do not count: they are half-written.
+    """
+    for root in map(Path, paths):
+        if not root.exists():
+            missing.append(str(root))
+        for file in sorted(root.rglob(pattern)) if root.is_dir() else [root]:
+            if file.is_file() and not file.name.startswith("."):
+                yield root, file
+
+
 def _read_jobs(
     paths: Iterable[str], missing: list[str], batch_rules: Container[str], batches: Container[str]
-) -> list[tuple[str, dict[str, float]]]:
-    """(rule, row) of every benchmark in `paths`, whose files are called <rule>.tsv or <rule>/<name>.tsv.
+) -> dict[str, list[dict[str, float]]]:
+    """Rule -> rows of every benchmark in `paths`, whose files are called <rule>.tsv or <rule>/<name>.tsv.
 
-    Of the rules in `batch_rules`, only benchmarks whose name is in `batches` are read. Missing paths are
-    added to `missing`.
+    Of the rules in `batch_rules`, only benchmarks whose name is in `batches` are read.
     """
-    jobs = []
-    for root in map(Path, paths):
-        if root.is_dir():
-            files = [
-                (p.relative_to(root).parts[0].removesuffix(".tsv"), p) for p in sorted(root.rglob("*.tsv"))
-            ]
-        elif root.is_file():
-            files = [(root.stem, root)]
-        else:
-            missing.append(str(root))
-            continue
-        files = [(rule, path) for rule, path in files if rule not in batch_rules or path.stem in batches]
-        jobs += [(rule, row) for rule, path in files for row in read_benchmark(path)]
+    jobs: dict[str, list[dict[str, float]]] = defaultdict(list)
+    for root, path in _files_in(paths, "*.tsv", missing):
+        rule = path.stem if path == root else path.relative_to(root).parts[0].removesuffix(".tsv")
+        if rule not in batch_rules or path.stem in batches:
+            jobs[rule] += read_benchmark(path)
     return jobs
 
 
@@ -198,40 +192,19 @@ def _scale_times(rows: list[dict[str, float]], seconds: float) -> None:
 
 
 def _file_sizes(paths: Iterable[str], missing: list[str]) -> list[int]:
-    """Bytes of every file in `paths`. Missing paths are added to `missing`.
-
-    Hidden files do not count, because they are half-written.
-    """
-    out = []
-    for root in map(Path, paths):
-        if root.is_dir():
-            files = [p for p in root.rglob("*") if p.is_file() and not p.name.startswith(".")]
-            out += [p.stat().st_size for p in files]
-        elif root.is_file():
-            out.append(root.stat().st_size)
-        else:
-            missing.append(str(root))
-    return out
+    """Bytes of every file in `paths`."""
+    return [path.stat().st_size for _, path in _files_in(paths, "*", missing)]
 
 
 def _training_seconds(paths: Iterable[str]) -> float:
     """Seconds of training over all starts, from history.csv in one of the folders `paths`; 0 without it."""
-    for path in map(Path, paths):
-        if (path / "history.csv").is_file():
-            seconds = read_numbers(path / "history.csv").get("seconds", [])
-            return max((s for s in seconds if s is not None), default=0.0)
+    for path in (Path(folder) / "history.csv" for folder in paths):
+        if path.is_file():
+            return max((s for s in read_numbers(path).get("seconds", []) if s is not None), default=0.0)
     return 0.0
 
 
-def _database_sizes(paths: Iterable[str]) -> Sizes | None:
-    """The sizes of the database, or None if none of the folders `paths` is a database."""
-    for path in map(Path, paths):
-        if (path / MANIFEST).is_file():
-            return database_sizes(Manifest.load(path))
-    return None
-
-
-def _total_of_jobs(rows: list[dict[str, float]]) -> JobTotal:
+def _total_of_jobs(rows: list[dict[str, float]]) -> dict[str, Any]:
     """Totals over jobs. rows: from `read_benchmark`."""
     seconds = [row.get("s", 0.0) for row in rows]
     memory = [row["max_rss"] for row in rows if "max_rss" in row]

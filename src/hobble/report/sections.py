@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
@@ -26,50 +26,55 @@ from hobble.report.parts import (
     format_number,
     line_trace,
     log_axis,
+    log_range,
 )
 
 # The network's output consists of blocks. The names of these blocks do not say that they belong to the path,
 # so the page uses other names.
 PATH_PARTS = {"position": "path position", "direction": "path direction"}
+MOST_CLIPS = 10  # at most this many clips have their ground profile drawn
+# A profile is the height of the ground under the root over time. It shows at most this many rows of its clip.
+# A row is a frame in a gait cycle.
+MOST_ROWS = 900
+FRAME_STEP = 3  # a profile has a point for every third frame
 
 
-def passes_axis(material: ReportMaterial) -> list[float]:
-    """The number of passes done at the end of each section: section 5 of 10 in pass 2 ends at 1.5."""
-    passes, sections = material.history.get("pass", []), material.history.get("section", [])
-    last = max((s for s in sections if s is not None), default=1) or 1
-    # Passes and sections may be numbered from 1 or from 0.
+def passes_axis(history: Mapping[str, Sequence[float | None]]) -> list[float]:
+    """How many passes were done at the end of each section of training: section 5 of 10 in pass 2 is at 1.5.
+
+    A pass goes over the training data once, and is divided into sections. history: column of history.csv ->
+    values. Passes and sections may be numbered from 1 or from 0.
+    """
+    passes, sections = history.get("pass", ()), [s for s in history.get("section", ()) if s is not None]
     first_pass = min((p for p in passes if p is not None), default=1)
-    start = 1 if first_pass >= 1 else 0
-    first_section = min((s for s in sections if s is not None), default=1)
-    per_pass = last if first_section >= 1 else last + 1
-    ends = [(s if first_section >= 1 else s + 1) / per_pass for s in sections if s is not None]
-    return [p - start + end for p, end in zip(passes, ends, strict=False) if p is not None]
+    first, last = min(sections, default=1), max(sections, default=1) or 1
+    start, shift = min(first_pass, 1), 0 if first >= 1 else 1
+    return [
+        p - start + (s + shift) / (last + shift)
+        for p, s in zip(passes, sections, strict=False)
+        if p is not None
+    ]
 
 
 def learning_curve(material: ReportMaterial) -> Chart:
     """The training error and, if clips were held out, the held-out error, on a logarithmic scale."""
-    x, history = passes_axis(material), material.history
+    history = material.history
+    x = passes_axis(history)
     traces = [line_trace("training", x, history.get("train_mse", []), "@muted")]
-    held_out = any(v is not None for v in history.get("held_out_mse", ()))
-    if held_out:
+    more = ". No clips were held out, so there is no held-out error."
+    if any(v is not None for v in history.get("held_out_mse", ())):
         traces.append(line_trace("held out", x, history["held_out_mse"], "@accent"))
-    return Chart(
-        "learning-curve",
-        "Error over the passes",
-        "Mean squared error of the standardised output, on a logarithmic scale. A network that always "
-        "predicts the mean has error 1. The training error is measured with dropout"
-        + (
+        more = (
             ", so it can be above the held-out error. If the held-out error still falls at the end, train "
             "longer. If it rises again, the network overfits."
-            if held_out
-            else ". No clips were held out, so there is no held-out error."
-        ),
-        traces,
-        {
-            "xaxis": axis("pass", rangemode="tozero"),
-            "yaxis": log_axis("mean squared error", [v for t in traces for v in t["y"]]),
-        },
+        )
+    caption = (
+        "Mean squared error of the standardised output, on a logarithmic scale. A network that always "
+        f"predicts the mean has error 1. The training error is measured with dropout{more}"
     )
+    errors = log_axis("mean squared error", [v for t in traces for v in t["y"]])
+    layout = {"xaxis": axis("pass", rangemode="tozero"), "yaxis": errors}
+    return Chart("learning-curve", "Error over the passes", caption, traces, layout)
 
 
 def block_curves(material: ReportMaterial) -> ChartGroup | None:
@@ -77,7 +82,7 @@ def block_curves(material: ReportMaterial) -> ChartGroup | None:
 
     The block with the largest error comes first. None if there is no held-out error.
     """
-    x, history = passes_axis(material), material.history
+    x, history = passes_axis(material.history), material.history
     whole = [v for v in history.get("held_out_mse", ()) if v is not None]
     blocks = {
         part_in_words(name.removeprefix("held_out_").removesuffix("_mse")): history[name]
@@ -88,33 +93,24 @@ def block_curves(material: ReportMaterial) -> ChartGroup | None:
         return None
     last = {name: next(v for v in values[::-1] if v is not None) for name, values in blocks.items()}
     every = [v for values in blocks.values() for v in values] + whole
+    powers = [math.log10(v) for v in every if v is not None and v > 0] or [0.0]
+    margin = 0.05 * (max(powers) - min(powers)) + 0.02
+    layout = {
+        "xaxis": axis("pass", rangemode="tozero"),
+        "yaxis": log_axis("", every) | {"range": [min(powers) - margin, max(powers) + margin]},
+        "showlegend": False,
+    }
+    grey = [line_trace("whole output", x, history["held_out_mse"], "@muted", width=1.2)] if whole else []
     charts = []
     for i, name in enumerate(sorted(blocks, key=lambda name: last[name], reverse=True)):
-        traces = (
-            [line_trace("whole output", x, history["held_out_mse"], "@muted", width=1.2)] if whole else []
-        )
-        traces.append(line_trace(name, x, blocks[name], "@accent"))
-        layout = {
-            "xaxis": axis("pass", rangemode="tozero"),
-            "yaxis": log_axis("", every) | {"range": _log_span(every)},
-            "showlegend": False,
-        }
-        charts.append(
-            Chart(f"block-{i}", f"{name}, {format_number(last[name])}", "", traces, layout, height=190)
-        )
-    return ChartGroup(
-        "block-curves",
-        "Held-out error of each part of the output",
+        traces = [*grey, line_trace(name, x, blocks[name], "@accent")]
+        title = f"{name}, {format_number(last[name])}"
+        charts.append(Chart(f"block-{i}", title, "", traces, layout, height=190))
+    caption = (
         "Each title gives the error at the end of training, and the largest comes first. The grey line is "
-        "the error of the whole output. All charts have the same logarithmic scale.",
-        charts,
+        "the error of the whole output. All charts have the same logarithmic scale."
     )
-
-
-def _column_in_words(name: str) -> str:
-    """A column of history.csv in words, such as "held out joint velocity"."""
-    part = name.removeprefix("held_out_")
-    return part_in_words(part) if part == name else f"held out {part_in_words(part)}"
+    return ChartGroup("block-curves", "Held-out error of each part of the output", caption, charts)
 
 
 def part_in_words(name: str) -> str:
@@ -122,38 +118,28 @@ def part_in_words(name: str) -> str:
     return PATH_PARTS.get(name, name.replace("_", " "))
 
 
-def _log_span(values: Sequence[float | None]) -> list[float]:
-    """Lowest and highest exponent of ten on a logarithmic axis that shows the values, with a small margin."""
-    powers = [math.log10(v) for v in values if v is not None and v > 0] or [0.0]
-    margin = 0.05 * (max(powers) - min(powers)) + 0.02
-    return [min(powers) - margin, max(powers) + margin]
-
-
 def history_table(material: ReportMaterial) -> Table:
     """A row for each section (part of a pass) of training, as in history.csv."""
-    names = list(material.history)
-    counts = ("pass", "section", "samples")
-    columns = [
-        Column.count(name) if name in counts else Column.number(_column_in_words(name), 4) for name in names
-    ]
+
+    def column(name: str) -> Column:
+        if name in ("pass", "section", "samples"):
+            return Column.count(name)
+        held_out = "held out " if name.startswith("held_out_") else ""
+        return Column.number(held_out + part_in_words(name.removeprefix("held_out_")), 4)
+
     rows = list(zip(*material.history.values(), strict=False))
-    return Table(f"{material.name}-history", columns, rows, "Every section (part of a pass) of training")
-
-
-MOST_CLIPS = 10  # at most this many clips have their ground profile drawn
-# A profile is the height of the ground under the root over time. It shows at most this many rows of its clip.
-# A row is a frame in a gait cycle.
-MOST_ROWS = 900
-FRAME_STEP = 3  # a profile has a point for every third frame
+    title = "Every section (part of a pass) of training"
+    return Table(f"{material.name}-history", [column(name) for name in material.history], rows, title)
 
 
 @dataclass(frozen=True)
 class ShownFits:
     """The terrain fits of one clip with C gait cycles and 10 fits of each cycle, the best first.
 
-    foot_error: (C, 10, 2) mean and largest distance of a foot in contact from the fitted ground, cm. error:
-    (C, 10) fitting error, cm². frame: (S,) frames of the profile, at 60 Hz. profile: (S, K) height of the
-    ground under the root in the K best fits of each frame, cm. All frames have at least K fits.
+    A fit is a ground that suits a cycle. foot_error: (C, 10, 2) mean and largest distance of a foot in
+    contact from it, cm. error: (C, 10) fitting error, cm². frame: (S,) frames of the profile, at 60 Hz.
+    profile: (S, K) height of the ground under the root in the K best fits of each frame, cm; all frames have
+    at least K fits. A clip on flat ground has only one fit.
     """
 
     clip: str
@@ -161,11 +147,6 @@ class ShownFits:
     error: Array = field(repr=False)
     frame: Array = field(repr=False)
     profile: Array = field(repr=False)
-
-    @property
-    def is_flat(self) -> bool:
-        """Whether the clip is on flat ground. Then its cycles have only one fit."""
-        return self.profile.shape[1] < 2
 
 
 def read_fits(path: str | Path) -> ShownFits:
@@ -193,79 +174,64 @@ def read_fits(path: str | Path) -> ShownFits:
 
 def terrain_section(paths: Iterable[str | Path]) -> dict[str, Any]:
     """Charts and a table of the fits. Clips on flat ground are left out. paths: files of terrain fits."""
-    fits_of_clips = [fit for fit in map(read_fits, paths) if not fit.is_flat and len(fit.profile)]
-    if not fits_of_clips:
+    uneven = [fit for fit in map(read_fits, paths) if fit.profile.shape[1] > 1 and len(fit.profile)]
+    if not uneven:
         return {"charts": [], "table": None}
-    return {
-        "charts": [profile_chart(fits_of_clips), distance_chart(fits_of_clips)],
-        "table": fit_table(fits_of_clips),
-    }
+    return {"charts": [profile_chart(uneven), distance_chart(uneven)], "table": fit_table(uneven)}
 
 
 def profile_chart(fits_of_clips: list[ShownFits]) -> Chart:
     """Height of the ground under the root over time, for each of the first MOST_CLIPS clips and each fit."""
-    options: dict[str, list[Trace]] = {}
-    for fit in fits_of_clips[:MOST_CLIPS]:
-        seconds = np.round(fit.frame / 60, 2)
-        # Where one cycle does not follow the other, nan is inserted, which interrupts the line.
-        gaps = np.flatnonzero(np.diff(fit.frame) > FRAME_STEP) + 1
-        count = fit.profile.shape[1]
-        traces = []
-        for k in range(count - 1, -1, -1):
-            height = np.insert(np.round(fit.profile[:, k].astype(float), 1), gaps, np.nan)
-            colour, width = ("@accent", 2.2) if k == 0 else ("@muted", 1)
-            name = "best fit" if k == 0 else f"fits 2 to {count}"
-            more: dict[str, Any] = {"legendgroup": name, "showlegend": k in (0, 1), "width": width}
-            times = [
-                None if not np.isfinite(v) else float(t)
-                for t, v in zip(np.insert(seconds, gaps, 0), height, strict=True)
-            ]
-            traces.append(
-                line_trace(
-                    name, times, [None if not np.isfinite(v) else float(v) for v in height], colour, **more
-                )
-            )
-        options[fit.clip] = traces
+    caption = (
+        "Several grounds are fitted to each gait cycle, and the network is trained on all of them. The lines "
+        "are the heights of these grounds under the root. They agree where a foot is on the ground and "
+        "differ elsewhere. Each cycle has its own fits, so the lines may jump from one cycle to the next."
+    )
     return Chart(
         "terrain-profiles",
         "The ground under the path",
-        "Several grounds are fitted to each gait cycle, and the network is trained on all of them. The lines "
-        "are the heights of these grounds under the root. They agree where a foot is on the ground and "
-        "differ elsewhere. Each cycle has its own fits, so the lines may jump from one cycle to the next.",
+        caption,
         layout={"xaxis": axis("seconds"), "yaxis": axis("height, cm")},
         choose="Clip",
-        options=options,
+        options={fit.clip: _profile_traces(fit) for fit in fits_of_clips[:MOST_CLIPS]},
     )
+
+
+def _profile_traces(fit: ShownFits) -> list[Trace]:
+    """A line for each fit. Where one cycle does not follow the other, None interrupts the line."""
+    gaps, count = np.flatnonzero(np.diff(fit.frame) > FRAME_STEP) + 1, fit.profile.shape[1]
+    seconds = np.insert(np.round(fit.frame / 60, 2), gaps, 0).tolist()
+    traces = []
+    for k in range(count - 1, -1, -1):
+        heights = np.insert(np.round(fit.profile[:, k].astype(float), 1), gaps, np.nan).tolist()
+        points = [(t, h) if math.isfinite(h) else (None, None) for t, h in zip(seconds, heights, strict=True)]
+        colour, width = ("@accent", 2.2) if k == 0 else ("@muted", 1)
+        name = "best fit" if k == 0 else f"fits 2 to {count}"
+        more: dict[str, Any] = {"legendgroup": name, "showlegend": k in (0, 1), "width": width}
+        traces.append(line_trace(name, [t for t, _ in points], [h for _, h in points], colour, **more))
+    return traces
 
 
 def distance_chart(fits_of_clips: list[ShownFits]) -> Chart:
     """Distance of feet in contact from the fitted ground, for each clip."""
+    style = {"type": "box", "orientation": "h", "boxpoints": False, "fillcolor": "@accent-wash"}
+    style["line"] = {"color": "@accent", "width": 1.4}
     traces: list[Trace] = [
-        {
-            "type": "box",
-            "name": fit.clip,
-            "x": np.round(fit.foot_error[:, :, 0].ravel(), 3).tolist(),
-            "orientation": "h",
-            "boxpoints": False,
-            "line": {"color": "@accent", "width": 1.4},
-            "fillcolor": "@accent-wash",
-        }
+        {"name": fit.clip, "x": np.round(fit.foot_error[:, :, 0].ravel(), 3).tolist(), **style}
         for fit in fits_of_clips[::-1]
     ]
-    return Chart(
-        "terrain-feet",
-        "Distance of the feet from the ground",
+    layout = {
+        "xaxis": axis("cm", rangemode="tozero"),
+        "yaxis": {"type": "category", "automargin": True},
+        "showlegend": False,
+    }
+    caption = (
         "The fitted ground was corrected to meet the feet. The chart shows the mean distance that remains "
         "between the ground and a foot in contact. Each box covers the cycles and fits of a clip. A distance "
-        "of less than a centimetre is invisible.",
-        traces,
-        {
-            "xaxis": axis("cm", rangemode="tozero"),
-            "yaxis": {"type": "category", "automargin": True},
-            "showlegend": False,
-        },
-        height=max(260, 110 + 26 * len(fits_of_clips)),
+        "of less than a centimetre is invisible."
     )
+    height = max(260, 110 + 26 * len(fits_of_clips))
+    return Chart("terrain-feet", "Distance of the feet from the ground", caption, traces, layout, height)
 
 
 def fit_table(fits_of_clips: list[ShownFits]) -> Table:
@@ -278,17 +244,11 @@ def fit_table(fits_of_clips: list[ShownFits]) -> Table:
         Column.number("mean distance of a foot, cm"),
         Column.number("largest distance, cm"),
     ]
-    rows = [
-        [
-            fit.clip,
-            len(fit.error),
-            float(fit.error[:, 0].mean()),
-            float(fit.error[:, -1].mean()),
-            float(fit.foot_error[:, :, 0].mean()),
-            float(fit.foot_error[:, :, 1].max()),
-        ]
-        for fit in fits_of_clips
-    ]
+    rows = []
+    for fit in fits_of_clips:
+        errors = fit.error[:, 0].mean(), fit.error[:, -1].mean()
+        distances = fit.foot_error[:, :, 0].mean(), fit.foot_error[:, :, 1].max()
+        rows.append([fit.clip, len(fit.error), *map(float, (*errors, *distances))])
     return Table("terrain", columns, rows)
 
 
@@ -298,7 +258,6 @@ def stage_charts(material: ReportMaterial) -> list[Chart]:
     stages = list(material.pipeline.get("stages") or ())[::-1]
     names = [stage["stage"] for stage in stages]
     charts = []
-    key: Literal["seconds", "bytes"]
     for key, title, label, as_text, caption in (
         ("seconds", "Time of each stage", "seconds, sum over all jobs", format_duration,
          "The sum over all jobs of a stage. Jobs run in parallel, so the run itself takes less time. The "
@@ -319,23 +278,17 @@ def stage_charts(material: ReportMaterial) -> list[Chart]:
             "hovertemplate": "%{y}: %{text}<extra></extra>",
             "cliponaxis": False,
         }
-        layout = {
-            "xaxis": axis(label, type="log", tickformat="~s", dtick=1, range=log_range(values)),
-            "yaxis": {"automargin": True, "categoryorder": "array", "categoryarray": names},
-            "showlegend": False,
-        }
+        layout = {**stage_axes(label, values, names), "showlegend": False}
         charts.append(Chart(f"stage-{key}", title, caption, [trace], layout, 80 + 30 * len(names)))
     return charts
 
 
-def log_range(values: Sequence[float]) -> list[float]:
-    """The two ends of a logarithmic axis for `values`, as exponents of ten.
-
-    It begins with the whole decade below the smallest positive value. Beyond the largest value there is room
-    for a text.
-    """
-    powers = [math.log10(value) for value in values if value > 0] or [0.0, 1.0]
-    return [math.floor(min(powers)), max(powers) + 0.4 * (max(powers) - math.floor(min(powers)) + 1)]
+def stage_axes(label: str, values: Iterable[float], names: Sequence[str]) -> dict[str, Any]:
+    """The axes of a chart of stages. label: of the x axis. names: of the stages, from bottom to top."""
+    return {
+        "xaxis": axis(label, type="log", tickformat="~s", dtick=1, range=log_range(values)),
+        "yaxis": {"automargin": True, "categoryorder": "array", "categoryarray": names},
+    }
 
 
 def stage_table(material: ReportMaterial) -> Table:
@@ -343,36 +296,23 @@ def stage_table(material: ReportMaterial) -> Table:
 
     It has columns of published times and sizes if there are any for this configuration.
     """
-    published = {
-        row["stage"]: row for row in material.published["stages"] if row["configuration"] == material.name
+    columns = {
+        "stage": Column("stage"),
+        "jobs": Column.count("jobs"),
+        "seconds": Column.duration("time of all jobs"),
+        "longest": Column.duration("longest job"),
+        "max_rss_mb": Column("peak memory", lambda v: f"{format_number(v)} MB", "n"),
+        "files": Column.count("files"),
+        "bytes": Column.size("size"),
     }
-    columns = [
-        Column("stage"),
-        Column.count("jobs"),
-        Column("time of all jobs", lambda v: format_duration(float(v)), "n"),
-        Column("longest job", lambda v: format_duration(float(v)), "n"),
-        Column("peak memory", lambda v: f"{format_number(v)} MB", "n"),
-        Column.count("files"),
-        Column("size", lambda v: format_bytes(float(v)), "n"),
-    ]
+    published = {
+        row["stage"]: {"published_seconds": row.get("seconds"), "published_bytes": row.get("bytes")}
+        for row in material.published["stages"]
+        if row["configuration"] == material.name
+    }
     if published:
-        columns.append(Column("published time", lambda v: format_duration(float(v)), "n"))
-        columns.append(Column("published size", lambda v: format_bytes(float(v)), "n"))
-    rows = [
-        [
-            stage["stage"],
-            stage.get("jobs"),
-            stage.get("seconds"),
-            stage.get("longest"),
-            stage.get("max_rss_mb"),
-            stage.get("files"),
-            stage.get("bytes"),
-            *(
-                (published.get(stage["stage"], {}).get(key) for key in ("seconds", "bytes"))
-                if published
-                else ()
-            ),
-        ]
-        for stage in material.pipeline.get("stages") or ()
-    ]
-    return Table(f"{material.name}-pipeline", columns, rows)
+        columns |= {"published_seconds": Column.duration("published time")}
+        columns |= {"published_bytes": Column.size("published size")}
+    stages = material.pipeline.get("stages") or ()
+    records = [{**stage, **published.get(stage["stage"], {})} for stage in stages]
+    return Table.of(f"{material.name}-pipeline", columns, records)

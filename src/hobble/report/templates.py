@@ -12,18 +12,14 @@ from markupsafe import Markup
 from hobble.report.gather import ReportMaterial
 from hobble.report.parts import (
     Chart,
-    ChartGroup,
-    ChartPair,
-    Hint,
-    KeyFigure,
     PageSection,
+    embedded,
     format_bytes,
     format_duration,
     format_number,
-    join_sections,
 )
+from hobble.report.provenance import git_commit, machine, versions
 
-Json = Mapping[str, Any]
 FOLDER = Path(__file__).parent
 
 
@@ -40,6 +36,24 @@ def load_template(name: str) -> Template:
     return environment.get_template(name)
 
 
+def render_page(template: str, for_scripts: Mapping[str, Any], bundle: str, **values: Any) -> str:
+    """A page as one HTML document, with style, scripts and data inside.
+
+    template: its file. for_scripts: part -> JSON data for the scripts. bundle: all scripts as one script.
+    values: the template's other values.
+
+    Texts from the user's files cannot become HTML: the template escapes every value, and the data for the
+    scripts is JSON without any "<".
+    """
+    return load_template(template).render(
+        embedded={name: embedded(part) for name, part in for_scripts.items()},
+        style=page_style(),
+        bundle=mark_safe("the bundle", bundle),
+        provenance={"commit": git_commit(FOLDER), "machine": machine(), "versions": versions()},
+        **values,
+    )
+
+
 def chart_specs(shown: Any) -> dict[str, Any]:
     """Chart name -> the chart's data for the page's script.
 
@@ -47,15 +61,14 @@ def chart_specs(shown: Any) -> dict[str, Any]:
     """
     if isinstance(shown, Chart):
         return {shown.name: shown.spec()}
-    if isinstance(shown, ChartGroup | ChartPair):
-        return chart_specs(shown.charts)
     if isinstance(shown, PageSection):
-        return chart_specs([part.content for part in shown.parts])
+        shown = [part.content for part in shown.parts]
     if isinstance(shown, Mapping):
-        return chart_specs(list(shown.values()))
-    if isinstance(shown, list | tuple):
-        return {name: spec for item in shown for name, spec in chart_specs(item).items()}
-    return {}
+        shown = list(shown.values())
+    shown = getattr(shown, "charts", shown)  # of a group or a pair of charts
+    if not isinstance(shown, list | tuple):
+        return {}
+    return {name: spec for item in shown for name, spec in chart_specs(item).items()}
 
 
 def page_style() -> Markup:
@@ -78,29 +91,14 @@ def mark_safe(name: str, text: str) -> Markup:
     return Markup(text)
 
 
-def measured_sections(material: ReportMaterial) -> list[PageSection]:
-    """The sections of the report that show measurements."""
-    return join_sections(_of_each(material, "section"))
-
-
-def measured_figures(material: ReportMaterial) -> list[KeyFigure]:
-    """The key figures that measurements have for the top of the report."""
-    return [figure for shown in _of_each(material, "figures") for figure in shown]
-
-
-def measured_hints(material: ReportMaterial) -> list[Hint]:
-    """The advice that follows from the numbers of the measurements."""
-    return [hint for shown in _of_each(material, "hints") for hint in shown]
-
-
-def _of_each(material: ReportMaterial, name: str) -> Iterator[Any]:
-    """What the function `name` of each measurement returns."""
+def measured_by(material: ReportMaterial, name: str) -> Iterator[Any]:
+    """What the function `name` of each measurement returns: its `section`, its `figures` or its `hints`."""
     for measure in material.measures:
         if (show := measure.function(name)) is not None:
             yield show(material.results_of(measure.name), material)
 
 
-def compared_by(measures: Iterable[Any], name: str, compared: Json) -> list[Any]:
+def compared_by(measures: Iterable[Any], name: str, compared: Mapping[str, Any]) -> list[Any]:
     """What the function `name` of each measurement returns for compare.json.
 
     measures: of the type `hobble.measures.measure.Measure`, which says what functions there are.
