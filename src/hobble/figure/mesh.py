@@ -21,27 +21,20 @@ from hobble.core import quat
 from hobble.core.compiled import njit
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
-from hobble.figure.shape import Rod, Solid, body_scale, smooth_difference, smooth_union, solids_of_person
+from hobble.figure.shape import (
+    SIDES,
+    BindPose,
+    Rod,
+    Solid,
+    body_scale,
+    smooth_difference,
+    smooth_union,
+    solids_of_person,
+)
 
-SIDES = ("left", "right")
 ARMS_DOWN = np.radians(60.0)  # angle of the arms below the horizontal
 LEGS_OUT = np.radians(5.0)  # angle between the legs and the vertical
 SHORTEST_BONE = 0.5  # cm; a shorter bone is not turned, because it hardly has a direction
-
-
-@dataclass(frozen=True)
-class BindPose:
-    """World positions (J, 3) in cm and rotations (J, 4) of all joints.
-
-    joint_of: role -> index of the joint that moves the part of the body below it. For "left_knee", this part
-    is the shank. If the skeleton has no joint for a role, the index is that of a joint near by. position_of:
-    role -> position (3,) of its joint, cm. It is estimated if the skeleton has no joint for the role.
-    """
-
-    positions: Array
-    rotations: Array
-    joint_of: dict[str, int]
-    position_of: dict[str, Array]
 
 
 def bind_pose(skeleton: Skeleton) -> BindPose:

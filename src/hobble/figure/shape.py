@@ -13,7 +13,24 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from hobble.core.quat import Array
-from hobble.figure.mesh import SIDES, BindPose
+
+SIDES = ("left", "right")
+
+
+@dataclass(frozen=True)
+class BindPose:
+    """World positions (J, 3) in cm and rotations (J, 4) of all joints.
+
+    joint_of: role -> index of the joint that moves the part of the body below it. For "left_knee", this part
+    is the shank. If the skeleton has no joint for a role, the index is that of a joint near by. position_of:
+    role -> position (3,) of its joint, cm. It is estimated if the skeleton has no joint for the role.
+    """
+
+    positions: Array
+    rotations: Array
+    joint_of: dict[str, int]
+    position_of: dict[str, Array]
+
 
 # The part of a solid that one bone moves: (where this part starts along the solid, cm; the bone's role in the
 # skeleton, such as "left_knee").
