@@ -34,7 +34,7 @@ from hobble.measures.rollouts_run import measure_roll_outs
 from hobble.models.load import load_network
 from hobble.models.pfnn.options import PfnnOptions
 from hobble.runtime.options import Runtime
-from hobble.runtime.scenarios import TRACK, Waypoint
+from hobble.runtime.waypoints import TRACK, Waypoint
 from hobble.training.held_out import HeldOutErrors
 from hobble.training.train import train
 from hobble.training.weights import write_weights

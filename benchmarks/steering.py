@@ -15,7 +15,7 @@ import numpy as np
 from hobble.models.load import load_network
 from hobble.models.network import Network
 from hobble.runtime.animation import ProceduralAnimation
-from hobble.runtime.scenarios import TRACK
+from hobble.runtime.waypoints import TRACK
 
 LINES = {  # degrees from the facing to the direction of travel, cm a frame
     "ahead": (0, 2.5),

@@ -13,7 +13,7 @@ from hobble.database.reader import Database
 from hobble.models.pfnn.options import PfnnOptions
 from hobble.rows.clip_rows import ClipRows, save_clip_rows
 from hobble.rows.layout import RowLayout
-from hobble.runtime.scenarios import Waypoint
+from hobble.runtime.waypoints import Waypoint
 
 
 def clip_rows(name: str, skeleton: Skeleton, count: int, seed: int) -> ClipRows:

@@ -24,7 +24,7 @@ from hobble.measures.responsivity_run import (
 )
 from hobble.runtime.controller import STEPS
 from hobble.runtime.options import Runtime
-from hobble.runtime.scenarios import Waypoint
+from hobble.runtime.waypoints import Waypoint
 
 RUNTIME = Runtime(steering=1.0)
 # So near to each other that standing in their midst is arriving at each.

@@ -15,7 +15,7 @@ from hobble.measures.walks import foot_slide, largest_turn
 from hobble.models.load import load_network
 from hobble.models.network import Network
 from hobble.runtime import ProceduralAnimation
-from hobble.runtime.scenarios import TRACK
+from hobble.runtime.waypoints import TRACK
 from tests.runtime.walking import KNEE, hills, walk
 
 

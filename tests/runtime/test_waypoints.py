@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from hobble.runtime import ProceduralAnimation
-from hobble.runtime.scenarios import TRACK, Follower, Waypoint
+from hobble.runtime.waypoints import TRACK, Follower, Waypoint
 
 SQUARE = (
     Waypoint((0.0, 1000.0), "walk", 2.5),

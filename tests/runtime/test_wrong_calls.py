@@ -11,7 +11,7 @@ import pytest
 
 from hobble.core.errors import InputError
 from hobble.runtime import ProceduralAnimation
-from hobble.runtime.scenarios import Waypoint
+from hobble.runtime.waypoints import Waypoint
 from tests.runtime.walking import KNEE, hills, same, walk
 
 

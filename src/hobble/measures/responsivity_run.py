@@ -31,7 +31,7 @@ from hobble.models.network import Network
 from hobble.runtime.animation import ProceduralAnimation, world_rotations
 from hobble.runtime.controller import STEPS
 from hobble.runtime.options import Runtime
-from hobble.runtime.scenarios import TRACK, Waypoint
+from hobble.runtime.waypoints import TRACK, Waypoint
 
 
 class Spread(TypedDict):

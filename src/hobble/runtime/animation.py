@@ -23,8 +23,8 @@ from hobble.runtime.character import Character, Snapshot, start_characters
 from hobble.runtime.controller import Controller, ControllerOptions
 from hobble.runtime.ground import as_ground
 from hobble.runtime.network_rows import ChannelValues
-from hobble.runtime.scenarios import Follower, Waypoint
 from hobble.runtime.trajectory import target_facing
+from hobble.runtime.waypoints import Follower, Waypoint
 
 # Largest x or z of a start position, cm (100 km). Farther from the origin, floats are imprecise.
 FARTHEST = 1e7
