@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hobble.motion.body_sample import Spine, spine_shares
+from hobble.motion.body_sample import Target, spine_shares
 
 POINTS = np.array([[0.0, 0, 0], [0, 10, -2], [0, 20, -2], [0, 30, 0], [0, 40, 4]])
-SPINE = Spine(np.array([0.0, 0.5, 1.0, 1.5, 2.0]), POINTS)
+SPINE = Target(np.array([0.0, 0.5, 1.0, 1.5, 2.0]), POINTS)
 
 
 def between(a: int, b: int) -> np.ndarray:

@@ -28,17 +28,17 @@ DIRECTIONS = {  # name of an axis, such as "-X" -> (3,) unit vector
 }
 
 
-def unit_vectors(vectors: Array) -> Array:
+def unit(vectors: Array) -> Array:
     """The vectors (..., 3), scaled to length 1. A zero vector stays zero."""
     return vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-9)
 
 
 def degrees_between(a: Array, b: Array) -> float:
     """Angle in degrees between two vectors (3,) of any length."""
-    return float(np.degrees(np.arccos(np.clip(unit_vectors(a) @ unit_vectors(b), -1.0, 1.0))))
+    return float(np.degrees(np.arccos(np.clip(unit(a) @ unit(b), -1.0, 1.0))))
 
 
-def rotation_aligning(first: Array, from_first: Array, second: Array, from_second: Array) -> Array:
+def aligned(first: Array, from_first: Array, second: Array, from_second: Array) -> Array:
     """The rotation (4,) that turns one direction exactly, and a second one as nearly as possible.
 
     It turns `from_first` to `first`. Among the rotations that do this, it is the one that turns `from_second`
@@ -49,27 +49,27 @@ def rotation_aligning(first: Array, from_first: Array, second: Array, from_secon
 
 def _right_angles(first: Array, second: Array) -> Array:
     """(3, 3) matrix whose columns are unit vectors at right angles: x along `first`, y towards `second`."""
-    x = unit_vectors(first)
-    y = unit_vectors(second - x * (second @ x))
+    x = unit(first)
+    y = unit(second - x * (second @ x))
     if np.linalg.norm(y) < 0.5:  # zero, because the two are parallel: take any y at right angles to x
         k = int(np.argmin(np.abs(x)))
-        y = unit_vectors(np.eye(3)[k] - x * x[k])
+        y = unit(np.eye(3)[k] - x * x[k])
     return np.stack([x, y, np.cross(x, y)], axis=1)
 
 
-def snapped_to_axes(rotation: Array) -> Array:
+def snapped(rotation: Array) -> Array:
     """The rotation (4,), made exact if it turns each of the X, Y and Z axes to within 20 degrees of an axis.
 
     The exact rotation turns each axis to the axis that it was near, positive or negative. Any other rotation
     is returned unchanged.
     """
     axes = quat.to_matrix(rotation)
-    snapped = np.round(axes)
-    near = np.sum(axes * snapped, axis=0).min() > np.cos(np.radians(20.0))
-    return quat.from_matrix(snapped) if near and np.all(np.abs(snapped).sum(axis=0) == 1) else rotation
+    exact = np.round(axes)
+    near = np.sum(axes * exact, axis=0).min() > np.cos(np.radians(20.0))
+    return quat.from_matrix(exact) if near and np.all(np.abs(exact).sum(axis=0) == 1) else rotation
 
 
-def rotation_pointing_along(rotation: Array, axis: Array, bone: Array) -> Array:
+def pointed_along(rotation: Array, axis: Array, bone: Array) -> Array:
     """The rotation (4,), changed as little as possible so that it turns `axis` to the direction of `bone`.
 
     axis, bone: vectors (3,).
@@ -99,7 +99,7 @@ def mean_rotation(rotations: Array) -> Array:
 
 def bend_direction(hip: Array, knee: Array, heel: Array) -> Array:
     """(..., 3) how far the middle joint of a limb lies out from the line between the ends (positions)."""
-    line = unit_vectors(heel - hip)
+    line = unit(heel - hip)
     return knee - hip - line * np.sum((knee - hip) * line, axis=-1, keepdims=True)
 
 
@@ -117,14 +117,14 @@ def body_axes(skeleton: Skeleton, positions: Array) -> tuple[Array, Array, Array
         else bend_direction(*(at[f"{side}_{part}"] for part in ("hip", "knee", "heel")))
         for side in ("left", "right")
     )
-    return unit_vectors(left), unit_vectors(at["head"] - at["hips"]), unit_vectors(np.asarray(ahead))
+    return unit(left), unit(at["head"] - at["hips"]), unit(np.asarray(ahead))
 
 
 def rest_frame(skeleton: Skeleton) -> Array:
     """(4,) rotation that turns X to the body's left in the rest pose, Y to its up, and Z to its front."""
     left, up, _ = body_axes(skeleton, rest_positions(skeleton))
-    up = unit_vectors(up - left * (up @ left))
-    return snapped_to_axes(quat.from_matrix(np.stack([left, up, np.cross(left, up)], axis=1)))
+    up = unit(up - left * (up @ left))
+    return snapped(quat.from_matrix(np.stack([left, up, np.cross(left, up)], axis=1)))
 
 
 @dataclass(frozen=True)
@@ -189,9 +189,9 @@ def straighten(clip: Clip, up: str, handedness: str, standing: bool = True) -> U
 
 def _nearest_axis(direction: Array) -> tuple[str, float]:
     """The axis nearest to a direction (3,), such as "+Y", and the cosine of the angle to it."""
-    unit = unit_vectors(direction)
-    k = int(np.argmax(np.abs(unit)))
-    return ("+" if unit[k] > 0 else "-") + "XYZ"[k], float(abs(unit[k]))
+    cosines = unit(direction)
+    k = int(np.argmax(np.abs(cosines)))
+    return ("+" if cosines[k] > 0 else "-") + "XYZ"[k], float(abs(cosines[k]))
 
 
 def _up_axis(clip: Clip, standing: bool) -> tuple[str, list[str], list[str]]:
@@ -224,7 +224,7 @@ def _along_body(skeleton: Skeleton, positions: Array) -> Array:
     ends = ("toe" if f"{side}_toe" in skeleton.roles else "heel" for side in ("left", "right"))
     roles = ("head", "hips", *(f"{side}_{end}" for side, end in zip(("left", "right"), ends, strict=True)))
     head, hips, left, right = (positions[:, skeleton.role(role)] for role in roles)
-    return unit_vectors(head - hips) + unit_vectors(hips - 0.5 * (left + right))
+    return unit(head - hips) + unit(hips - 0.5 * (left + right))
 
 
 def _crawls(clip: Clip, axis: str) -> bool:

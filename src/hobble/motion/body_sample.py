@@ -17,7 +17,7 @@ the zero pose and with the tilt of the target's feet.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
 
@@ -34,10 +34,10 @@ from hobble.motion.axes import (
     UP,
     degrees_between,
     mean_rotation,
+    pointed_along,
     rest_frame,
     robust_mean,
-    rotation_pointing_along,
-    unit_vectors,
+    unit,
 )
 from hobble.motion.body import REACH, SIDES, Body, across, body_by_roles, distance_shares
 
@@ -92,19 +92,36 @@ FORWARD, STRAIGHT = 35.0, 30.0
 
 
 @dataclass(frozen=True)
-class Spine:
-    """The points where trunk and neck may bend, in a rest pose that stands facing +Z.
+class Target:
+    """The target in its standing rest pose, facing +Z.
 
-    These are joints. A joint less than SHORT above the one before it is left out. shares: (N,) position of
-    each point along the body: 0 at the hips, 1 at the chest, 2 at the head. points: (N, 3) cm, from the hips
-    up. A bone of another rig gets the direction of that part of this spine that it replaces.
+    shares, points: (N,) and (N, 3) the points where its trunk and neck may bend, from the hips up. These are
+    joints; a joint less than SHORT above the one before it is left out. shares: where they are along the
+    body: 0 at the hips, 1 at the chest, 2 at the head. points: their positions, cm. foot_tilt: radians by
+    which the bone from ankle to ball of the foot points below the horizontal, mean of both feet.
+    limb_lengths: (B,) of `Body.limb_bones`, cm.
     """
 
     shares: Array
     points: Array
+    foot_tilt: float = 0.0
+    limb_lengths: Array = field(default_factory=lambda: np.zeros(0))
+
+    @classmethod
+    def of(cls, skeleton: Skeleton) -> Target:
+        """The target `skeleton`, which has roles."""
+        body = body_by_roles(skeleton)
+        rest = quat.rotate(quat.inv(rest_frame(skeleton)), rest_positions(skeleton))
+        places = rest[list(body.spine)]
+        lengths = np.linalg.norm(np.diff(places, axis=0), axis=-1)
+        used = np.concatenate([[True], lengths > SHORT])
+        feet = np.array([rest[toe] - rest[heel] for *_, heel, toe in body.legs.values() if toe is not None])
+        limbs = np.array([np.linalg.norm(rest[b] - rest[a]) for a, b in body.limb_bones])
+        shares = spine_shares(lengths, body.trunk_bones)
+        return cls(shares[used], places[used], float(np.mean(_downward(feet))), limbs)
 
     def direction(self, start: float, end: float) -> Array:
-        """(3,) unit direction that a bone of another rig gets from this spine.
+        """(3,) unit direction that a bone of another rig gets: that of the part of this spine that it replaces.
 
         start, end: positions along the body between which the bone lies, counted like `shares`. If the rig
         has fewer joints, one of its bones may span several bones of this spine.
@@ -112,7 +129,7 @@ class Spine:
         first = self._first_point(start)
         # A bone that ends at the chest or below does not reach into the neck.
         last = min(self._last_point(end), self._chest if end <= 1 else len(self.shares) - 1)
-        return unit_vectors(self.points[max(last, first + 1)] - self.points[first])
+        return unit(self.points[max(last, first + 1)] - self.points[first])
 
     def bone_end(self, start: float) -> float:
         """Position along the body of the upper end of a bone of this spine. start: that of its lower end."""
@@ -122,7 +139,7 @@ class Spine:
     def neck_direction(self) -> Array:
         """(3,) unit direction from the chest to the next point: the neck, or the head if there is no neck."""
         chest = min(self._chest, len(self.shares) - 2)
-        return unit_vectors(self.points[chest + 1] - self.points[chest])
+        return unit(self.points[chest + 1] - self.points[chest])
 
     @property
     def has_neck(self) -> bool:
@@ -155,32 +172,6 @@ def spine_shares(lengths: Array, trunk_bones: int) -> Array:
 
 
 @dataclass(frozen=True)
-class Proportions:
-    """The proportions of the target in its standing rest pose.
-
-    spine: the shape of its trunk and neck. foot_tilt: radians by which the bone from ankle to ball of the
-    foot points below the horizontal, mean of both feet. limb_lengths: (B,) of `Body.limb_bones`, cm.
-    """
-
-    spine: Spine
-    foot_tilt: float
-    limb_lengths: Array
-
-    @classmethod
-    def of(cls, skeleton: Skeleton) -> Proportions:
-        """The proportions of a skeleton with roles."""
-        body = body_by_roles(skeleton)
-        rest = quat.rotate(quat.inv(rest_frame(skeleton)), rest_positions(skeleton))
-        feet = np.array([rest[toe] - rest[heel] for *_, heel, toe in body.legs.values() if toe is not None])
-        places = rest[list(body.spine)]
-        lengths = np.linalg.norm(np.diff(places, axis=0), axis=-1)
-        used = np.concatenate([[True], lengths > SHORT])
-        spine = Spine(spine_shares(lengths, body.trunk_bones)[used], places[used])
-        limbs = np.array([np.linalg.norm(rest[b] - rest[a]) for a, b in body.limb_bones])
-        return cls(spine, float(np.mean(_downward(feet))), limbs)
-
-
-@dataclass(frozen=True)
 class FeetTilt:
     """The tilt of each foot that has a ball, when it stands flat, in radians.
 
@@ -199,7 +190,7 @@ class BodySample:
 
     body: which joint is which part. positions: (S, J, 3) cm. rotations: (S, J, 4) in the world. speeds:
     (S, J) cm a second. zero_positions: (J, 3) in the zero pose. end_sites: joint -> (3,) offset of its end
-    site in the file. target: proportions of the target. seconds: length of the clip.
+    site in the file. target: the target's proportions. seconds: length of the clip.
     """
 
     body: Body
@@ -208,7 +199,7 @@ class BodySample:
     speeds: Array
     zero_positions: Array
     end_sites: Mapping[int, Array]
-    target: Proportions
+    target: Target
     seconds: float
 
     @classmethod
@@ -226,7 +217,7 @@ class BodySample:
             speeds[moments],
             rest_positions(clip.skeleton),
             ends,
-            Proportions.of(target),
+            Target.of(target),
             len(clip) / clip.fps,
         )
 
@@ -243,16 +234,16 @@ class BodySample:
     @cached_property
     def hips_left(self) -> Array:
         """(S, 3) unit vectors from the right hip to the left hip."""
-        return unit_vectors(across(self.positions, self.body.legs, 0))
+        return unit(across(self.positions, self.body.legs, 0))
 
     @cached_property
     def chest_left(self) -> Array:
         """(S, 3) unit vectors from the right shoulder to the left shoulder."""
-        return unit_vectors(across(self.positions, self.body.arms, 1))
+        return unit(across(self.positions, self.body.arms, 1))
 
     def directions(self, start: int, end: int) -> Array:
         """(S, 3) unit vectors from the joint `start` to the joint `end`."""
-        return unit_vectors(self.positions[:, end] - self.positions[:, start])
+        return unit(self.positions[:, end] - self.positions[:, start])
 
     def mean_in_joint_axes(self, joint: int, vectors: Array) -> Array:
         """(3,) mean of `vectors` (S, 3) of the world, without outliers, in the joint's own axes."""
@@ -285,7 +276,7 @@ class BodySample:
         mean_axis = self.mean_in_joint_axes(start, axis)
         if np.linalg.norm(mean_axis) < FLEXED:
             return otherwise
-        return quat.rotate(self.rotations[:, start], np.broadcast_to(unit_vectors(mean_axis), axis.shape))
+        return quat.rotate(self.rotations[:, start], np.broadcast_to(unit(mean_axis), axis.shape))
 
     def hand_frame(self, side: str, straight: Array) -> Array:
         """(4,) the frame of a hand, which points from the wrist to the base of a finger (`Body.fingers`).
@@ -296,142 +287,148 @@ class BodySample:
         if side not in self.body.fingers:
             return straight
         finger = self.bone(self.body.arms[side][3], self.body.fingers[side])
-        return rotation_pointing_along(straight, outward(side), finger)
+        return pointed_along(straight, outward(side), finger)
 
     @cached_property
     def feet_tilt(self) -> FeetTilt:
         """The tilt of flat feet: from the zero pose if it shows it, else from frames in which they stand."""
         feet = [side for side in SIDES if self.body.legs[side][3] is not None]
-        if not feet:
-            return FeetTilt({}, {}, 0.0)
-        by_side = {
-            side: float(np.median(_downward(ahead(self, side)[flat_moments(self, side)]))) for side in feet
-        }
-        zero = {side: tilt for side in feet if (tilt := _zero_tilt(self, side)) is not None}
-        zero_tilts, measured_tilts = list(zero.values()), list(by_side.values())
-        target = _around_mean(by_side, self.target.foot_tilt)
-        if is_on_tiptoe(self, measured_tilts):
-            alike = len(zero) == len(SIDES) and np.ptp(zero_tilts) < SAME
-            if alike and 0 < np.mean(zero_tilts) < np.mean(measured_tilts):
-                return FeetTilt(by_side, zero, CAPTURED_ERROR)
-            return FeetTilt(by_side, target, BRIEF_ERROR)
-        if exact := [by_side[side] for side in feet if _has_exact_tilt(self, side)]:
-            return FeetTilt(by_side, _around_mean(by_side, float(np.mean(exact))), EXACT_ERROR)
+        measured = {s: float(np.median(_downward(self._ahead(s)[self.flat_moments(s)]))) for s in feet}
+        return FeetTilt(measured, *(self._flat_tilt(measured) if feet else ({}, 0.0)))
+
+    def _flat_tilt(self, by_side: dict[str, float]) -> tuple[dict[str, float], float]:
+        """`flat` and `error` of FeetTilt. by_side: its `measured`."""
+        zero = {side: tilt for side in by_side if (tilt := self._zero_tilt(side)) is not None}
+        zero_tilts, tilts = list(zero.values()), list(by_side.values())
+        apart_in_zero = np.ptp(zero_tilts) if len(zero) == len(SIDES) else np.inf
+        as_target = _around_mean(by_side, self.target.foot_tilt)
+        if self.is_on_tiptoe(tilts):
+            shown = apart_in_zero < SAME and 0 < np.mean(zero_tilts) < np.mean(tilts)
+            return (zero, CAPTURED_ERROR) if shown else (as_target, BRIEF_ERROR)
+        if exact := [tilt for side, tilt in by_side.items() if self._has_exact_tilt(side)]:
+            return _around_mean(by_side, float(np.mean(exact))), EXACT_ERROR
         raised = RAISED if self.figure_runs else 0.0
-        measured = float(np.mean(measured_tilts)) - raised
-        if len(zero) == len(SIDES) and np.ptp(zero_tilts) < AGREE:
+        measured = float(np.mean(tilts)) - raised
+        if apart_in_zero < AGREE:
             # A foot that limps or stands on a slope may never come down. So it is enough if one foot agrees,
             # to within half of AGREE.
-            best_foot = min(abs(a - b + raised) for a, b in zip(zero_tilts, measured_tilts, strict=True))
+            best_foot = min(abs(a - b + raised) for a, b in zip(zero_tilts, tilts, strict=True))
             if min(abs(np.mean(zero_tilts) - measured), 2 * best_foot) < AGREE:
-                return FeetTilt(by_side, zero, EXACT_ERROR)
+                return zero, EXACT_ERROR
         if self._has_target_lengths:  # then its feet are taken to be built like the target's
-            return FeetTilt(by_side, target, EXACT_ERROR)
+            return as_target, EXACT_ERROR
         # The more the two feet differ, the less certain is their mean.
-        error = float(np.hypot(CAPTURED_ERROR, 0.25 * np.ptp(measured_tilts)))
-        angle, error = _expected_tilt(measured, error)
-        return FeetTilt(
-            by_side, _around_mean(by_side, angle), error if self.seconds >= BRIEF else BRIEF_ERROR
-        )
+        angle, error = _expected_tilt(measured, float(np.hypot(CAPTURED_ERROR, 0.25 * np.ptp(tilts))))
+        return _around_mean(by_side, angle), error if self.seconds >= BRIEF else BRIEF_ERROR
 
     @property
     def figure_runs(self) -> bool:
         """Whether the figure runs. The feet of a runner hardly stand."""
         legs = self.body.legs
-        slow = [self.speeds[:, ball(self, side)] < SLOW * self.length(*legs[side][:3]) for side in SIDES]
+        slow = [self.speeds[:, self._ball(side)] < SLOW * self.length(*legs[side][:3]) for side in SIDES]
         return bool(np.mean(slow) < RUNS)
 
     @property
     def _has_target_lengths(self) -> bool:
-        limbs = np.array([self.length(*bone) for bone in self.body.limb_bones])
-        if len(limbs) != len(self.target.limb_lengths):
-            return False
-        quotients = np.maximum(limbs, 1e-9) / self.target.limb_lengths
+        limbs, wanted = (
+            np.array([self.length(*bone) for bone in self.body.limb_bones]),
+            self.target.limb_lengths,
+        )
+        quotients = np.maximum(limbs, 1e-9) / wanted if len(limbs) == len(wanted) else np.array([1.0, 2.0])
         return bool(quotients.max() < (1 + SAME_LENGTHS) * quotients.min())
+
+    def _ball(self, side: str) -> int:
+        """The joint at the ball of a foot, or the ankle if the foot has none."""
+        heel, toe = self.body.legs[side][2:]
+        return heel if toe is None else toe
+
+    def _ahead(self, side: str) -> Array:
+        """(S, 3) vectors to where a foot points at the S moments of the sample: from the ankle to the ball.
+
+        A foot without a ball points from the ankle to the ankle's end site. If there is none either, the foot
+        points where the hips face on average.
+        """
+        heel, toe = self.body.legs[side][2:]
+        if toe is not None:
+            return self.positions[:, toe] - self.positions[:, heel]
+        site = self.end_sites.get(heel)
+        if site is None or np.linalg.norm(site) <= SHORT:
+            site = self.mean_in_joint_axes(heel, np.cross(self.hips_left, UP))
+        return quat.rotate(self.rotations[:, heel], site)
+
+    def foot_frames(self) -> dict[int, Array]:
+        """Joint (ankle or ball) -> its frame (4,), from how the joint is turned while the foot is flat."""
+        tilt = self.feet_tilt
+        frames: dict[int, Array] = {}
+        for side in SIDES:
+            steeper_by = tilt.flat.get(side, 0.0) - tilt.measured.get(side, 0.0)
+            flat = self.flat_moments(side)
+            # The rotations from a figure that faces +Z to one that faces where the foot points.
+            heading = quat.between(AHEAD, unit(self._ahead(side)[flat] * [1, 0, 1]))
+            for joint in self.body.legs[side][2:]:
+                if joint is not None:
+                    as_measured = mean_rotation(quat.mul(quat.inv(self.rotations[flat, joint]), heading))
+                    frames[joint] = quat.mul(as_measured, quat.inv(quat.from_axis_angle(LEFT, steeper_by)))
+        return frames
+
+    def flat_moments(self, side: str) -> NDArray[np.integer]:
+        """Indices of the moments in which a foot is most likely flat on the ground: at least FEWEST."""
+        stance = self._stance_moments(side)
+        tilts = _downward(self._ahead(side)[stance])
+        low, high = np.percentile(tilts, LEAST_STEEP)
+        flat = stance[(tilts >= low) & (tilts <= high)]
+        return flat if len(flat) >= FEWEST else stance[np.argsort(tilts)[:FEWEST]]
+
+    def is_upright_while_flat(self, side: str) -> bool:
+        """Whether the body is upright while the foot on this side is flat."""
+        hip, knee, heel, _ = self.body.legs[side]
+        flat = self.flat_moments(side)
+        height = np.median(self.positions[flat, hip, 1] - self.positions[flat, heel, 1])
+        return bool(height > UPRIGHT * self.length(hip, knee, heel))
+
+    def is_on_tiptoe(self, tilts: Sequence[float]) -> bool:
+        """Whether the body squats on feet whose `tilts` are much steeper than the target's flat ones."""
+        low = not any(self.is_upright_while_flat(side) for side in SIDES)
+        return low and bool(np.mean(tilts) > self.target.foot_tilt + TIPTOE)
+
+    def _stance_moments(self, side: str) -> NDArray[np.integer]:
+        """Indices of the sample's moments in which a foot stands: those with the lowest and slowest ball.
+
+        The most certain moments come first.
+        """
+        joint = self._ball(side)
+        # How many speeds, and how many heights, come before each one in ascending order.
+        speeds, heights = self.speeds[:, joint], self.positions[:, joint, 1]
+        order = np.argsort(np.argsort(speeds)) + np.argsort(np.argsort(heights))
+        return np.argsort(order)[: max(FEWEST + 2, round(STANCE * len(order)))]
+
+    def _has_exact_tilt(self, side: str) -> bool:
+        """Whether a foot has exactly one tilt whenever it stands, but other tilts at other times."""
+        tilts = _downward(self._ahead(side))
+        low, middle = np.percentile(tilts[self._stance_moments(side)], [10, 50])
+        return bool(middle - low < EXACT and np.ptp(tilts) > TILTS)
+
+    def _zero_tilt(self, side: str) -> float | None:
+        """The tilt in radians of a foot in the zero pose, with its shank turned upright.
+
+        None if the foot does not point where its knee points, since its tilt can be any angle then. The knee
+        of a nearly straight leg is not compared with the foot, because it may point anywhere if the bones are
+        twisted.
+        """
+        leg = self.body.legs[side]
+        thigh, shank, foot = unit(np.diff(self.zero_positions[list(leg)], axis=0))
+        left = self.mean_in_joint_axes(leg[1], self.hinge_axes(leg[:3], self.hips_left))
+        forward = unit(np.cross(shank, unit(left)))
+        # Where the foot points, seen along the shank.
+        toe_direction = unit(foot - shank * (shank @ foot))
+        if degrees_between(toe_direction, forward) > FORWARD and degrees_between(thigh, shank) > STRAIGHT:
+            return None
+        return float(np.arcsin(np.clip(foot @ shank, -1.0, 1.0)))
 
 
 def outward(side: str) -> Array:
     """(3,) where an arm points in the T-pose."""
     return LEFT if side == "left" else -LEFT
-
-
-def ball(sample: BodySample, side: str) -> int:
-    """The joint at the ball of a foot, or the ankle if the foot has none."""
-    heel, toe = sample.body.legs[side][2:]
-    return heel if toe is None else toe
-
-
-def ahead(sample: BodySample, side: str) -> Array:
-    """(S, 3) vectors to where a foot points at the S moments of the sample: from the ankle to the ball.
-
-    A foot without a ball points from the ankle to the ankle's end site. If there is none either, the foot
-    points where the hips face on average.
-    """
-    heel, toe = sample.body.legs[side][2:]
-    if toe is not None:
-        return sample.positions[:, toe] - sample.positions[:, heel]
-    site = sample.end_sites.get(heel)
-    if site is None or np.linalg.norm(site) <= SHORT:
-        site = sample.mean_in_joint_axes(heel, np.cross(sample.hips_left, UP))
-    return quat.rotate(sample.rotations[:, heel], site)
-
-
-def foot_frames(sample: BodySample) -> dict[int, Array]:
-    """Joint (ankle or ball) -> its frame (4,), found from how the joint is turned while the foot is flat."""
-    tilt = sample.feet_tilt
-    frames: dict[int, Array] = {}
-    for side in SIDES:
-        steeper_by = tilt.flat.get(side, 0.0) - tilt.measured.get(side, 0.0)
-        flat = flat_moments(sample, side)
-        # The rotations from a figure that faces +Z to one that faces where the foot points.
-        heading = quat.between(AHEAD, unit_vectors(ahead(sample, side)[flat] * [1, 0, 1]))
-        for joint in sample.body.legs[side][2:]:
-            if joint is not None:
-                as_measured = mean_rotation(quat.mul(quat.inv(sample.rotations[flat, joint]), heading))
-                frames[joint] = quat.mul(as_measured, quat.inv(quat.from_axis_angle(LEFT, steeper_by)))
-    return frames
-
-
-def flat_moments(sample: BodySample, side: str) -> NDArray[np.integer]:
-    """Indices of the sample's moments in which a foot is most likely flat on the ground: at least FEWEST."""
-    stance = _stance_moments(sample, side)
-    tilts = _downward(ahead(sample, side)[stance])
-    low, high = np.percentile(tilts, LEAST_STEEP)
-    flat = stance[(tilts >= low) & (tilts <= high)]
-    return flat if len(flat) >= FEWEST else stance[np.argsort(tilts)[:FEWEST]]
-
-
-def is_upright_while_flat(sample: BodySample, side: str) -> bool:
-    """Whether the body is upright while the foot on this side is flat."""
-    hip, knee, heel, _ = sample.body.legs[side]
-    flat = flat_moments(sample, side)
-    height = np.median(sample.positions[flat, hip, 1] - sample.positions[flat, heel, 1])
-    return bool(height > UPRIGHT * sample.length(hip, knee, heel))
-
-
-def is_on_tiptoe(sample: BodySample, tilts: Sequence[float]) -> bool:
-    """Whether the body squats on feet that are much steeper than the target's flat ones. tilts: measured."""
-    low = not any(is_upright_while_flat(sample, side) for side in SIDES)
-    return low and bool(np.mean(tilts) > sample.target.foot_tilt + TIPTOE)
-
-
-def _stance_moments(sample: BodySample, side: str) -> NDArray[np.integer]:
-    """Indices of the sample's moments in which a foot stands: those with the lowest and slowest ball.
-
-    The most certain moments come first.
-    """
-    joint = ball(sample, side)
-    # How many speeds, and how many heights, come before each one in ascending order.
-    speeds, heights = sample.speeds[:, joint], sample.positions[:, joint, 1]
-    order = np.argsort(np.argsort(speeds)) + np.argsort(np.argsort(heights))
-    return np.argsort(order)[: max(FEWEST + 2, round(STANCE * len(order)))]
-
-
-def _has_exact_tilt(sample: BodySample, side: str) -> bool:
-    """Whether a foot has exactly one tilt whenever it stands, but other tilts at other times."""
-    tilts = _downward(ahead(sample, side))
-    low, middle = np.percentile(tilts[_stance_moments(sample, side)], [10, 50])
-    return bool(middle - low < EXACT and np.ptp(tilts) > TILTS)
 
 
 def _downward(ahead: Array) -> Array:
@@ -465,20 +462,3 @@ def _expected_tilt(measured: float, error: float) -> tuple[float, float]:
     pull = (error / deviation) ** 2  # share of the way to PERSON, if the feet are like a person's
     variance = error**2 * (1 - person * pull) + person * (1 - person) * (pull * apart) ** 2
     return measured + person * pull * apart, float(np.sqrt(variance))
-
-
-def _zero_tilt(sample: BodySample, side: str) -> float | None:
-    """The tilt in radians of a foot in the zero pose, after the leg is turned so that its shank is upright.
-
-    None if the foot does not point where its knee points, since its tilt can be any angle then. The knee of a
-    nearly straight leg is not compared with the foot, because it may point anywhere if the bones are twisted.
-    """
-    leg = sample.body.legs[side]
-    thigh, shank, foot = unit_vectors(np.diff(sample.zero_positions[list(leg)], axis=0))
-    left = sample.mean_in_joint_axes(leg[1], sample.hinge_axes(leg[:3], sample.hips_left))
-    forward = unit_vectors(np.cross(shank, unit_vectors(left)))
-    # Where the foot points, seen along the shank.
-    toe_direction = unit_vectors(foot - shank * (shank @ foot))
-    if degrees_between(toe_direction, forward) > FORWARD and degrees_between(thigh, shank) > STRAIGHT:
-        return None
-    return float(np.arcsin(np.clip(foot @ shank, -1.0, 1.0)))

@@ -15,7 +15,7 @@ from hobble.core import quat
 from hobble.core.clip import Clip
 from hobble.core.errors import InputError
 from hobble.core.quat import Array
-from hobble.motion.axes import UP, unit_vectors
+from hobble.motion.axes import UP, unit
 from hobble.motion.body import SIDES
 from hobble.motion.physics import Balance, find_balance
 from hobble.motion.rig import leg_length
@@ -178,13 +178,13 @@ def _body_directions(clip: Clip) -> tuple[Array, Array, Array]:
     at = {role: clip.positions[:, clip.skeleton.role(role)] for role in clip.skeleton.roles}
     across = at["left_hip"] - at["right_hip"] + at["left_shoulder"] - at["right_shoulder"]
     legs = at["hips"] - 0.5 * (at["left_heel"] + at["right_heel"])
-    return unit_vectors(at["head"] - at["hips"]), unit_vectors(legs), unit_vectors(across)
+    return unit(at["head"] - at["hips"]), unit(legs), unit(across)
 
 
 def _up_from_posture(trunk: Array, legs: Array, across: Array) -> Array:
     """(2,) x and z of the mean unit vector up the body, without the usual forward lean of a walk."""
-    ahead = unit_vectors(np.cross(across, UP))
-    up = unit_vectors(trunk + legs) - np.sin(np.radians(FORWARD_LEAN)) * ahead
+    ahead = unit(np.cross(across, UP))
+    up = unit(trunk + legs) - np.sin(np.radians(FORWARD_LEAN)) * ahead
     return np.asarray(up[:, [0, 2]].mean(axis=0))
 
 
@@ -193,7 +193,7 @@ def _least_sideways_lean(trunk: Array, legs: Array, across: Array) -> float:
 
     0 if they do not all lean to the same side.
     """
-    left = unit_vectors(across * [1.0, 0.0, 1.0])
+    left = unit(across * [1.0, 0.0, 1.0])
     # Sines of the leans, positive to the left.
     leans = [float(np.mean(np.sum(part * left, axis=-1))) for part in (trunk, legs)]
     leans.append(-float(np.mean(across[:, 1])))

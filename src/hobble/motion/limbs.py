@@ -15,7 +15,7 @@ from functools import cached_property
 import numpy as np
 
 from hobble.core.quat import Array
-from hobble.motion.axes import bend_direction, unit_vectors
+from hobble.motion.axes import bend_direction, unit
 from hobble.motion.body import SIDES, Body, lowest_common_ancestor, middle, path_between, path_to_root
 from hobble.motion.names import are_twins, is_control, is_end, limb_parts, part_of, side_of, side_of_pair
 
@@ -128,7 +128,7 @@ class MovingRig:
 
     def bend_degrees(self, i: int, j: int, k: int) -> Array:
         """(S,) degrees by which a limb bends at joint j: 0 if joints i, j and k are in line."""
-        cosine = np.sum(unit_vectors(self.vectors(i, j)) * unit_vectors(self.vectors(j, k)), axis=-1)
+        cosine = np.sum(unit(self.vectors(i, j)) * unit(self.vectors(j, k)), axis=-1)
         return np.degrees(np.arccos(np.clip(cosine, -1, 1)))
 
     def are_counterparts(self, a: int, b: int) -> bool:
@@ -252,7 +252,7 @@ def _find_limbs(rig: MovingRig) -> tuple[Limbs, Limbs]:
 def _legs_along_trunk(rig: MovingRig, legs: Limbs, arms: Limbs) -> float:
     """Mean cosine of the angle between legs and trunk, both seen from the hips: -1 for a standing body."""
     feet = sum(rig.positions[:, joints[2]] for joints in legs.joints) / 2 - rig.positions[:, legs.hub]
-    return float(np.mean(np.sum(unit_vectors(rig.vectors(legs.hub, arms.hub)) * unit_vectors(feet), axis=-1)))
+    return float(np.mean(np.sum(unit(rig.vectors(legs.hub, arms.hub)) * unit(feet), axis=-1)))
 
 
 def _limb_length(rig: MovingRig, limbs: Limbs) -> float:
@@ -389,7 +389,7 @@ def _head_by_place(rig: MovingRig, legs: Limbs, arms: Limbs, paths: dict[int, li
     Joints that only mark the end of the head do not count. paths: joint -> its path to the root, for each
     joint above the arms that is in no limb.
     """
-    trunk = unit_vectors(rig.vectors(legs.hub, arms.hub))
+    trunk = unit(rig.vectors(legs.hub, arms.hub))
     shoulders = sum(rig.positions[:, chain[0]] for chain in arms.chains) / 2
 
     def height(j: int) -> float:
@@ -422,15 +422,15 @@ def _left_leg_first(rig: MovingRig, legs: Limbs, head: int) -> tuple[Limbs, bool
     votes = _named_sides(rig, legs)
     if votes[0] * votes[1] < 0:
         return (legs if votes[0] > 0 else _exchanged(legs)), True
-    up = unit_vectors(rig.positions[:, head] - sum(rig.positions[:, joints[2]] for joints in legs.joints) / 2)
+    up = unit(rig.positions[:, head] - sum(rig.positions[:, joints[2]] for joints in legs.joints) / 2)
     forward = np.zeros_like(up)
     for k, joints in enumerate(legs.joints):
         forward += bend_direction(*(rig.positions[:, j] for j in joints))
         ball = _find_toe(rig, legs, k)
         forward += 0.0 if ball is None else 3 * rig.vectors(joints[2], ball)
-    from_other = unit_vectors(rig.vectors(legs.joints[1][0], legs.joints[0][0]))
+    from_other = unit(rig.vectors(legs.joints[1][0], legs.joints[0][0]))
     # Up times forward is left. The mean cosine between left and the line from leg 1 to leg 0:
-    cosine = float(np.mean(np.sum(np.cross(up, unit_vectors(forward)) * from_other, axis=-1)))
+    cosine = float(np.mean(np.sum(np.cross(up, unit(forward)) * from_other, axis=-1)))
     if abs(cosine) < 0.3:
         raise Doubt("neither names nor feet and knees show which side is left")
     return (legs if cosine > 0 else _exchanged(legs)), False
@@ -441,9 +441,7 @@ def _left_arm_first(rig: MovingRig, legs: Limbs, arms: Limbs) -> Limbs:
 
     Raises Doubt if places and names disagree.
     """
-    hips, shoulders = (
-        unit_vectors(rig.vectors(limbs.joints[1][0], limbs.joints[0][0])) for limbs in (legs, arms)
-    )
+    hips, shoulders = (unit(rig.vectors(limbs.joints[1][0], limbs.joints[0][0])) for limbs in (legs, arms))
     side = float(
         np.mean(np.sum(hips * shoulders, axis=-1))
     )  # positive if arm 0 is on the side of the left leg
@@ -479,7 +477,7 @@ def on_four_legs(body: Body, positions: Array) -> bool:
     bones = [bone for leg in body.legs.values() for bone in (leg[:2], leg[1:3])]
     leg_length = 0.5 * sum(np.linalg.norm(positions[:, b] - positions[:, a], axis=-1) for a, b in bones)
     # No axis needs to point up, because down is the direction from the hips to the feet.
-    down, depth = unit_vectors(feet - hips), np.linalg.norm(feet - hips, axis=-1)
-    trunk_level = np.sum(unit_vectors(chest - hips) * down, axis=-1) > LEVEL
+    down, depth = unit(feet - hips), np.linalg.norm(feet - hips, axis=-1)
+    trunk_level = np.sum(unit(chest - hips) * down, axis=-1) > LEVEL
     hands_low = np.sum((hands - hips) * down, axis=-1) > REACH * depth
     return bool(np.mean(trunk_level & hands_low & (depth > STRETCHED * leg_length)) > NEARLY_ALL)

@@ -28,7 +28,6 @@ from hobble.motion.edit import (
     resample,
 )
 from hobble.motion.ground import check_tilt, put_on_floor
-from hobble.motion.hips_root import below_hips, decode_below
 from hobble.motion.limbs import on_four_legs
 from hobble.motion.options import ClipMotion
 from hobble.motion.physics import check_pace
@@ -45,8 +44,10 @@ from hobble.motion.rest_pose import UprightMotion, why_not_standing, with_uprigh
 from hobble.motion.retarget import check_difference, check_knees, compare_motions, plan, retarget_clip
 from hobble.motion.rig import (
     RigMatch,
+    below_hips,
     body_in_file,
     clean_names,
+    decode_below,
     find_hips,
     leg_length,
     likely_unit,

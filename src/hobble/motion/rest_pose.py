@@ -26,11 +26,11 @@ from hobble.motion.axes import (
     AHEAD,
     LEFT,
     UP,
+    aligned,
     degrees_between,
-    rotation_aligning,
-    rotation_pointing_along,
-    snapped_to_axes,
-    unit_vectors,
+    pointed_along,
+    snapped,
+    unit,
 )
 from hobble.motion.body import SIDES, Body, across, middle, path_to_root
 from hobble.motion.body_sample import (
@@ -38,10 +38,6 @@ from hobble.motion.body_sample import (
     RAISED,
     SHORT,
     BodySample,
-    flat_moments,
-    foot_frames,
-    is_on_tiptoe,
-    is_upright_while_flat,
     outward,
     spine_shares,
 )
@@ -148,13 +144,13 @@ def why_not_standing(body: Body, rest: Array) -> str | None:
     coordinates may be left-handed.
     """
     shoulders = middle(rest, body.arms, 1)
-    up = unit_vectors(shoulders - middle(rest, body.legs, 0))
+    up = unit(shoulders - middle(rest, body.legs, 0))
     left = across(rest, body.legs, 0)
     if degrees_between(left, across(rest, body.arms, 1)) > 30 or abs(degrees_between(left, up) - 90) > 25:
         return "hips and shoulders point in different directions"
     if degrees_between(rest[body.head] - shoulders, up) > HEAD:
         return "the head is not above the shoulders"
-    ahead = np.cross(unit_vectors(left), up)  # straight back in left-handed coordinates
+    ahead = np.cross(unit(left), up)  # straight back in left-handed coordinates
     forward = []  # for each foot, how far it reaches along `ahead`
     for side in SIDES:
         hip, knee, heel, toe = body.legs[side]
@@ -217,7 +213,7 @@ def _upright_moments(sample: BodySample, stands_in_zero: bool) -> BodySample:
 def _leans(sample: BodySample) -> Array:
     """(S,) degrees between the trunk and the vertical; 180 in moments in which no leg is stretched."""
     body, p = sample.body, sample.positions
-    trunk = unit_vectors(middle(p, body.arms, 1) - middle(p, body.legs, 0))
+    trunk = unit(middle(p, body.arms, 1) - middle(p, body.legs, 0))
     stretch = [
         np.linalg.norm(p[:, ankle] - p[:, hip], axis=-1) / max(sample.length(hip, knee, ankle), 1e-9)
         for hip, knee, ankle, _ in body.legs.values()
@@ -232,23 +228,23 @@ def _trunk_frames(sample: BodySample, zero: Frames | None) -> Frames:
     for joint in body.spine[:-1]:
         bone, axis, left = _trunk_bone(sample, joint)
         if body.trunk and joint == body.chest and _lacks_neck(sample):
-            bone, axis = _assumed_neck(sample, left, zero), sample.target.spine.neck_direction
-        # `rotation_aligning` fits its first direction exactly and its second one as nearly as possible. For
+            bone, axis = _assumed_neck(sample, left, zero), sample.target.neck_direction
+        # `aligned` fits its first direction exactly and its second one as nearly as possible. For
         # hips and chest, the direction to the left is more reliable than the bone: hips and shoulders are
         # level, but spines of captured rigs bend sideways by some degrees.
         if joint in (body.hips, body.chest):
-            frames[joint] = rotation_aligning(left, LEFT, bone, axis)
+            frames[joint] = aligned(left, LEFT, bone, axis)
         else:
-            frames[joint] = rotation_aligning(bone, axis, left, LEFT)
+            frames[joint] = aligned(bone, axis, left, LEFT)
     chest = frames[body.chest]
     if len(frames) > 2 and max(_apart(frame, chest) for frame in frames.values()) < AGREE:
         frames[body.head] = chest
     else:  # the head is assumed to look ahead on average
-        ahead = unit_vectors(np.cross(sample.chest_left + sample.hips_left, UP) * [1, 0, 1])
+        ahead = unit(np.cross(sample.chest_left + sample.hips_left, UP) * [1, 0, 1])
         up, ahead = (
             sample.mean_in_joint_axes(body.head, np.broadcast_to(v, ahead.shape)) for v in (UP, ahead)
         )
-        frames[body.head] = rotation_aligning(up, UP, ahead, AHEAD)
+        frames[body.head] = aligned(up, UP, ahead, AHEAD)
     return frames
 
 
@@ -258,14 +254,14 @@ def _trunk_bone(sample: BodySample, joint: int) -> tuple[Array, Array, Array]:
     They are: the bone, in the joint's coordinates; the direction of this bone in a figure that stands facing
     +Z; and the direction to the body's left, in the joint's coordinates.
     """
-    body, spine = sample.body, sample.target.spine
+    body, target = sample.body, sample.target
     lengths = np.array([sample.length(a, b) for a, b in pairwise(body.spine)])
     # Joint -> its position along the body: 0 at the hips, 1 at the chest, 2 at the head.
     share = dict(zip(body.spine, spine_shares(lengths, body.trunk_bones), strict=True))
     following = body.spine[body.spine.index(joint) + 1 :]
     # A chain of many short bones is not straight. If one bone of the target is as long as several bones of
     # the rig, the direction is measured from the start of the first of these bones to the end of the last.
-    within_bone = [j for j in following if share[j] <= spine.bone_end(share[joint]) + 1e-6]
+    within_bone = [j for j in following if share[j] <= target.bone_end(share[joint]) + 1e-6]
     # The chest is stiff up to the shoulders. A very short bone above it does not show how it is turned.
     least = max(SHORT, KINK * sample.length(*body.legs["left"][:3])) if joint == body.chest else SHORT
     bones = [(sample.bone(joint, end), end) for end in (*within_bone[-1:], *following)]
@@ -274,8 +270,8 @@ def _trunk_bone(sample: BodySample, joint: int) -> tuple[Array, Array, Array]:
     if joint == body.hips:
         left = sample.hips_left
     elif joint in body.trunk and joint != body.chest:
-        left = unit_vectors(sample.hips_left + sample.chest_left)
-    return bone, spine.direction(share[joint], share[end]), sample.mean_in_joint_axes(joint, left)
+        left = unit(sample.hips_left + sample.chest_left)
+    return bone, target.direction(share[joint], share[end]), sample.mean_in_joint_axes(joint, left)
 
 
 def _lacks_neck(sample: BodySample) -> bool:
@@ -284,7 +280,7 @@ def _lacks_neck(sample: BodySample) -> bool:
     A joint at the same place as the chest is no neck.
     """
     chest, neck = sample.body.chest, sample.body.neck
-    return sample.target.spine.has_neck and all(sample.length(chest, joint) <= SHORT for joint in neck)
+    return sample.target.has_neck and all(sample.length(chest, joint) <= SHORT for joint in neck)
 
 
 def _assumed_neck(sample: BodySample, left: Array, zero: Frames | None) -> Array:
@@ -295,8 +291,8 @@ def _assumed_neck(sample: BodySample, left: Array, zero: Frames | None) -> Array
     chest = sample.body.chest
     if zero:
         return quat.rotate(zero[chest], np.array([0.0, np.cos(NECK), np.sin(NECK)]))
-    head = unit_vectors(sample.bone(chest, sample.body.head))
-    return quat.rotate(quat.from_axis_angle(unit_vectors(left), NECK_OF_HEAD), head)
+    head = unit(sample.bone(chest, sample.body.head))
+    return quat.rotate(quat.from_axis_angle(unit(left), NECK_OF_HEAD), head)
 
 
 # Frames of all joints
@@ -321,7 +317,7 @@ def _frames_from_motion(sample: BodySample, trunk: BodySample, zero: Frames | No
         _, elbow, wrist = arm
         forearm = quat.mul(sample.rotations[:, elbow], frames[elbow])
         frames[wrist] = sample.hand_frame(side, sample.mean_frame(wrist, forearm))
-    return frames | foot_frames(sample)
+    return frames | sample.foot_frames()
 
 
 def _limb_frames(sample: BodySample, limb: Sequence[int], along: Array, usual: Array, hinge: Array) -> Frames:
@@ -332,9 +328,7 @@ def _limb_frames(sample: BodySample, limb: Sequence[int], along: Array, usual: A
     """
     axes = sample.hinge_axes(limb, usual)
     return {
-        start: rotation_aligning(
-            sample.bone(start, end), along, sample.mean_in_joint_axes(start, axes), hinge
-        )
+        start: aligned(sample.bone(start, end), along, sample.mean_in_joint_axes(start, axes), hinge)
         for start, end in pairwise(limb)
     }
 
@@ -347,15 +341,15 @@ def _frames_from_zero_pose(sample: BodySample) -> Frames:
     show how they are turned.
     """
     body, rest = sample.body, sample.zero_positions
-    left = unit_vectors(unit_vectors(across(rest, body.legs, 0)) + unit_vectors(across(rest, body.arms, 1)))
+    left = unit(unit(across(rest, body.legs, 0)) + unit(across(rest, body.arms, 1)))
     trunk, upward = middle(rest, body.arms, 1) - middle(rest, body.legs, 0), rest[body.head] - rest[body.hips]
-    common = snapped_to_axes(rotation_aligning(upward if upward @ trunk > 0 else trunk, UP, left, LEFT))
+    common = snapped(aligned(upward if upward @ trunk > 0 else trunk, UP, left, LEFT))
     frames = dict.fromkeys(body.joints, common)
     for side in SIDES:
         _, *arm = body.arms[side]
         for limb, along in ((arm, outward(side)), (body.legs[side][:3], -UP)):
             for start, end in pairwise(limb):
-                frames[start] = rotation_pointing_along(common, along, sample.bone(start, end))
+                frames[start] = pointed_along(common, along, sample.bone(start, end))
         frames[arm[2]] = sample.hand_frame(side, frames[arm[1]])
     return frames
 
@@ -389,7 +383,7 @@ def _foot_frame(standing: Array, zero: Array, sample: BodySample, side: str) -> 
     with a toe joint gets `standing`, made as steep as `zero`. Only the steepness is taken from the zero pose,
     because in a zero pose with splayed legs the feet are rolled and point outward.
     """
-    if not is_upright_while_flat(sample, side):
+    if not sample.is_upright_while_flat(side):
         return zero
     heel, toe = sample.body.legs[side][2:]
     if toe is None:
@@ -427,7 +421,7 @@ def _add_further_joints(frames: Frames, clip: Clip, sample: BodySample, others: 
             bones = (sample.bone(joint, j) for j in others if joint in path_to_root(parents, j)[1:])
             bone = next((bone for bone in bones if np.linalg.norm(bone) > SHORT), None)
             if bone is not None:
-                frames[joint] = rotation_pointing_along(frames[joint], outward(hands[carrier]), bone)
+                frames[joint] = pointed_along(frames[joint], outward(hands[carrier]), bone)
     return added
 
 
@@ -514,7 +508,7 @@ def _bends(clip: Clip, sample: BodySample) -> Frames:
             long = np.linalg.norm(bones, axis=-1, keepdims=True) > 0.5 * np.linalg.norm(bone)
             mean = np.broadcast_to(bone, bones.shape)
             rotations = quat.mul(rotations, quat.between(mean, np.where(long, bones, mean)))
-        out[joint] = quat.mul(rotations, rotation_aligning(direction, axis, left, LEFT))
+        out[joint] = quat.mul(rotations, aligned(direction, axis, left, LEFT))
     return out
 
 
@@ -574,11 +568,11 @@ def _zero_doubt(sample: BodySample, zero: Frames | None) -> str | None:
     stand at any angle, so there is no warning.
     """
     measured = sample.feet_tilt.measured
-    sides = [side for side in measured if is_upright_while_flat(sample, side)]
+    sides = [side for side in measured if sample.is_upright_while_flat(side)]
     if not zero or not sides:
         return None
     feet = {side: sample.body.legs[side][2:] for side in sides}
-    heights = [sample.positions[flat_moments(sample, side), toe, 1] for side, (_, toe) in feet.items()]
+    heights = [sample.positions[sample.flat_moments(side), toe, 1] for side, (_, toe) in feet.items()]
     # Radians by which a foot points further down while it stands than in the zero pose. A runner's foot is
     # steeper than flat by RAISED.
     differences = []
@@ -624,7 +618,7 @@ def _feet_doubt(sample: BodySample, zero: Frames | None, height_error: float) ->
     why = "nobody could stand in the zero pose (all rotations zero) of its file"
     if sample.seconds < BRIEF:
         why += f" and {sample.seconds:.2f} s are too short for a step of each foot"
-    if is_on_tiptoe(sample, tilts):
+    if sample.is_on_tiptoe(tilts):
         why += " and the figure squats, perhaps on tiptoe"
     one, other = np.degrees(tilts)
     if abs(one - other) > APART:

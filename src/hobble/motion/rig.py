@@ -14,14 +14,16 @@ from pathlib import Path
 
 import numpy as np
 
+from hobble.core import quat
 from hobble.core.clip import Clip
 from hobble.core.errors import InputError
 from hobble.core.quat import Array
-from hobble.core.skeleton import Skeleton, rest_positions
+from hobble.core.skeleton import Skeleton, forward_kinematics, rest_positions
 from hobble.core.untrusted import read_text
-from hobble.motion.axes import body_axes, unit_vectors
-from hobble.motion.body import ARM, LEG, SIDES, Body, body_by_roles, path_between, with_fingers
+from hobble.motion.axes import body_axes, unit
+from hobble.motion.body import ARM, LEG, SIDES, Body, body_by_roles, path_between, path_to_root, with_fingers
 from hobble.motion.limbs import Doubt, TwoFigures, find_body
+from hobble.motion.read import Bvh, Decoded, decode_channels
 from hobble.motion.skeleton_file import KnownSkeleton, draft_skeleton_file, guess_roles, load_skeleton
 
 # Name of a unit of length -> centimetres. The unit of CMU files is an inch / 0.45.
@@ -98,6 +100,50 @@ def find_hips(names: Sequence[str], target: KnownSkeleton, folder: str | Path) -
     return names.index(hips) if hips in names else 0
 
 
+def below_hips(file: Bvh, hips: int) -> Bvh:
+    """The file with its hips as the root. Joints that are not below them are left out."""
+    if hips == 0:
+        return file
+    return _with_joints(file, [j for j in range(len(file.names)) if hips in path_to_root(file.parents, j)])
+
+
+def decode_below(file: Bvh, hips: int, still: float) -> Decoded:
+    """Rotations and positions of the joints of `below_hips`, as if the hips had always been the root.
+
+    The motion of the joints above is added to the motion of the hips. still: a joint whose position stays
+    this close to its offset (in the file's unit) does not move relative to its parent.
+    """
+    decoded = decode_channels(below_hips(file, hips), still)
+    if hips == 0:
+        return decoded
+    above = path_to_root(file.parents, hips)[:0:-1]
+    chain = decode_channels(_with_joints(file, above), 0.0)
+    skeleton = Skeleton("above", tuple(map(str, above)), tuple(range(-1, len(above) - 1)), chain.offsets)
+    turns, places = forward_kinematics(skeleton, chain.rotations, chain.root, chain.translations)
+    rotations = decoded.rotations.copy()
+    rotations[:, 0] = quat.mul(turns[:, -1], rotations[:, 0])
+    root = places[:, -1] + quat.rotate(turns[:, -1], decoded.root)
+    names = ", ".join(file.names[j] for j in above)
+    note = f"The joints above {file.names[hips]} ({names:.100}) were left out; their motion was added to it."
+    return replace(decoded, rotations=quat.continuous(rotations), root=root, notes=[note, *decoded.notes])
+
+
+def _with_joints(file: Bvh, joints: list[int]) -> Bvh:
+    """The same file with only some of its joints. joints: parents before children; the first is the root."""
+    new_index = {old: i for i, old in enumerate(joints)}
+    starts = np.cumsum([0, *(len(c) for c in file.channels)])  # of each joint's columns in `file.values`
+    names = tuple(file.names[j] for j in joints)
+    return replace(
+        file,
+        names=names,
+        parents=tuple(new_index.get(file.parents[j], -1) for j in joints),
+        offsets=file.offsets[joints],
+        channels=tuple(file.channels[j] for j in joints),
+        values=file.values[:, [column for j in joints for column in range(starts[j], starts[j + 1])]],
+        end_sites={name: sites for name, sites in file.end_sites.items() if name in names},
+    )
+
+
 def match_rig(rig: Skeleton, target: KnownSkeleton, folder: str | Path) -> RigMatch | None:
     """Find which known skeleton a clip's rig is, and how it maps to the target.
 
@@ -152,7 +198,7 @@ def _bone_directions(skeleton: Skeleton) -> dict[str, Array]:
         for limb in (ARM, LEG):
             for start, end in pairwise(f"{side}_{part}" for part in limb):
                 if start in skeleton.roles and end in skeleton.roles:
-                    out[end] = unit_vectors(axes @ (rest[skeleton.role(end)] - rest[skeleton.role(start)]))
+                    out[end] = unit(axes @ (rest[skeleton.role(end)] - rest[skeleton.role(start)]))
     return out
 
 
