@@ -121,7 +121,7 @@ class Target:
         return cls(shares[used], places[used], float(np.mean(_downward(feet))), limbs)
 
     def direction(self, start: float, end: float) -> Array:
-        """(3,) unit direction that a bone of another rig gets: that of the part of this spine that it replaces.
+        """(3,) unit direction of a bone of another rig: that of the part of this spine that it replaces.
 
         start, end: positions along the body between which the bone lies, counted like `shares`. If the rig
         has fewer joints, one of its bones may span several bones of this spine.
@@ -330,11 +330,10 @@ class BodySample:
 
     @property
     def _has_target_lengths(self) -> bool:
-        limbs, wanted = (
-            np.array([self.length(*bone) for bone in self.body.limb_bones]),
-            self.target.limb_lengths,
-        )
-        quotients = np.maximum(limbs, 1e-9) / wanted if len(limbs) == len(wanted) else np.array([1.0, 2.0])
+        bones, wanted = self.body.limb_bones, self.target.limb_lengths
+        if len(bones) != len(wanted):
+            return False
+        quotients = np.maximum([self.length(*bone) for bone in bones], 1e-9) / wanted
         return bool(quotients.max() < (1 + SAME_LENGTHS) * quotients.min())
 
     def _ball(self, side: str) -> int:
