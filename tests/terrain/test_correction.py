@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hobble.terrain.clip_fits import (
+from hobble.terrain.cycle_ground import (
     WALL_STEEPNESS,
     Stances,
     dig_pits,
