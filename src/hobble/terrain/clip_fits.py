@@ -1,7 +1,7 @@
 """Fits the ground under each gait cycle of a clip, and looks up its heights along the trajectory.
 
-A fit is a patch of ground that suits the footsteps of a cycle, corrected so that it meets the feet. A cycle gets
-several fits, or one if its ground is flat.
+A fit is a patch of ground that suits the footsteps of a cycle, corrected so that it meets the feet. A cycle
+gets several fits, or one if its ground is flat.
 """
 
 from __future__ import annotations
