@@ -16,7 +16,9 @@ help:            ## list these targets
 env: .venv/.ready  ## make the Python environment in .venv
 
 .venv/.ready: pyproject.toml constraints.txt
-	$(PYTHON) src/hobble/workflow/environment.py .venv
+	@echo "Making the environment in .venv: PyTorch, Snakemake, SciPy and their dependencies. It takes 2 GB of disk."
+	test -x $(BIN)/python || $(PYTHON) -m venv .venv
+	$(BIN)/python -m pip install --disable-pip-version-check --constraint constraints.txt --editable ".[dev]"
 	touch $@
 
 report: env      ## train a character that can be hurt and make its report

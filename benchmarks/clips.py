@@ -56,7 +56,7 @@ def main() -> None:
     start = time.process_time()
     frames = sum(len(read_bvh(path)) for path in files)
     reading = time.process_time() - start
-    targets = [f"results/datasets/{arguments.dataset}/labels/{clip}.json" for clip in clips]
+    targets = project.batches.folders(arguments.dataset, clips, "labels")
     wall, busy = workflow_seconds(targets, mocap, arguments.cores)
     print(f"{len(files)} clips, {frames} frames, {size:.1f} MB")
     print(f"read                       {size / reading:8.0f} MB/s")

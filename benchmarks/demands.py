@@ -10,15 +10,72 @@ requested.
 from __future__ import annotations
 
 import argparse
+import re
 import subprocess
 import sys
 from collections import defaultdict
+from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 
-from hobble.workflow.resource_demands import ENGINE_MB
-from hobble.workflow.resource_use import JobResources, planned_jobs, with_measured_use
+from hobble.report.provenance import read_benchmark
+from hobble.workflow.demands import ENGINE_MB
 
 ROOT = Path(__file__).resolve().parents[1]
+# A job in the text of a dry run: the line with its rule, then indented lines `key: value`.
+JOB_BLOCK = re.compile(r"^ *(?:local)?rule ([^\n]+):\n((?: +\w+: .*\n)+)", re.M)
+
+
+@dataclass(frozen=True)
+class JobResources:
+    """What one job requests and, if it has run, what it used.
+
+    log: path of the job's log, relative to the
+    folder of the run. requested_mb, used_mb: memory in MB; the used memory does not include that of Snakemake
+    itself. requested_s, used_s: time in seconds. used_mb or used_s is None if the run has no record of it.
+    """
+
+    rule: str
+    log: str
+    requested_mb: int
+    requested_s: int
+    used_mb: float | None = None
+    used_s: float | None = None
+
+    @property
+    def memory_share(self) -> float:
+        """Used memory, including that of Snakemake itself, divided by the requested memory."""
+        return ((self.used_mb or 0) + ENGINE_MB) / self.requested_mb
+
+    @property
+    def time_share(self) -> float:
+        """Used time divided by the requested time."""
+        return (self.used_s or 0) / self.requested_s
+
+
+def planned_jobs(plan: str) -> Iterator[JobResources]:
+    """The jobs in the text of a dry run, with their requests.
+
+    plan: this text. Raises KeyError for a job that requests no memory or no time.
+    """
+    for rule, block in JOB_BLOCK.findall(plan):
+        values = dict(line.strip().split(": ", 1) for line in block.splitlines())
+        requests = dict(part.split("=", 1) for part in values["resources"].split(", "))
+        yield JobResources(rule, values["log"], int(requests["mem_mb"]), 60 * int(requests["runtime"]))
+
+
+def with_measured_use(jobs: Iterator[JobResources], run: Path) -> Iterator[JobResources]:
+    """The same jobs, with what they used. Jobs without a benchmark are left out.
+
+    run: the folder in which Snakemake ran.
+    """
+    for job in jobs:
+        benchmark = run / job.log.replace("/logs/", "/benchmarks/", 1).replace(".log", ".tsv")
+        if rows := read_benchmark(benchmark) if benchmark.is_file() else []:
+            used = rows[-1]
+            yield JobResources(
+                job.rule, job.log, job.requested_mb, job.requested_s, used.get("max_rss"), used["s"]
+            )
 
 
 def plan(folder: Path, targets: list[str], more: list[str]) -> str:
@@ -57,7 +114,7 @@ def main() -> None:
     options = parser.parse_args(own)
     jobs = list(with_measured_use(planned_jobs(plan(options.folder, options.targets, more)), options.folder))
     if not any(job.used_mb for job in jobs):
-        sys.exit(f"{options.folder}: no run whose logs say what its jobs took")
+        sys.exit(f"{options.folder}: no run whose benchmarks say what its jobs took")
     print(table(jobs))
     short = [job for job in jobs if max(job.memory_share, job.time_share) >= 1]
     for job in short:

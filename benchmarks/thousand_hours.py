@@ -29,11 +29,11 @@ import numpy as np
 import yaml
 
 from hobble.measures.measure import SampleOptions, all_measures
-from hobble.workflow.clip_batches import batch_count
-from hobble.workflow.costs import BATCH_RULES
+from hobble.workflow.batches import batch_count
+from hobble.workflow.configurations import BATCH_RULES
 
 ROOT = Path(__file__).resolve().parents[1]
-OF_BATCHES = {rule for rules in BATCH_RULES.values() for rule in rules}
+OF_BATCHES = {"synthetic_clips"} | {rule for rules in BATCH_RULES.values() for rule in rules}
 # Rules whose work grows with the motion, as far as one run can tell.
 GROWING = {*OF_BATCHES, "database_shard", "database_merge", "training", "recognition", "manners"}
 SAMPLED = {one.name for one in all_measures() if "sample_frames" in one.options.model_fields}

@@ -29,7 +29,6 @@ KINDS: dict[Callable[[Lab, Random], Throw], int] = {
     throws.spoilt_checkpoint: 4,
     runs.kill_run: 5,
     runs.two_runs: 2,
-    runs.stale_lock: 2,
     runs.touched: 1,
 }
 TEXTS_PER_ROUND = 5

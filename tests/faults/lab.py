@@ -22,13 +22,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from hobble.workflow.clip_batches import family_of
-
 from .same import same
 
 ROOT = Path(__file__).resolve().parents[2]
 NOBODY = 65534
-FETCHED = ("page_packages", "page_bundle")  # they ask the npm registry, and read what it gave
+FETCHED = ("page_bundle",)  # it asks the npm registry, and reads what it gave
 PREAMBLE_END = "######## snakemake preamble end #########"
 # Put on the path of every job as sitecustomize: keeps the scripts that Snakemake makes for its jobs.
 KEEP = """
@@ -148,7 +146,7 @@ class Lab:
 
     @contextmanager
     def bench(self, job: Job) -> Iterator[Bench]:
-        """A folder of its own with the job's inputs and their checksums. It is removed afterwards."""
+        """A folder of its own with the job's inputs. It is removed afterwards."""
         folder = Path(tempfile.mkdtemp(prefix="bench-", dir=self.folder))
         try:
             clone(folder / "run", self.run / "src")
@@ -169,9 +167,6 @@ class Bench:
         """Copy the job's inputs from the undisturbed run."""
         for path in self.artefacts:
             _copy(self.lab.run / path, self.folder / path)
-            record = _record(path)
-            if (self.lab.run / record).exists():
-                _copy(self.lab.run / record, self.folder / record)
         (self.folder / "results").mkdir(parents=True, exist_ok=True)
 
     @property
@@ -265,8 +260,9 @@ def _job(source: str) -> Job:
     exec(source[: source.index(PREAMBLE_END)], names)
     sys.path[:] = path
     given = names["snakemake"]
-    rule = family_of(given.rule)
-    return Job(rule, source, tuple(map(str, given.input)), tuple(map(str, given.output)), str(given.log[0]))
+    return Job(
+        given.rule, source, tuple(map(str, given.input)), tuple(map(str, given.output)), str(given.log[0])
+    )
 
 
 def _import(source: str) -> None:
@@ -280,9 +276,3 @@ def _copy(source: Path, target: Path) -> None:
         shutil.copytree(source, target)
     else:
         shutil.copy2(source, target)
-
-
-def _record(path: str) -> str:
-    parts = path.split("/")
-    root = 3 if parts[1] == "datasets" else 2
-    return "/".join([*parts[:root], "checksums", *parts[root:]]) + ".crc32"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import re
 import shutil
@@ -15,12 +14,12 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from random import Random
 
-from .judging import FAULT, REFUSED, REMADE, SKIPPED, TRACEBACK, UNHARMED, Throw
+from .judging import FAULT, REFUSED, REMADE, TRACEBACK, UNHARMED, Throw
 from .lab import End, Job, Lab, tracked
 from .same import same
 
 FAILED = re.compile(r"^\d+ of \d+ jobs done in .*, \d+ failed:$", re.M)
-LOCKED = "cannot be locked"  # Snakemake's own words
+LOCKED = "cannot be locked"  # words of hobble.workflow.lifetime
 
 
 @contextmanager
@@ -158,36 +157,6 @@ def touched(lab: Lab, rng: Random) -> Throw:
 
 def _times(lab: Lab, folder: Path) -> dict[str, int]:
     return {path: (folder / path).stat().st_mtime_ns for job in lab.jobs for path in job.outputs}
-
-
-def stale_lock(lab: Lab, rng: Random) -> Throw:
-    """Kill a run, so that its lock stays. If the lock is of this machine, the same command continues. If it
-    is of another machine, the message says how to remove it, and that works.
-    """
-    elsewhere = rng.random() < 0.5
-    what, at = f"a stale lock of {'another' if elsewhere else 'this'} machine", "a whole run"
-    with _started(lab, rng) as (folder, _):
-        locks = folder / ".snakemake/locks"
-        process = _start(lab, folder, folder / "said")
-        while not (locks / "owner.json").exists() and process.poll() is None:
-            time.sleep(0.01)
-        for pid in (process.pid, *_tree(process.pid)):
-            with suppress(ProcessLookupError):
-                os.kill(pid, signal.SIGKILL)
-        process.wait()
-        owner = locks / "owner.json"
-        if not owner.exists():
-            return Throw(what, at, SKIPPED, "the run had ended before it could be killed")
-        if not elsewhere:
-            return _rerun(lab, folder, what, at, REMADE)
-        owner.write_text(json.dumps({**json.loads(owner.read_text()), "host": "another"}))
-        end = lab.snakemake(folder, "-c2", *lab.targets)
-        if end.status == 0 or LOCKED not in end.said or "--unlock" not in end.said:
-            return Throw(what, at, FAULT, f"status {end.status}: {end.said[-1500:]}")
-        end = lab.snakemake(folder, "--unlock", *lab.targets)
-        if end.status:
-            return Throw(what, at, FAULT, f"--unlock ended in {end.said[-1500:]}")
-        return _rerun(lab, folder, what, at, REFUSED)
 
 
 def two_runs(lab: Lab, rng: Random) -> Throw:

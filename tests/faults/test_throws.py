@@ -12,7 +12,7 @@ import pytest
 from . import attacks, bvh_grammar, runs, status_grammar, texts, throws
 from .damage import DAMAGES
 from .grammar import Case, mutated
-from .judging import FAULT, REFUSED, REMADE, UNHARMED
+from .judging import FAULT, REFUSED, UNHARMED
 from .lab import ROOT, Lab
 from .same import same
 
@@ -60,17 +60,6 @@ def test_a_damaged_input_is_refused_or_harmless(lab: Lab, rule: str) -> None:
 def test_a_second_snakemake_at_once_is_refused_or_harmless(lab: Lab) -> None:
     thrown = runs.two_runs(lab, Random(SEED))
     assert thrown.happened in (REFUSED, UNHARMED), thrown
-
-
-def test_a_stale_lock_is_removed_or_the_message_says_how(lab: Lab) -> None:
-    """A lock of this machine is removed. For one of another machine the message says what to do, and that
-    works.
-    """
-    kinds = {}
-    for number in range(8):
-        if (Random(number).random() < 0.5) not in kinds:
-            kinds[Random(number).random() < 0.5] = runs.stale_lock(lab, Random(number))
-    assert [kinds[elsewhere].happened for elsewhere in (False, True)] == [REMADE, REFUSED], kinds
 
 
 def test_after_touch_of_every_tracked_file_nothing_runs_again(lab: Lab) -> None:

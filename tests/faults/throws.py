@@ -88,7 +88,7 @@ def _old_or_new(bench: Bench, path: str, older: bool) -> bool:
 
 
 def harm(lab: Lab, rng: Random, only: str | None = None) -> Throw:
-    """Cut, flip or zero bytes of one input that another job made. The file's time stays the same."""
+    """Cut, flip or zero bytes of an input that another job made and that holds checksums."""
     there = [(job, path) for job in lab.jobs for path in _files_read(lab, job) if only in (None, job.rule)]
     wanted = rng.choice(sorted({kind(path) for _, path in there}))  # each kind of file as often
     job, path = rng.choice([(job, path) for job, path in there if kind(path) == wanted])
@@ -104,9 +104,9 @@ def harm(lab: Lab, rng: Random, only: str | None = None) -> Throw:
 
 
 def _files_read(lab: Lab, job: Job) -> list[str]:
-    """The files that a job reads and other jobs made, including those in folders."""
+    """The files with checksums that a job reads and other jobs made, including those in folders."""
     roots = [lab.run / path for path in job.inputs if path.startswith("results/")]
-    files = [file for root in roots for file in _files(root) if not file.name.startswith(".")]
+    files = [file for root in roots for file in _files(root) if file.suffix in (".npz", ".safetensors")]
     return sorted(str(file.relative_to(lab.run)) for file in files)
 
 
@@ -218,9 +218,6 @@ def changing_clip(lab: Lab, rng: Random) -> Throw:
     how = rng.choice(("written over", "emptied and written", "replaced"))
     with lab.bench(job) as bench:
         clip = bench.folder / next(p for p in job.inputs if p.endswith(".bvh"))
-        record = next((bench.folder / "results").rglob(f"{clip.name}.crc32"), None)
-        if record is not None:
-            record.unlink()  # a user's clip has no checksum
         new = (lab.run / next(p for p in other.inputs if p.endswith(".bvh"))).read_bytes()
         delay, pause = rng.uniform(0, 0.8 * lab.seconds[job.name]), rng.uniform(0, 0.01)
 
@@ -233,7 +230,7 @@ def changing_clip(lab: Lab, rng: Random) -> Throw:
         if end.status != 0:
             wrong = refusal(end, job, clip.name)
             return Throw("a clip that changes", at, FAULT if wrong else REFUSED, wrong)
-        written = min((bench.folder / path).stat().st_mtime_ns for path in job.outputs)
+        written = min(path.stat().st_mtime_ns for path in _outputs(bench))
         if clip.stat().st_mtime_ns >= written:
             torn = bench.unlike()
             return Throw(
@@ -242,14 +239,18 @@ def changing_clip(lab: Lab, rng: Random) -> Throw:
                 FAULT if torn else UNHARMED,
                 f"neither old nor new: {torn}" * bool(torn),
             )
-        made = {path: (bench.folder / path).read_bytes() for path in job.outputs}
+        made = {path: path.read_bytes() for path in _outputs(bench)}
         end = bench.run()
-        again = {path: (bench.folder / path).read_bytes() for path in job.outputs}
+        again = {path: path.read_bytes() for path in _outputs(bench)}
         if end.status or made != again:
             return Throw(
                 "a clip that changes", at, FAULT, f"{job.name}: the result is not that of the new clip"
             )
         return Throw("a clip that changes", at, UNHARMED)
+
+
+def _outputs(bench: Bench) -> list[Path]:
+    return [file for path in bench.job.outputs for file in _files(bench.folder / path)]
 
 
 def _write_anew(clip: Path, new: bytes, how: str, pause: float) -> None:

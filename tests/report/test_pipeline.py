@@ -7,7 +7,6 @@ import pytest
 
 from hobble.core.errors import InputError
 from hobble.report.provenance import read_benchmark, summarise_pipeline
-from hobble.workflow.kept_files import recorded_seconds
 
 HEADER = "s\th:m:s\tmax_rss\tmax_vms\tmax_uss\tmax_pss\tio_in\tio_out\tmean_load\tcpu_time\n"
 
@@ -72,10 +71,10 @@ def test_times_of_clips_from_earlier_calls_are_counted(tmp_path: Path) -> None:
     benchmark(folder / "other/walk.tsv", 1.0)
     (made / "motion").mkdir(parents=True)
     for clip, seconds in (("a", 3.0), ("b", 1.5)):
-        record = {"fingerprint": "x", "files": [1], "seconds": seconds}
-        (made / f"motion/.{clip}.kept").write_text(json.dumps(record))
+        record = {"key": "x", "files": [1], "seconds": seconds}
+        (made / f"motion/{clip}.npz.json").write_text(json.dumps(record))
     places = {"benchmarks": [str(folder)], "files": [], "batches": ["00"], "made": [str(made)]}
-    (motion,) = summarise_pipeline("c", {"motion": places}, recorded_seconds)["stages"]
+    (motion,) = summarise_pipeline("c", {"motion": places})["stages"]
     assert {rule["rule"]: rule["seconds"] for rule in motion["rules"]} == {"motion_clips": 4.5, "other": 1.0}
     assert (motion["jobs"], motion["seconds"]) == (2, 5.5)
 

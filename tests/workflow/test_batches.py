@@ -5,34 +5,26 @@ from __future__ import annotations
 import json
 import logging
 import os
+import shutil
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
-from hobble.core.errors import InputError
+from hobble.core.errors import HobbleError, InputError
 from hobble.core.files import write_text
-from hobble.workflow.batch_job import job_pieces, make_each
-from hobble.workflow.clip_batches import (
-    LEAST_BATCHES,
-    MOST_CLIPS_OF_A_BATCH,
-    ClipBatch,
-    batch_count,
-    batch_of,
-    dataset_of,
-    family_of,
-    rules_of_job,
-)
+from hobble.workflow.batches import LEAST_BATCHES, MOST_CLIPS_OF_A_BATCH, batch_count, batch_of
+from hobble.workflow.job import Inputs, make_each
+from hobble.workflow.project import Project
 
 
 class Named(dict):
     """Files or params as a script gets them."""
 
     def __iter__(self):
-        return iter(
-            [file for files in self.values() for file in ([files] if isinstance(files, str) else files)]
-        )
+        files = [[file] if isinstance(file, str) else file for file in self.values()]
+        return iter([file for some in files for file in some])
 
     def __getattr__(self, name: str) -> Any:
         return self[name]
@@ -44,40 +36,43 @@ class Job:
     def __init__(self, folder: Path, clips: str) -> None:
         self.folder, self.clips, self.made = folder, clips, []
         self.times = 1
+        self.root = folder / "results/datasets/d"
+        self.batch = self.root / "batches/motion/0"
         for clip in clips:
             (folder / f"{clip}.txt").write_text(f"{clip}\n")
 
     def run(self) -> int:
-        """Run it as Snakemake does, without its outputs at first. Returns its status."""
-        root = self.folder / "results/datasets/d/motion"
-        notes = [sorted(map(str, self.folder.glob(f"{clip}_*.note"))) for clip in self.clips]
-        output = {kind: [str(root / f"{clip}.{kind}") for clip in self.clips] for kind in ("npz", "json")}
-        self.outputs = [Path(path) for paths in output.values() for path in paths]
-        for path in self.outputs:
-            path.unlink(missing_ok=True)
+        """Run it as Snakemake does, without its output at first. Returns its status."""
+        if self.batch.exists():
+            shutil.rmtree(self.batch)
         self.made.clear()
+        clips = [
+            {
+                "clip": clip,
+                "files": {
+                    "source": str(self.folder / f"{clip}.txt"),
+                    "notes": sorted(map(str, self.folder.glob(f"{clip}_*.note"))),
+                },
+            }
+            for clip in self.clips
+        ]
         job = SimpleNamespace(
-            rule="motion_clips__d__0",
+            rule="motion_clips",
             log=[str(self.folder / "job.log")],
-            input=Named(
-                source=[str(self.folder / f"{clip}.txt") for clip in self.clips],
-                notes=[file for files in notes for file in files],
-            ),
-            output=Named(output),
-            params=Named(
-                per_clip=[{"clip": clip} for clip in self.clips],
-                files_per_clip={"notes": [len(files) for files in notes]},
-                times=self.times,
-            ),
+            input=Named(files=[f for c in clips for f in (c["files"]["source"], *c["files"]["notes"])]),
+            output=Named(batch=str(self.batch)),
+            params=Named(clips=clips, times=self.times),
         )
+        writes = {"npz": "motion/{clip}.npz", "json": "motion/{clip}.json", "other": "motion/{mirror}.npz"}
         try:
-            make_each(job, self.make)
+            make_each(job, self.make, writes=writes)
         except SystemExit as end:
             return int(str(end.code))
         return 0
 
     def make(self, piece: Any, log: logging.Logger) -> None:
         self.made.append(piece.name)
+        assert piece.output.keys() == {"npz", "json"}, "this data set has no mirrors"
         text = "".join(Path(file).read_text() for file in [piece.input["source"], *piece.input["notes"]])
         if "torn" in text:
             raise InputError(piece.input["source"], "is torn")
@@ -85,6 +80,10 @@ class Job:
             raise KeyError("left knee")
         write_text(piece.output["npz"], text * piece.params["times"])
         write_text(piece.output["json"], json.dumps(piece.name))
+
+    @property
+    def outputs(self) -> list[Path]:
+        return [self.batch / f"motion/{clip}.{kind}" for kind in ("npz", "json") for clip in self.clips]
 
 
 @pytest.fixture
@@ -97,7 +96,7 @@ def job(tmp_path: Path) -> Job:
 
 def whole(job: Job, clips: str = "abc") -> None:
     for clip in clips:
-        found = job.folder / "results/datasets/d/motion"
+        found = job.batch / "motion"
         assert (found / f"{clip}.npz").read_text().startswith(f"{clip}\n")
         assert json.loads((found / f"{clip}.json").read_text()) == clip
 
@@ -119,36 +118,30 @@ def test_the_batch_of_a_clip_depends_on_its_name_and_batches_split_in_two() -> N
     assert max(sizes) < 2 * 2500 / 96
 
 
-def test_rule_names_give_their_data_set() -> None:
-    batch = ClipBatch("cmu__ava x", 7, "07_hurt", ("a b",), True, hurt=True)
-    rule = batch.rule("terrain_fits")
-    assert (family_of(rule), dataset_of(rule)) == ("terrain_fits", "cmu__ava x")
-    assert (family_of("training"), dataset_of("training")) == ("training", "")
-    assert rules_of_job(["snakemake", "--target-jobs", f"{rule}:", "--cores", "all"]) == [rule]
-    assert rules_of_job(["snakemake", "results/test/report.html"]) == []
+def test_a_clip_has_its_folders_and_a_hurt_version_those_of_the_stage_hurt(root: Path) -> None:
+    batches = Project(root, {}).batches
+    found = batches.folders("tiny", ["uneven-1", "uneven-1_mirror"], "motion", "terrain")
+    assert found == [f"results/datasets/tiny/batches/{stage}/uneven-1" for stage in ("motion", "terrain")]
+    found = batches.folders("tiny", ["uneven-1_hurt1"], "motion", "labels", "channels", "terrain")
+    stages = [folder.removeprefix("results/datasets/tiny/batches/") for folder in found]
+    assert stages == [f"{stage}/uneven-1_hurt" for stage in ("hurt", "terrain")]
+    assert batches.named("tiny", "uneven-1_hurt").originals == ("uneven-1",)
+    with pytest.raises(HobbleError, match="data set tiny has no batch 7; it has walk-straight-1, "):
+        batches.named("tiny", "7")
 
 
-def test_clips_and_mirrors_have_their_paths() -> None:
-    batch = ClipBatch("d", 0, "a", ("a", "b_hurt2"), True)
-    assert batch.of_names("motion/{clip}.npz") == [
-        f"results/datasets/d/motion/{name}.npz" for name in ("a", "b_hurt2", "a_mirror", "b_hurt2_mirror")
-    ]
-    assert batch.of_originals("labels/{clip}.json")[1] == "results/datasets/d/labels/b.json"
-    assert ClipBatch("d", 0, "a", ("a",), False).of_mirrors("motion/{clip}.npz") == []
-
-
-def test_each_clip_of_a_job_gets_its_files() -> None:
-    job = SimpleNamespace(
-        input=Named(one=["a", "b"], shared="s", some=["x", "y", "z"], none=[]),
-        output=Named(out=["A", "B"], mirror=[]),
-        params=Named(
-            per_clip=[{"clip": "a", "k": 1}, {"clip": "b", "k": 2}], files_per_clip={"some": [0, 3]}, code="c"
-        ),
-    )
-    first, second = job_pieces(job)
-    assert first.input == {"one": "a", "shared": "s", "some": []}
-    assert second.input == {"one": "b", "shared": "s", "some": ["x", "y", "z"]}
-    assert (second.output, second.params) == ({"out": "B"}, {"clip": "b", "k": 2, "code": "c"})
+def test_an_input_is_found_wherever_snakemake_has_put_it(tmp_path: Path) -> None:
+    stored, batch = tmp_path / "store/results/x.bvh", tmp_path / "store/batches/motion/0"
+    (batch / "motion").mkdir(parents=True)
+    (batch / "motion/a.npz").write_text("")
+    stored.parent.mkdir()
+    stored.write_text("")
+    find = Inputs([str(batch), str(stored), "mine/a.bvh"])
+    assert find("motion/a.npz") == str(batch / "motion/a.npz")
+    assert find("results/x.bvh") == str(stored)
+    assert find("mine/a.bvh") == "mine/a.bvh"
+    with pytest.raises(InputError, match=r"motion/b\.npz: is missing in the folder of its batch"):
+        find.each("motion/{clip}.npz", ["a", "b"])
 
 
 def test_a_second_run_makes_no_clip_again(job: Job) -> None:
@@ -200,7 +193,7 @@ def test_one_bad_clip_does_not_stop_the_others(
 
 def test_a_damaged_kept_file_is_made_again(job: Job) -> None:
     """The damage is in both names of the file, and its time and size stay the same."""
-    path = job.outputs[0]
+    path = job.root / "motion/a.npz"
     times = path.stat()
     with path.open("r+b") as file:
         file.write(b"X")
@@ -211,27 +204,35 @@ def test_a_damaged_kept_file_is_made_again(job: Job) -> None:
 
 
 def test_with_a_damaged_record_clips_are_made_again(job: Job) -> None:
-    for record in (job.folder / "results/datasets/d/.made").rglob(".*.kept"):
+    for record in (job.folder / "results/datasets/d/.made").rglob("*.json"):
         record.write_text(record.read_text()[:20])
     assert job.run() == 0
     assert job.made == list("abc")
 
 
-def test_a_kept_file_takes_no_space(job: Job) -> None:
-    assert all(path.stat().st_nlink == 2 for path in job.outputs)
-
-
-def test_without_hard_links_it_is_copied(job: Job, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("links", [True, False])
+def test_the_batch_has_links_to_the_files_or_copies(
+    job: Job, monkeypatch: pytest.MonkeyPatch, links: bool
+) -> None:
     def refused(*arguments: object) -> None:
         raise PermissionError(1, "Operation not permitted")
 
-    monkeypatch.setattr(os, "link", refused)
+    if not links:
+        monkeypatch.setattr(os, "link", refused)
     job.times = 3
     assert job.run() == 0
-    assert all(path.stat().st_nlink == 1 for path in job.outputs)
+    assert {path.stat().st_nlink for path in job.outputs} == {2 if links else 1}
     assert job.run() == 0
     assert job.made == []
     whole(job)
+
+
+def test_a_clip_that_fails_leaves_no_older_file(job: Job) -> None:
+    (job.folder / "a.txt").write_text("torn\n")
+    assert job.run() == 1
+    assert sorted(path.name for path in (job.root / "motion").iterdir()) == [
+        "b.json", "b.npz", "c.json", "c.npz",
+    ]  # fmt: skip
 
 
 def test_a_full_disk_ends_the_job_with_one_message(

@@ -118,19 +118,6 @@ def test_wrong_names_in_clip_entries_are_reported_before_anything_runs(
         check_targets(Project(complete, {}), ["results/one/report.html"])
 
 
-def test_a_file_in_both_splits_is_refused_before_anything_runs(complete: Path) -> None:
-    for name, text in (("a", "one motion"), ("b", "one motion"), ("c", "one m0tion")):
-        (complete / f"data/mine/{name}.bvh").write_text(text)
-    message = r'data set mine: b and a are the same file\. The first .* to held_out: \["a"\]'
-    with pytest.raises(HobbleError, match=message):
-        check_targets(Project(complete, {}), ["results/one/report.html"])
-    check_targets(Project(complete, {}), ["results/datasets/mine/look.html"])
-    data = complete / "config/datasets/mine.yaml"
-    data.write_text(DATASET.replace("[b]", "[a, b]").replace("mirror: true", ""))
-    (complete / "data/mine/a_mirror.bvh").unlink()
-    check_targets(Project(complete, {}), ["results/hurt/report.html"])
-
-
 def test_a_skeleton_that_cannot_be_mirrored_is_reported_before_anything_runs(complete: Path) -> None:
     rig = complete / "config/skeletons/s.yaml"
     rig.write_text(rig.read_text().replace("RightFoot", "OtherFoot"))

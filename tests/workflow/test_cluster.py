@@ -8,10 +8,9 @@ from pathlib import Path
 import pytest
 import yaml
 
-from hobble.workflow.clip_batches import LEAST_BATCHES, ClipBatch, batch_of
+from hobble.workflow.batches import LEAST_BATCHES, ClipBatch, batch_of
+from hobble.workflow.demands import WEEK_MINUTES, Demands, bvh_seconds
 from hobble.workflow.project import Project
-from hobble.workflow.resource_demands import ENGINE_MB, WEEK_MINUTES, Demands, bvh_seconds
-from hobble.workflow.resource_use import planned_jobs, with_measured_use
 
 CLIPS = 40
 MANY = "skeleton: holden31\nfolder: many\nmirror: true\nheld_out: [clip-00]\n"
@@ -49,20 +48,6 @@ def test_a_stage_has_a_job_for_each_batch_of_clips(workflow, tmp_path) -> None:
     # Whatever is not in a batch is there once for the data set, the configuration or a measurement or its
     # piece, not once for each clip.
     assert {rule for rule, count in planned.items() if count > 1} == {"measure", "measure_piece"}, planned
-    made = re.findall(
-        r"database/clips/[^/,]+\.npz", workflow.run("-np", *request).partition("rule database_merge")[0]
-    )
-    assert len(set(made)) == 2 * CLIPS
-
-
-@pytest.mark.workflow
-def test_a_job_on_another_machine_has_the_rules_of_its_batch_only(workflow) -> None:
-    """Snakemake starts it with the name of its rule in place of a target."""
-    batch = "motion_clips__tiny__1"
-    workflow.run("-c2", "results/datasets/tiny/motion/walk-straight-2.npz")
-    job = ("-c1", "--allowed-rules", batch, "--target-jobs", f"{batch}:", "--force")
-    workflow.run(*job, "--mode", "remote")
-    assert "motion_clips__tiny__0" not in workflow.run("--list-rules", "--target-jobs", f"{batch}:")
 
 
 @pytest.mark.parametrize("name", ["slurm", "kubernetes", "s3"])
@@ -99,27 +84,29 @@ def test_a_gpu_is_requested_if_training_uses_one(workflow) -> None:
 
 
 def alone(dataset: str, clip: str) -> ClipBatch:
-    return ClipBatch(dataset, 0, clip, (clip,), mirrored=True)
+    return ClipBatch(dataset, clip, (clip,), mirrored=True)
 
 
 def test_requests_grow_with_motion_and_attempt(demands) -> None:
-    short, long = (demands.batch_memory(alone("synthetic", clip), 20) for clip in ("jog-2", "jog-1"))
+    short, long = (demands.batch_memory("hurt", alone("synthetic", clip)) for clip in ("jog-2", "jog-1"))
     assert short < long
-    assert demands.batch_memory(alone("synthetic", "jog-1"), 20, attempt=2) == pytest.approx(2 * long, abs=1)
-    assert demands.batch_memory(alone("synthetic", "jog-1_hurt1"), 20) == long
-    assert demands.batch_memory(alone("synthetic-ava", "jog-1"), 20) > long
-    minutes = [demands.batch_minutes(alone("synthetic", "jog-1"), 600.0, attempt) for attempt in (1, 3)]
+    assert demands.batch_memory("hurt", alone("synthetic", "jog-1"), attempt=2) == pytest.approx(
+        2 * long, abs=1
+    )
+    assert demands.batch_memory("hurt", alone("synthetic", "jog-1_hurt1")) == long
+    assert demands.batch_memory("hurt", alone("synthetic-ava", "jog-1")) > long
+    minutes = [demands.batch_minutes("hurt", alone("synthetic", "jog-1"), attempt) for attempt in (1, 3)]
     assert minutes[1] == 3 * minutes[0]
     assert demands.training_memory("ava") > demands.training_memory("holden")
     assert demands.training_minutes("ava", attempt=10_000) == WEEK_MINUTES
 
 
 def test_a_batch_requests_the_memory_of_its_longest_clip_and_the_time_of_all(demands) -> None:
-    both = ClipBatch("synthetic", 0, "0", ("jog-1", "jog-2"), mirrored=True)
+    both = ClipBatch("synthetic", "0", ("jog-1", "jog-2"), mirrored=True)
     each = [alone("synthetic", clip) for clip in both.clips]
-    assert demands.batch_memory(both, 200) == max(demands.batch_memory(one, 200) for one in each)
-    assert demands.batch_minutes(both, 6000) == pytest.approx(
-        sum(demands.batch_minutes(one, 6000) for one in each), abs=1
+    assert demands.batch_memory("hurt", both) == max(demands.batch_memory("hurt", one) for one in each)
+    assert demands.batch_minutes("hurt", both) == pytest.approx(
+        sum(demands.batch_minutes("hurt", one) for one in each), abs=1
     )
 
 
@@ -129,20 +116,3 @@ def test_the_length_of_a_clip_is_counted_from_its_rows(tmp_path) -> None:
     assert bvh_seconds(bvh(tmp_path / "c.bvh", 0, 500)) is None
     assert bvh_seconds(bvh(tmp_path / "d.bvh", 5, 5, "1.2.3")) is None
     assert bvh_seconds(tmp_path / "not there.bvh") is None
-
-
-def test_used_and_requested_resources_of_a_job(tmp_path) -> None:
-    plan = (
-        "rule motion_clips__x__0:\n    input: a\n    log: results/x/logs/motion/motion_clips/a.log\n"
-        "    resources: tmpdir=/tmp, mem_mb=1000, mem=1 GB, runtime=2, gpu=0\n[now]\n"
-        "rule later:\n    log: results/x/logs/later.log\n    resources: mem_mb=500, runtime=1\n"
-    )
-    log = tmp_path / "results/x/logs/motion/motion_clips/a.log"
-    benchmark = tmp_path / "results/x/benchmarks/motion/motion_clips/a.tsv"
-    for path, text in ((log, "took 500 MB of memory at most\n"), (benchmark, "s\tmax_rss\n30.0\t7.1\n")):
-        path.parent.mkdir(parents=True)
-        path.write_text(text)
-    (job,) = with_measured_use(planned_jobs(plan), tmp_path)
-    assert job.rule == "motion_clips"
-    assert job.memory_share == pytest.approx((500 + ENGINE_MB) / 1000)
-    assert job.time_share == pytest.approx(0.25)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from hobble.workflow.clip_batches import LEAST_BATCHES, batch_of
+from hobble.workflow.batches import LEAST_BATCHES, batch_of
 
 pytestmark = pytest.mark.workflow
 
@@ -181,11 +181,9 @@ def test_one_bad_clip_of_a_batch_does_not_stop_the_others(clips: list[Path], wor
     said = [line for line in text.splitlines() if line.startswith("motion_clips: ")]
     assert len(said) == 1, text
     assert path.name in said[0]
-    assert "0 of 1 jobs done" in text
+    assert "0 of 4 jobs done" in text
     path.write_text(whole)
     make(workflow, *asked, ok=True)
     log = (workflow.folder / "results/datasets/mine/logs/motion/motion_clips/05.log").read_text()
     assert "3 pieces, 2 of them kept from before, 0 failed" in log
-    one, two, three = (workflow.folder / "results/datasets/mine" / name for name in asked)
-    assert {path.stat().st_nlink for path in (one, two, three)} == {2}
     assert make(workflow, *asked, ok=True).count("Nothing to be done") == 1

@@ -1,10 +1,8 @@
-"""Owners of locks, and jobs that end with their run."""
+"""The lock of a folder, and jobs that end with their run."""
 
 from __future__ import annotations
 
-import json
 import os
-import platform
 import signal
 import subprocess
 import sys
@@ -13,6 +11,7 @@ from pathlib import Path
 
 import pytest
 
+from hobble.core.errors import HobbleError
 from hobble.workflow import lifetime
 
 JOB = """
@@ -25,79 +24,33 @@ with job(SimpleNamespace(log=[{log!r}], rule="stage")):
 """
 
 
-@pytest.fixture
-def locks(tmp_path: Path) -> Path:
-    """A lock that this process has taken."""
-    folder = tmp_path / ".snakemake/locks"
-    folder.mkdir(parents=True)
-    (folder / "0.output.lock").write_text("results/a\n")
-    lifetime.record_lock_owner(folder)
-    return folder
+def test_only_one_run_works_in_a_folder_and_its_lock_ends_with_it(tmp_path: Path) -> None:
+    path = tmp_path / ".snakemake/run.lock"
+    holds = f"""
+import sys, time
+from pathlib import Path
+from hobble.workflow.lifetime import lock
+lock(Path({str(path)!r}))
+print("begun", flush=True)
+time.sleep(60)"""
+    run = subprocess.Popen([sys.executable, "-c", holds], stdout=subprocess.PIPE, text=True)
+    assert run.stdout is not None
+    assert run.stdout.readline() == "begun\n"
+    with pytest.raises(HobbleError, match="cannot be locked, because another run of Snakemake is at work"):
+        lifetime.lock(path)
+    run.kill()
+    run.wait()
+    lifetime.lock(path)
 
 
-def owned_by(locks: Path, **changed: object) -> None:
-    owner = json.loads((locks / lifetime.OWNER).read_text())
-    (locks / lifetime.OWNER).write_text(json.dumps(owner | changed))
+def test_a_user_without_a_name_gets_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    def nameless() -> str:
+        raise KeyError("getpwuid(): uid not found")
 
-
-def ended() -> int:
-    """The id of a process that has ended."""
-    process = subprocess.Popen([sys.executable, "-c", ""])
-    process.wait()
-    return process.pid
-
-
-def test_the_lock_of_a_living_run_stays(locks: Path) -> None:
-    assert not lifetime.clear_stale_lock(locks)
-    assert (locks / "0.output.lock").is_file()
-
-
-def test_the_lock_of_a_dead_run_is_removed(locks: Path) -> None:
-    owned_by(locks, pid=ended())
-    assert lifetime.clear_stale_lock(locks)
-    assert list(locks.iterdir()) == []
-    assert [path.name for path in locks.parent.iterdir()] == ["locks"]
-
-
-def test_the_file_of_the_owner_is_never_seen_half_written(
-    locks: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """A run that is killed while it writes leaves no file. An empty one could never be cleared."""
-    (locks / lifetime.OWNER).unlink()
-    write = Path.write_text
-
-    def interrupted(path: Path, text: str, **options: str) -> int:
-        write(path, text[:9], **options)
-        raise KeyboardInterrupt
-
-    with monkeypatch.context() as patch:
-        patch.setattr(Path, "write_text", interrupted)
-        with pytest.raises(KeyboardInterrupt):
-            lifetime.record_lock_owner(locks)
-    assert not (locks / lifetime.OWNER).exists()
-    lifetime.record_lock_owner(locks)
-    owned_by(locks, pid=ended())
-    assert lifetime.clear_stale_lock(locks)
-    assert list(locks.iterdir()) == []
-
-
-def test_a_new_process_with_the_same_id_does_not_own_the_lock(locks: Path) -> None:
-    owned_by(locks, began="1")
-    assert lifetime.clear_stale_lock(locks)
-
-
-def test_a_lock_of_another_machine_stays(locks: Path) -> None:
-    owned_by(locks, host=f"not-{platform.node()}", pid=ended())
-    assert not lifetime.clear_stale_lock(locks)
-
-
-@pytest.mark.parametrize("text", ["", "{}", "[]", "not json", '{"host": 1, "pid": "x", "began": 2}'])
-def test_a_lock_without_an_owner_stays(locks: Path, text: str) -> None:
-    (locks / lifetime.OWNER).write_text(text)
-    assert not lifetime.clear_stale_lock(locks)
-    (locks / lifetime.OWNER).unlink()
-    assert not lifetime.clear_stale_lock(locks)
-    assert (locks / "0.output.lock").is_file()
+    monkeypatch.setattr(lifetime.getpass, "getuser", nameless)
+    monkeypatch.setenv("USER", "somebody")
+    lifetime.ensure_user_name()
+    assert os.environ["USER"] == str(os.getuid())
 
 
 def started(tmp_path: Path, work: str, run: int) -> subprocess.Popen[str]:

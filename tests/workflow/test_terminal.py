@@ -141,12 +141,12 @@ def test_a_dry_run_prints_its_table_once_and_the_reasons() -> None:
 
 
 def test_the_batches_of_a_rule_are_one_line() -> None:
-    stats = {f"motion_clips__cmu-ava__{n}": 1 for n in range(12)} | {"training": 1, "total": 13}
+    stats = {"motion_clips": 12, "training": 1, "total": 13}
     run = Run(dryrun=True)
     run.say("run_info", "Job stats: ...", stats=stats)
     run.say(
         None,
-        "Reasons:\n    code:\n        motion_clips__cmu-ava__0, motion_clips__cmu-ava__11, training\nx, y",
+        "Reasons:\n    code:\n        motion_clips, training\nx, y",
     )
     assert run.lines[3:] == [
         "motion_clips       12",
@@ -160,8 +160,8 @@ def test_the_batches_of_a_rule_are_one_line() -> None:
     run = Run()
     run.say("run_info", "", stats=stats)
     log = "results/datasets/cmu-ava/logs/motion/motion_clips/07.log"
-    run.job(1, "motion_clips__cmu-ava__7", log)
-    run.say("job_error", "", logging.ERROR, jobid=1, rule_name="motion_clips__cmu-ava__7", log=[log])
+    run.job(1, "motion_clips", log, dataset="cmu-ava", batch="07")
+    run.say("job_error", "", logging.ERROR, jobid=1, rule_name="motion_clips", log=[log])
     run.terminal.close()
     assert run.lines[0] == "13 jobs: 12 motion_clips, 1 training"
     assert f"  motion_clips cmu-ava 07: {log}" in run.lines
@@ -174,11 +174,11 @@ def test_a_whole_run_takes_few_lines(workflow) -> None:
     assert len(dry.splitlines()) < 20
     text = workflow.run("-c2", target)
     lines = [line for line in text.splitlines() if not line.startswith("Using workflow specific profile")]
-    assert lines[0] == "3 jobs: 1 synthetic_clips, 1 motion_clips, 1 channel_clips"
-    assert re.fullmatch(r"3 of 3 jobs done in .*\.", lines[-1])
-    assert len([line for line in lines if not line.startswith(("0/3 ", "1/3 ", "2/3 ", "3/3 "))]) == 2
+    assert lines[0] == "4 jobs: 1 synthetic_clips, 1 motion_clips, 1 channel_clips, 1 clip_file"
+    assert re.fullmatch(r"4 of 4 jobs done in .*\.", lines[-1])
+    assert len([line for line in lines if not line.startswith(("0/4 ", "1/4 ", "2/4 ", "3/4 "))]) == 2
     assert "Error in rule" not in text
-    assert "rule synthetic_clips__tiny__0:" in workflow.run("-np", "-F", target)
+    assert "rule synthetic_clips:" in workflow.run("-np", "-F", target)
 
 
 @pytest.mark.workflow
@@ -204,4 +204,4 @@ def test_on_a_terminal_a_failure_has_its_own_line(workflow) -> None:
     assert len([line for line in shown if line.startswith("motion_clips: ") and "torn.bvh" in line]) == 1, (
         shown
     )
-    assert "0 of 1 jobs done in" in said.decode()
+    assert "0 of 2 jobs done in" in said.decode()

@@ -1,6 +1,3 @@
-# Objects such as `clips`, `datasets` and `demands` are made in the Snakefile.
-
-
 rule measure:
     """The results of one measurement of a network, as JSON and CSV tables. hobble.measures has the measurements."""
     input:
@@ -13,7 +10,6 @@ rule measure:
         "results/{configuration}/logs/evaluation/{measure}.log",
     benchmark:
         "results/{configuration}/benchmarks/evaluation/{measure}.tsv"
-    threads: 1
     resources:
         mem_mb=lambda w, attempt: demands.measure_memory(
             w.configuration, w.measure, attempt
@@ -25,6 +21,7 @@ rule measure:
         configuration=lambda w: w.configuration,
         module=lambda w: measurements.module_of(w.measure),
         splits=lambda w: measurements.splits(w.configuration, w.measure),
+        summaries=lambda w: measurements.summaries(w.configuration, w.measure),
         people=lambda w: measurements.people(w.configuration, w.measure),
         runtime=lambda w: measurements.runtime(w.configuration, w.measure),
         options=lambda w: measurements.options(w.configuration, w.measure),
@@ -45,7 +42,6 @@ rule measure_piece:
         "results/{configuration}/logs/evaluation/{measure}-{piece}.log",
     benchmark:
         "results/{configuration}/benchmarks/evaluation/{measure}-{piece}.tsv"
-    threads: 1
     resources:
         mem_mb=lambda w, attempt: demands.measure_memory(
             w.configuration, w.measure, attempt
@@ -58,6 +54,7 @@ rule measure_piece:
         piece=lambda w: w.piece,
         module=lambda w: measurements.module_of(w.measure),
         splits=lambda w: measurements.splits(w.configuration, w.measure),
+        summaries=lambda w: measurements.summaries(w.configuration, w.measure),
         people=lambda w: measurements.people(w.configuration, w.measure),
         runtime=lambda w: measurements.runtime(w.configuration, w.measure),
         options=lambda w: measurements.options(w.configuration, w.measure),

@@ -1,6 +1,3 @@
-# Objects such as `clips`, `datasets` and `demands` are made in the Snakefile.
-
-
 # This rule has no param `code`: if the checksum is right, it does not matter which code downloaded the file.
 rule download_clip:
     """A clip that is not in the user's folder, downloaded from the data set's address."""
@@ -20,57 +17,72 @@ rule download_clip:
         "../scripts/download_clip.py"
 
 
-# A batch is a set of clips that one job processes. Each batch has its own rule.
-for batch in batches_of_clips:
+def motion_files(dataset, clip):
+    """The clip's BVH file, and the file of its rig if this is not the data set's skeleton."""
+    return {
+        "bvh": clips.source(dataset, clip),
+        "rigs": clips.clip_skeleton_files(dataset, clip),
+    }
 
-    rule:
-        """Clips made from BVH files: checked, retargeted to the data set's skeleton, at 60 Hz. Also their mirrors."""
-        name:
-            batch.rule("motion_clips")
-        input:
-            bvh=lambda w, batch=batch: keep_local(
-                [clips.source(batch.dataset, clip) for clip in batch.clips]
-            ),
-            skeleton=lambda w, batch=batch: keep_local(
-                clips.skeleton_file(batch.dataset)
-            ),
-            rigs=lambda w, batch=batch: files_of_batch(batch, clips.clip_skeleton_files),
-        output:
-            clip=batch.of_clips("motion/{clip}.npz"),
-            report=batch.of_clips("motion/{clip}.json"),
-            mirror=batch.of_mirrors("motion/{clip}.npz"),
-            mirror_report=batch.of_mirrors("motion/{clip}.json"),
-        log:
-            batch.log("motion", "motion_clips"),
-        benchmark:
-            batch.benchmark("motion", "motion_clips")
-        threads: 1
-        resources:
-            # The numbers below are MB and seconds for each thousand frames.
-            mem_mb=lambda w, attempt, batch=batch: demands.batch_memory(
-                batch, 13, attempt
-            ),
-            runtime=lambda w, attempt, batch=batch: demands.batch_minutes(
-                batch, 0.3, attempt
-            ),
-        params:
-            # One dictionary for each clip, which is a piece of the job: see hobble.workflow.batch_job.
-            per_clip=lambda w, batch=batch: [
-                {
-                    "clip": clip,
-                    "options": datasets.motion_options(batch.dataset, clip),
-                }
-                for clip in batch.clips
-            ],
-            # Name of an input -> the number of its files for each clip.
-            files_per_clip=lambda w, batch=batch: {
-                "rigs": file_counts(batch, clips.clip_skeleton_files)
-            },
-            skeleton_name=lambda w, batch=batch: catalogue.dataset(
-                batch.dataset
-            ).skeleton,
-            # The folder of skeleton files. They map the joints of one rig to those of another.
-            maps=clips.skeleton_folder,
-            code=lambda w: package.code("motion_clips"),
-        script:
-            "../scripts/motion_clips.py"
+
+rule motion_clips:
+    """Clips made from BVH files: checked, retargeted to the data set's skeleton, at 60 Hz. Also their mirrors."""
+    input:
+        files=lambda w: keep_local(
+            [
+                file
+                for clip in batch_of(w).clips
+                for file in [
+                    clips.source(w.dataset, clip),
+                    *clips.clip_skeleton_files(w.dataset, clip),
+                ]
+            ]
+        ),
+        skeleton=lambda w: keep_local(clips.skeleton_file(w.dataset)),
+    output:
+        batch=directory("results/datasets/{dataset}/batches/motion/{batch}"),
+    log:
+        "results/datasets/{dataset}/logs/motion/motion_clips/{batch}.log",
+    benchmark:
+        "results/datasets/{dataset}/benchmarks/motion/motion_clips/{batch}.tsv"
+    resources:
+        mem_mb=memory("motion"),
+        runtime=minutes("motion"),
+    params:
+        clips=lambda w: [
+            {
+                "clip": clip,
+                "options": datasets.motion_options(w.dataset, clip),
+                "files": motion_files(w.dataset, clip),
+            }
+            for clip in batch_of(w).clips
+        ],
+        mirrored=lambda w: batch_of(w).mirrored,
+        skeleton_name=lambda w: catalogue.dataset(w.dataset).skeleton,
+        # The folder of skeleton files. They map the joints of one rig to those of another.
+        maps=clips.skeleton_folder,
+        code=lambda w: package.code("motion_clips"),
+    script:
+        "../scripts/motion_clips.py"
+
+
+rule clip_file:
+    """One file of a clip, for a user who asks for it by its name. (A job makes the files of a whole batch.)"""
+    input:
+        batches=lambda w: batches.folders(
+            w.dataset,
+            [w.clip],
+            {"terrain/clips": "terrain"}.get(w.place, w.place.partition("/")[0]),
+        ),
+    output:
+        file="results/datasets/{dataset}/{place}/{clip}.{kind}",
+    log:
+        "results/datasets/{dataset}/logs/motion/clip_file/{place}/{clip}.{kind}.log",
+    wildcard_constraints:
+        place="motion|labels|channels/[a-z_]+|terrain/clips|database/clips",
+        kind="npz|json",
+    localrule: True
+    params:
+        name=lambda w: f"{w.place}/{w.clip}.{w.kind}",
+    script:
+        "../scripts/clip_file.py"

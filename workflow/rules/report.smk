@@ -1,36 +1,19 @@
-# Objects such as `clips`, `datasets` and `demands` are made in the Snakefile.
-
-
-rule page_packages:
-    """The npm packages that the pages of reports use, downloaded in the versions of the lock file."""
-    input:
-        keep_local(package.web_files(".json")),
-    output:
-        "results/page/node_modules/.package-lock.json",
-    log:
-        "results/page/logs/report/page_packages.log",
-    localrule: True
-    resources:
-        mem_mb=1000,
-        runtime=10,
-    params:
-        code=package.code("page_packages"),
-    script:
-        "../scripts/page_packages.py"
-
-
 rule page_bundle:
-    """The scripts of the reports' pages and their npm packages, bundled into one file."""
+    """The scripts of the reports' pages and their npm packages, bundled into one file.
+
+    The packages are downloaded in the versions of the lock file, beside the bundle, unless they are there.
+    """
     input:
-        packages=rules.page_packages.output,
+        packages=keep_local(package.web_files(".json")),
         scripts=keep_local(package.web_files(".js")),
     output:
         js="results/page/bundle.js",
     log:
         "results/page/logs/report/page_bundle.log",
+    localrule: True
     resources:
         mem_mb=1000,
-        runtime=5,
+        runtime=10,
     params:
         code=package.code("page_bundle"),
     script:
@@ -71,7 +54,7 @@ rule pipeline_summary:
         runtime=5,
     params:
         configuration=lambda w: w.configuration,
-        stages=lambda w: stages(configurations, project.batches, w.configuration),
+        stages=lambda w: configurations.stages(w.configuration),
         code=package.code("pipeline_summary"),
     script:
         "../scripts/pipeline_summary.py"
@@ -86,26 +69,8 @@ rule report:
         configuration=rules.configuration.output.yaml,
         weights=lambda w: configurations.network(w.configuration, "weights.npz"),
         history=lambda w: configurations.network(w.configuration, "history.csv"),
-        motion=lambda w: configurations.dataset_files(
-            w.configuration, "motion/{clip}.json"
-        ),
-        labels=lambda w: configurations.dataset_files(
-            w.configuration, "labels/{clip}.json"
-        ),
-        channels=lambda w: [
-            file
-            for channel in datasets.channel_sources.channels(
-                configurations.dataset(w.configuration)
-            )
-            for file in configurations.dataset_files(
-                w.configuration, f"channels/{channel}/{{clip}}.json"
-            )
-        ],
-        rows=lambda w: configurations.dataset_files(
-            w.configuration, "database/clips/{clip}.npz"
-        ),
-        terrain=lambda w: configurations.dataset_files(
-            w.configuration, "terrain/clips/{clip}.npz"
+        batches=lambda w: configurations.batch_folders(
+            w.configuration, "motion", "labels", "channels", "terrain", "database"
         ),
         template=keep_local(package.template_files()),
         bundle=rules.page_bundle.output.js,
@@ -116,17 +81,19 @@ rule report:
     benchmark:
         "results/{configuration}/benchmarks/report/report.tsv"
     resources:
-        # 12 MB and .1 s for each thousand frames.
-        mem_mb=lambda w, attempt: demands.evaluation_memory(
-            w.configuration, 12, attempt
+        mem_mb=lambda w, attempt: demands.dataset_memory(
+            "report", configurations.dataset(w.configuration), attempt
         ),
-        runtime=lambda w, attempt: demands.evaluation_minutes(
-            w.configuration, 0.1, attempt, least=10
+        runtime=lambda w, attempt: demands.dataset_minutes(
+            "report", configurations.dataset(w.configuration), attempt
         ),
     params:
         configuration=lambda w: w.configuration,
         dataset=lambda w: configurations.dataset(w.configuration),
         splits=lambda w: configurations.splits(w.configuration),
+        channels=lambda w: datasets.channel_sources.channels(
+            configurations.dataset(w.configuration)
+        ),
         title=lambda w: catalogue.configuration(w.configuration).report.title,
         code=lambda w: package.code(
             "report",
@@ -218,7 +185,7 @@ rule export_web:
     """The character for other web pages: an ES module, its network, TypeScript types and an example page."""
     input:
         weights=lambda w: configurations.network(w.configuration, "weights.npz"),
-        packages=rules.page_packages.output,
+        bundle=rules.page_bundle.output.js,
         scripts=rules.page_bundle.input.scripts,
         files=keep_local([*package.web_files(".ts"), *package.web_files(".html")]),
     output:

@@ -1,6 +1,3 @@
-# Objects such as `clips`, `datasets` and `demands` are made in the Snakefile.
-
-
 rule generate:
     """Motion of the character in scripted scenarios (walk, jog, crouch, limp), as one npz file and as BVH files."""
     input:
@@ -12,7 +9,6 @@ rule generate:
         "results/{configuration}/logs/runtime/generate.log",
     benchmark:
         "results/{configuration}/benchmarks/runtime/generate.tsv"
-    threads: 1
     resources:
         mem_mb=1000,
         runtime=10,
@@ -39,7 +35,6 @@ rule export_onnx:
         "results/{configuration}/benchmarks/runtime/export_onnx_{mode}.tsv"
     wildcard_constraints:
         mode="constant|linear|cubic",
-    threads: 1
     resources:
         mem_mb=2000,
         runtime=10,
@@ -62,7 +57,6 @@ rule export_release:
         "results/{configuration}/logs/runtime/export_release.log",
     benchmark:
         "results/{configuration}/benchmarks/runtime/export_release.tsv"
-    threads: 1
     resources:
         mem_mb=1000,
         runtime=10,
@@ -85,7 +79,6 @@ rule export_glb:
         "results/{configuration}/logs/runtime/export_glb.log",
     benchmark:
         "results/{configuration}/benchmarks/runtime/export_glb.tsv"
-    threads: 1
     resources:
         mem_mb=1500,
         runtime=10,

@@ -1,5 +1,3 @@
-# Objects such as `clips`, `datasets` and `demands` are made in the Snakefile.
-
 from hobble.training.options import Recipe
 
 
@@ -10,7 +8,11 @@ rule training:
         # Only if the training continues that of another configuration.
         checkpoint=lambda w: configurations.start_checkpoint(w.configuration),
         # Only for a network that is built from the clips' rows instead of trained.
-        clips=lambda w: configurations.training_row_files(w.configuration),
+        batches=lambda w: batches.folders(
+            configurations.dataset(w.configuration),
+            configurations.clips_to_build_from(w.configuration),
+            "database",
+        ),
     output:
         weights="results/{configuration}/network/weights.npz",
         history="results/{configuration}/network/history.csv",
@@ -37,6 +39,8 @@ rule training:
         training=lambda w: configurations.section(
             w.configuration, "training", *Recipe.model_fields
         ),
+        # Of a network that is built: the clips from whose rows it is built.
+        clips=lambda w: configurations.clips_to_build_from(w.configuration),
         terrain_side=lambda w: datasets.options(
             configurations.dataset(w.configuration), "database", "terrain_side"
         )["terrain_side"],

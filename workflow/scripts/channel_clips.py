@@ -8,16 +8,16 @@ from hobble.channels import channel
 from hobble.channels.clip_values import read_clip_values, save_values, write_report
 from hobble.core.clip import load_clip
 from hobble.core.files import read_json
-from hobble.workflow.batch_job import make_each
+from hobble.workflow.job import make_each
 
 
 def make_values(piece, log):
     """Write the values of one channel for a clip and its mirror.
 
-    piece: the channel and the clip with their params and files, a `JobPiece`.
+    piece: the channel and the clip with their params and files, a `Piece`.
     """
     name, clip = piece.params["channel"], load_clip(piece.input["clip"])
-    source = channel(name).make_source(piece.params["source"], piece.input.get("files", []))
+    source = channel(name).make_source(piece.params["source"], piece.input["files"])
     values, warnings = read_clip_values(name, clip, source, read_json(piece.input["report"]))
     for warning in warnings:
         log.warning("%s", warning)
@@ -31,4 +31,14 @@ def make_values(piece, log):
         write_report(piece.output["mirror_report"], name, mirror, values, columns, warnings)
 
 
-make_each(snakemake, make_values)
+make_each(
+    snakemake,
+    make_values,
+    reads={"clip": "motion/{clip}.npz", "report": "motion/{clip}.json", "mirror": "motion/{mirror}.npz"},
+    writes={
+        "values": "channels/{channel}/{clip}.npz",
+        "report": "channels/{channel}/{clip}.json",
+        "mirror": "channels/{channel}/{mirror}.npz",
+        "mirror_report": "channels/{channel}/{mirror}.json",
+    },
+)

@@ -10,16 +10,16 @@ from hobble.database.options import RowOptions
 from hobble.rows.build_rows import build_clip_rows
 from hobble.rows.clip_rows import save_clip_rows
 from hobble.rows.summary import save_summary, summary_of_rows
-from hobble.workflow.batch_job import make_each
+from hobble.workflow.job import make_each
 
 
 def make_rows(piece, log):
     """Write the rows of a clip and a summary of them.
 
-    piece: the clip or mirror with its params and files, a `JobPiece`.
+    piece: the clip or mirror with its params and files, a `Piece`.
     """
     options = RowOptions.model_validate(piece.params["options"])
-    files_of_channels = zip(piece.params["channels"], piece.input.get("channels", []), strict=True)
+    files_of_channels = zip(piece.params["channels"], piece.input["channels"], strict=True)
     rows = build_clip_rows(
         piece.name,
         load_clip(piece.input["clip"]),
@@ -35,4 +35,14 @@ def make_rows(piece, log):
     log.info("%d rows, %d fits", len(rows), rows.fits.sum())
 
 
-make_each(snakemake, make_rows)
+make_each(
+    snakemake,
+    make_rows,
+    reads={
+        "clip": "motion/{clip}.npz",
+        "labels": "labels/{clip}.npz",
+        "channels": "channels/{channels}/{clip}.npz",
+        "terrain": "terrain/clips/{clip}.npz",
+    },
+    writes={"rows": "database/clips/{clip}.npz", "summaries": "database/clips/{clip}.json"},
+)

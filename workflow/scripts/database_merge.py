@@ -11,15 +11,18 @@ from hobble.database.merge import merge_shards, write_database
 from hobble.database.options import Merging
 from hobble.database.split_check import refuse_split_pairs
 from hobble.motion.look import clip_digest, duplicate_pairs, load_digests
-from hobble.workflow.job import job
+from hobble.workflow.job import Inputs, job
 
 with job(snakemake) as log:
     options = Merging.model_validate(snakemake.params.options)
     database = Path(snakemake.output.database)
     shards = [Path(folder) for folder in snakemake.input.get("shards", [])]
     # A digest holds what is compared of a clip: a few poses and the checksum of its file.
-    files = zip(snakemake.input.compared, snakemake.input.reports, strict=True)
-    digests = [clip_digest(load_clip(clip), read_json(report)["sha256"]) for clip, report in files]
+    files = Inputs(snakemake.input.get("batches", []))
+    digests = [
+        clip_digest(load_clip(files(f"motion/{clip}.npz")), read_json(files(f"motion/{clip}.json"))["sha256"])
+        for clip in snakemake.params.compared
+    ]
     for shard in shards:
         digests += load_digests(shard / "likenesses.npz")
     refuse_split_pairs(
@@ -30,7 +33,7 @@ with job(snakemake) as log:
     else:
         manifest = write_database(
             database,
-            {Path(file).stem: file for file in snakemake.input.clips},
+            files.each("database/clips/{clip}.npz", snakemake.params.splits),
             snakemake.params.splits,
             channels=snakemake.params.channels,
             sources=snakemake.params.sources,

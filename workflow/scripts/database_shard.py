@@ -11,12 +11,13 @@ from hobble.core.files import read_json
 from hobble.database.options import Merging
 from hobble.database.shard import write_shard
 from hobble.motion.look import clip_digest, save_digests
-from hobble.workflow.job import job
+from hobble.workflow.job import Inputs, job
 
 with job(snakemake) as log:
     options = Merging.model_validate(snakemake.params.options)
     shard = Path(snakemake.output.shard)
-    clips = {Path(file).stem: file for file in snakemake.input.clips}
+    files = Inputs(snakemake.input.batches)
+    clips = files.each("database/clips/{clip}.npz", snakemake.params.splits)
     write_shard(
         shard,
         clips,
@@ -28,7 +29,9 @@ with job(snakemake) as log:
         dtype=options.dtype,
         seed=options.seed,
     )
-    files = zip(snakemake.input.compared, snakemake.input.reports, strict=True)
-    digests = [clip_digest(load_clip(clip), read_json(report)["sha256"]) for clip, report in files]
+    digests = [
+        clip_digest(load_clip(files(f"motion/{clip}.npz")), read_json(files(f"motion/{clip}.json"))["sha256"])
+        for clip in snakemake.params.compared
+    ]
     save_digests(shard / "likenesses.npz", digests)
     log.info("%d clips", len(clips))

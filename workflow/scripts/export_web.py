@@ -12,6 +12,6 @@ with job(snakemake) as log:
         snakemake.output.folder,
         load_network(snakemake.input.weights),
         Runtime.model_validate(snakemake.params.runtime),
-        Path(snakemake.input.packages[0]).parent,  # the folder node_modules
+        Path(snakemake.input.bundle).parent / "node_modules",
     )
     log.info("wrote %s", snakemake.output.folder)

@@ -10,13 +10,23 @@ from hobble.hurt.version import hurt_version
 from hobble.labels.clip_labels import LabelReport, load_labels, save_labels
 from hobble.labels.label import mirror_labels, write_report
 from hobble.motion.edit import mirror_clip, mirror_report
-from hobble.workflow.batch_job import make_each
+from hobble.workflow.job import make_each
+
+# Name -> each file of a hurt version, and of its mirror.
+FILES = {
+    "clip": "motion/{clip}.npz",
+    "report": "motion/{clip}.json",
+    "labels": "labels/{clip}.npz",
+    "label_report": "labels/{clip}.json",
+    "injury": f"channels/{HURT_CHANNEL}/{{clip}}.npz",
+    "injury_report": f"channels/{HURT_CHANNEL}/{{clip}}.json",
+}
 
 
 def make_version(piece, log):
     """Write a hurt version and its mirror.
 
-    piece: the hurt version with its params and files, a `JobPiece`.
+    piece: the hurt version with its params and files, a `Piece`.
     """
     clip = load_clip(piece.input["clip"])
     hurt, label_report = hurt_version(
@@ -63,4 +73,18 @@ def write_files(output, prefix, clip, motion_report, labels, label_report, sever
     write_channel_report(output[f"{prefix}injury_report"], HURT_CHANNEL, clip, severity, links, [])
 
 
-make_each(snakemake, make_version)
+make_each(
+    snakemake,
+    make_version,
+    reads={
+        "clip": "motion/{original}.npz",
+        "report": "motion/{original}.json",
+        "labels": "labels/{original}.npz",
+        "label_report": "labels/{original}.json",
+    },
+    writes={
+        prefix + name: file.replace("{clip}", clip)
+        for prefix, clip in (("", "{clip}"), ("mirror_", "{mirror}"))
+        for name, file in FILES.items()
+    },
+)

@@ -8,18 +8,18 @@ from hobble.core.files import read_json
 from hobble.labels.clip_labels import LabelReport, load_labels, save_labels
 from hobble.labels.label import label_clip, mirror_labels, write_report
 from hobble.labels.options import LabelOptions
-from hobble.workflow.batch_job import make_each
+from hobble.workflow.job import make_each
 
 
 def make_labels(piece, log):
     """Write the labels of a clip and of its mirror.
 
-    piece: the clip with its params and files, a `JobPiece`.
+    piece: the clip with its params and files, a `Piece`.
     """
     clip = load_clip(piece.input["clip"])
     labels, report = label_clip(
         clip,
-        piece.input.get("files", []),
+        piece.input["files"],
         read_json(piece.input["report"]),
         piece.params["gait"],
         piece.params["ground"],
@@ -37,4 +37,14 @@ def make_labels(piece, log):
         write_report(piece.output["mirror_report"], report, labels, mirror)
 
 
-make_each(snakemake, make_labels)
+make_each(
+    snakemake,
+    make_labels,
+    reads={"clip": "motion/{clip}.npz", "report": "motion/{clip}.json", "mirror": "motion/{mirror}.npz"},
+    writes={
+        "labels": "labels/{clip}.npz",
+        "report": "labels/{clip}.json",
+        "mirror": "labels/{mirror}.npz",
+        "mirror_report": "labels/{mirror}.json",
+    },
+)

@@ -8,13 +8,13 @@ from hobble.core.files import write_json
 from hobble.motion.edit import mirror_clip, mirror_report
 from hobble.motion.make import make_clip
 from hobble.motion.options import ClipMotion
-from hobble.workflow.batch_job import make_each
+from hobble.workflow.job import make_each
 
 
 def make_motion(piece, log):
     """Write a clip and its mirror.
 
-    piece: the clip with its params and files, a `JobPiece`.
+    piece: the clip with its params and files, a `Piece`.
     """
     clip, report = make_clip(
         piece.input["bvh"],
@@ -36,4 +36,13 @@ def make_motion(piece, log):
         write_json(piece.output["mirror_report"], mirror_report(report, mirror.name))
 
 
-make_each(snakemake, make_motion)
+make_each(
+    snakemake,
+    make_motion,
+    writes={
+        "clip": "motion/{clip}.npz",
+        "report": "motion/{clip}.json",
+        "mirror": "motion/{mirror}.npz",
+        "mirror_report": "motion/{mirror}.json",
+    },
+)

@@ -3,10 +3,7 @@
 from hobble.core.files import write_json
 from hobble.report.provenance import summarise_pipeline
 from hobble.workflow.job import job
-from hobble.workflow.kept_files import recorded_seconds
 
 with job(snakemake):
     params = snakemake.params
-    write_json(
-        snakemake.output.json, summarise_pipeline(params.configuration, params.stages, recorded_seconds)
-    )
+    write_json(snakemake.output.json, summarise_pipeline(params.configuration, params.stages))

@@ -10,10 +10,17 @@ from hobble.report.gather import gather
 from hobble.report.page import render_report
 from hobble.report.recorded_motion import packed_comparisons, packed_scenes
 from hobble.runtime.options import Runtime
-from hobble.workflow.job import job
+from hobble.workflow.job import Inputs, job
 
 with job(snakemake):
     files, params = snakemake.input, snakemake.params
+    find = Inputs(files.batches)
+
+    def of_clips(name):
+        """The files with this name, which contains {clip}, for all clips."""
+        return list(find.each(name, params.splits).values())
+
+    rows = of_clips("database/clips/{clip}.npz")
     material = gather(
         name=params.configuration,
         dataset=params.dataset,
@@ -24,11 +31,11 @@ with job(snakemake):
         pipeline=files.pipeline,
         history=files.history,
         weights=files.weights,
-        motion=files.motion,
-        labels=files.labels,
-        channels=files.channels,
-        terrain=files.terrain,
-        rows=files.rows,
+        motion=of_clips("motion/{clip}.json"),
+        labels=of_clips("labels/{clip}.json"),
+        channels=[f for name in params.channels for f in of_clips(f"channels/{name}/{{clip}}.json")],
+        terrain=of_clips("terrain/clips/{clip}.npz"),
+        rows=rows,
         measures=all_measures(),
     )
     description = material.network
@@ -37,7 +44,7 @@ with job(snakemake):
     runtime = Runtime.model_validate(material.resolved["configuration"]["runtime"])
     character = playable_with_recogniser(network, runtime)
     first_walk = opening_walk(network, runtime, character, material.measurements.values())
-    captured_and_predicted = packed_comparisons(network, files.rows, params.splits)
+    captured_and_predicted = packed_comparisons(network, rows, params.splits)
     bundle = Path(files.bundle).read_text(encoding="utf-8")
     page = render_report(material, walks, character, captured_and_predicted, bundle, first_walk)
     write_text(snakemake.output.html, page)

@@ -1,29 +1,21 @@
-"""Creates clips of a synthetic walker (BVH, footsteps, gait). A recipe says what the walker does."""
+"""Creates a clip of a synthetic walker (BVH, footsteps, gait). A recipe says what the walker does."""
 
 from pathlib import Path
 
 from hobble.core.untrusted import read_yaml
 from hobble.synthetic.generate_clip import write_clip
 from hobble.synthetic.options import Synthetic
-from hobble.workflow.batch_job import make_each
+from hobble.workflow.job import job
 
-
-def make_synthetic_clip(piece, log):
-    """Write a clip and the label files beside it.
-
-    piece: the clip with its params and files, a `JobPiece`.
-    """
-    source = Path(piece.input["skeleton"])
+with job(snakemake):
+    source, params = Path(snakemake.input.skeleton), snakemake.params
     write_clip(
-        piece.name,
+        params.clip,
         {"name": source.stem, **read_yaml(source)},
-        piece.params["frames"],
-        piece.params["recipe"],
-        Synthetic.model_validate(piece.params["options"]),
-        bvh=piece.output["bvh"],
-        footsteps=piece.output["footsteps"],
-        gait=piece.output["gait"],
+        params.frames,
+        params.recipe,
+        Synthetic.model_validate(params.options),
+        bvh=snakemake.output.bvh,
+        footsteps=snakemake.output.footsteps,
+        gait=snakemake.output.gait,
     )
-
-
-make_each(snakemake, make_synthetic_clip)

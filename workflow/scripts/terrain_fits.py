@@ -7,7 +7,7 @@ from hobble.core.files import load_npz
 from hobble.terrain.clip_fits import clip_fits, save_fits
 from hobble.terrain.options import FitOptions, HeightSampling
 from hobble.terrain.patches import load_patches
-from hobble.workflow.batch_job import make_each
+from hobble.workflow.job import make_each
 
 read_patches = functools.cache(load_patches)  # all clips of the job use the same file
 
@@ -15,7 +15,7 @@ read_patches = functools.cache(load_patches)  # all clips of the job use the sam
 def make_fits(piece, log):
     """Write the patches of ground that fit under a clip.
 
-    piece: the clip or mirror with its params and files, a `JobPiece`.
+    piece: the clip or mirror with its params and files, a `Piece`.
     """
     fits = clip_fits(
         load_clip(piece.input["clip"]),
@@ -29,4 +29,9 @@ def make_fits(piece, log):
     log.info("%d rows in %d cycles, %d fits", len(fits.frame), len(fits.patch), len(fits.heights))
 
 
-make_each(snakemake, make_fits)
+make_each(
+    snakemake,
+    make_fits,
+    reads={"clip": "motion/{clip}.npz", "labels": "labels/{clip}.npz"},
+    writes={"fits": "terrain/clips/{clip}.npz"},
+)

@@ -5,7 +5,7 @@ from pathlib import Path
 from hobble.models import network_options
 from hobble.training.options import Machines, Training
 from hobble.training.run import run
-from hobble.workflow.job import job
+from hobble.workflow.job import Inputs, job
 from hobble.workflow.training_processes import on_machines, train_together
 
 with job(snakemake):
@@ -34,5 +34,5 @@ with job(snakemake):
         history=Path(snakemake.output.history),
         checkpoint=Path(snakemake.output.checkpoint),
         terrain_side=snakemake.params.terrain_side,
-        clips={Path(file).stem: file for file in snakemake.input.clips},
+        clips=Inputs(snakemake.input.batches).each("database/clips/{clip}.npz", snakemake.params.clips),
     )

@@ -11,13 +11,13 @@ import os
 import platform
 import subprocess
 from collections import defaultdict
-from collections.abc import Callable, Container, Iterable, Iterator, Mapping
+from collections.abc import Container, Iterable, Iterator, Mapping
 from importlib import metadata
 from pathlib import Path
 from typing import Any
 
 from hobble.core.errors import InputError
-from hobble.core.files import read_numbers
+from hobble.core.files import read_json, read_numbers
 from hobble.core.processors import processor_name
 from hobble.database.manifest import FILE as MANIFEST
 from hobble.database.manifest import Manifest
@@ -74,7 +74,6 @@ def git_commit(folder: Path) -> dict[str, Any] | None:
 def summarise_pipeline(
     configuration: str,
     stages: Mapping[str, Mapping[str, Iterable[str]]],
-    recorded_seconds: Callable[[Path], float] = lambda folder: 0.0,
 ) -> dict[str, Any]:
     """The content of `pipeline.json`.
 
@@ -88,9 +87,8 @@ def summarise_pipeline(
       "made", other benchmarks do not count. They are left from batches that have changed since, for example
       because a clip was added.
 
-    recorded_seconds: the time of all clips in a folder of "made" together. A missing file is listed under
-    `missing`. It is no error, because a stage may have been copied from another machine without its
-    benchmarks.
+    A missing file is listed under `missing`. It is no error, because a stage may have been copied from
+    another machine without its benchmarks.
 
     If a job was stopped and started again, its benchmark covers only the last start. Its true time is also in
     the history of training (history.csv), or in the records in "made". The longer of both times counts.
@@ -103,7 +101,9 @@ def summarise_pipeline(
     missing: list[str] = []
     entries: list[dict[str, Any]] = []
     for stage, paths in stages.items():
-        clip_seconds = {Path(folder).name: recorded_seconds(Path(folder)) for folder in paths.get("made", ())}
+        clip_seconds = {
+            Path(folder).name: _recorded_seconds(Path(folder)) for folder in paths.get("made", ())
+        }
         by_rule = _read_jobs(
             paths.get("benchmarks", ()), missing, clip_seconds, set(paths.get("batches", ()))
         )
@@ -127,6 +127,11 @@ def summarise_pipeline(
         "machine": machine(),
         "versions": versions(),
     }
+
+
+def _recorded_seconds(folder: Path) -> float:
+    """How many seconds it took to make the clips of a rule, from the records in its folder."""
+    return sum(float(read_json(path)["seconds"]) for path in folder.rglob("*.json"))
 
 
 def read_benchmark(path: str | Path) -> list[dict[str, float]]:

@@ -9,16 +9,28 @@ from typing import Any
 from hobble.config.load_configuration import Catalogue
 from hobble.models import model_of_kind
 from hobble.models.model import BuiltModel, Model
+from hobble.workflow.batches import Batches
 from hobble.workflow.channel_sources import database_folder
 from hobble.workflow.clips import DATASETS
 from hobble.workflow.datasets import Datasets
+from hobble.workflow.job import RECORDS
+
+# Stage of a data set -> its rules that have a job for each batch of clips.
+BATCH_RULES = {
+    "synthetic": (),
+    "motion": ("motion_clips", "hurt_clips"),
+    "labels": ("labels_clips",),
+    "channels": ("channel_clips",),
+    "terrain": ("terrain_fits",),
+    "database": ("database_clips",),
+}
 
 
 class Configurations:
     """The configurations of a project. Each method has the name of a configuration as first argument."""
 
-    def __init__(self, catalogue: Catalogue, datasets: Datasets) -> None:
-        self.catalogue, self.datasets = catalogue, datasets
+    def __init__(self, catalogue: Catalogue, datasets: Datasets, batches: Batches) -> None:
+        self.catalogue, self.datasets, self.batches = catalogue, datasets, batches
 
     def section(self, configuration: str, name: str, *keys: str) -> dict[str, Any]:
         """Key -> value of one section of a configuration as plain data, for `keys` or for all keys."""
@@ -58,16 +70,9 @@ class Configurations:
         """
         return self.datasets.splits(self.dataset(configuration), self.channels(configuration))
 
-    def dataset_files(self, configuration: str, pattern: str) -> list[str]:
-        """Paths of files in the data set's folder.
-
-        pattern: a path in this folder. If it contains {clip}, there is a path for each clip of `splits`, else
-        there is one path.
-        """
-        root = f"{DATASETS}/{self.dataset(configuration)}"
-        if "{clip}" not in pattern:
-            return [f"{root}/{pattern}"]
-        return [f"{root}/{pattern.format(clip=clip)}" for clip in self.splits(configuration)]
+    def batch_folders(self, configuration: str, *stages: str) -> list[str]:
+        """The folders with the files that some stages have made of the clips of `splits`."""
+        return self.batches.folders(self.dataset(configuration), self.splits(configuration), *stages)
 
     def network_owner(self, configuration: str) -> str:
         """Name of the configuration that trains the network: `network_of`, or this one if it is not set."""
@@ -94,19 +99,33 @@ class Configurations:
         """Whether the network is built directly from the rows of the clips instead of trained."""
         return isinstance(self.model(configuration), BuiltModel)
 
-    def training_row_files(self, configuration: str) -> list[str]:
-        """If the network is built: a file for each training clip, in the order of `splits`. Else [].
-
-        A file holds the rows of its clip, in order of frames.
-        """
-        if not self.is_built(configuration):
-            return []
-        root = f"{DATASETS}/{self.dataset(configuration)}/database/clips"
-        return [
-            f"{root}/{clip}.npz" for clip, split in self.splits(configuration).items() if split == "train"
-        ]
+    def clips_to_build_from(self, configuration: str) -> list[str]:
+        """If the network is built: the training clips, in the order of `splits`. Else []."""
+        splits = self.splits(configuration) if self.is_built(configuration) else {}
+        return [clip for clip, split in splits.items() if split == "train"]
 
     def start_checkpoint(self, configuration: str) -> list[str]:
         """Path of the checkpoint from which the training continues, in a list; [] if there is none."""
         other = self.catalogue.configuration(configuration).training.continues
         return [f"results/{other}/network/checkpoint.npz"] if other else []
+
+    def stages(self, configuration: str) -> dict[str, dict[str, list[str]]]:
+        """Where to find what each stage has cost, see `hobble.report.provenance.summarise_pipeline`."""
+        name = self.dataset(configuration)
+        source = self.catalogue.dataset(name).source or name
+        results, root = f"results/{configuration}", f"{DATASETS}/{name}"
+        out = {}
+        for stage, rules in BATCH_RULES.items():
+            home = f"{DATASETS}/{source}" if stage == "synthetic" else root
+            out[stage] = {
+                "benchmarks": [f"{home}/benchmarks/{stage}"],
+                "files": [f"{home}/{stage}"],
+                "batches": list(self.batches.of_dataset(name)),
+                "made": [f"{home}/{RECORDS}/{rule}" for rule in rules],
+            }
+        out["database"]["files"] = [f"{root}/database/clips", self.database(configuration)]
+        trained = f"results/{self.network_owner(configuration)}"
+        out["training"] = {"benchmarks": [f"{trained}/benchmarks/training"], "files": [f"{trained}/network"]}
+        for stage in ("runtime", "evaluation"):
+            out[stage] = {"benchmarks": [f"{results}/benchmarks/{stage}"], "files": [f"{results}/{stage}"]}
+        return out

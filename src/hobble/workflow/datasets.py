@@ -9,7 +9,7 @@ from typing import Any
 from hobble.config.load_configuration import Catalogue
 from hobble.core.errors import HobbleError
 from hobble.core.section import Section
-from hobble.workflow.clip_batches import batch_of
+from hobble.workflow.batches import batch_of
 from hobble.workflow.clips import MIRROR_SUFFIX, Clips, original
 
 

@@ -1,70 +1,336 @@
-"""The context in which a job's script runs: it logs, checks files and turns errors into messages."""
+"""What every job's script runs in: a log, clear errors, and clips that are made one after another.
+
+`job` is for a script that makes one thing, `make_each` for one that makes the files of a batch of clips.
+"""
 
 from __future__ import annotations
 
 import contextlib
+import errno
+import hashlib
+import importlib
+import json
 import logging
 import os
+import shutil
 import sys
+import time
 import traceback
-from collections.abc import Iterator
-from typing import Any
+import zlib
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
-from hobble.core.errors import HobbleError
-from hobble.workflow import checksums
-from hobble.workflow.clip_batches import family_of
+from hobble.core.errors import HobbleError, InputError
+from hobble.core.files import failed_write_error, write_text
+from hobble.workflow.clips import MIRROR_SUFFIX, original
 from hobble.workflow.lifetime import ends_with_run
-from hobble.workflow.peak_memory import peak_memory_mb
+
+if TYPE_CHECKING:
+    from hobble.measures.measure import Measure, MeasureInputs
 
 BUG = "This is a bug in Hobble, not a fault in your data. Please report it with the log."
+# The disk is full, a quota is used up, or the disk is read-only. Every other clip would fail, too.
+DISK_ERRORS = (errno.ENOSPC, errno.EDQUOT, errno.EROFS)
+CLOCK_TICK = 0.02  # seconds; two writes that are this far apart get different modification times
+RECORDS = ".made"  # folder in that of a data set; see `make_each`
 
 
 @contextlib.contextmanager
 def job(snakemake: Any) -> Iterator[logging.Logger]:
-    """Run a script with logging, checks of its files, and clear errors. Yields the logger.
+    """Run a script with a log and clear errors. If the run of Snakemake ends, the script ends, too.
 
-    snakemake: the object that Snakemake gives to scripts. An input causes an error if it has changed since
-    its own job wrote it, or if it changes while this job runs. `log_job` logs messages and errors.
+    snakemake: the object that Snakemake gives to scripts. Yields the logger. Every message goes to the job's
+    log file, warnings and errors also to the terminal. Every error ends the process with status 1, also an
+    input file that changes while the script reads it: otherwise its result would count as up to date.
     """
-    with log_job(snakemake) as report:
-        checksums.delete(getattr(snakemake, "output", ()))
-        with check_and_record(getattr(snakemake, "input", ()), getattr(snakemake, "output", ())):
-            yield report.logger
+    with _logged(snakemake) as log:
+        before = _stamps(map(str, getattr(snakemake, "input", ())))
+        yield log.logger
+        _check_unchanged(before)
+
+
+class Inputs:
+    """Finds a job's input files by their names, wherever Snakemake has put them.
+
+    A file that a rule names has the name that it has there. A file in the folder of a batch is called as in
+    the folder of the data set, such as motion/walk.npz.
+    """
+
+    def __init__(self, paths: Iterable[str]) -> None:
+        self.files: dict[str, str] = {}
+        for path in map(str, paths):
+            if os.path.isdir(path):
+                for folder, _, names in os.walk(path):
+                    within = os.path.relpath(folder, path)
+                    self.files.update({os.path.normpath(f"{within}/{n}"): f"{folder}/{n}" for n in names})
+            else:
+                self.files[path] = path
+
+    def __call__(self, name: str) -> str:
+        """The path of a file. Raises InputError if no job has made it."""
+        if name in self.files:
+            return self.files[name]
+        # Files of an object store lie in another folder.
+        for path in self.files.values():
+            if path.endswith(f"/{name}"):
+                return path
+        raise InputError(
+            name,
+            "is missing in the folder of its batch",
+            fix="Delete that folder in batches/; the next run makes it again.",
+        )
+
+    def each(self, name: str, clips: Iterable[str]) -> dict[str, str]:
+        """Clip -> path of its file. name: contains {clip}."""
+        return {clip: self(name.replace("{clip}", clip)) for clip in clips}
+
+
+def measure_of(snakemake: Any) -> Measure:
+    """The measurement of a job.
+
+    Only this measurement's module is imported. A job runs again if code that its script imports changes. So
+    if the script imported all measurements, each new one would make all others run again.
+    """
+    measure: Measure = importlib.import_module(snakemake.params.module).MEASURE
+    return measure
+
+
+def measure_inputs(snakemake: Any) -> MeasureInputs:
+    """The inputs of the measurement of a job."""
+    from hobble.measures.measure import MeasureInputs
+    from hobble.runtime.options import Runtime
+
+    params, files = snakemake.params, dict(snakemake.input.items())
+    find = Inputs(files.pop("batches", ()))
+    clips = find.each("database/clips/{clip}.npz", params.splits)
+    return MeasureInputs(
+        params.configuration,
+        {name: Path(file) for name, file in files.items() if name != "pieces"},
+        {clip: Path(file) for clip, file in clips.items()},
+        params.splits,
+        params.people,
+        [Path(file) for file in find.each("database/clips/{clip}.json", params.summaries).values()],
+        Runtime.model_validate(params.runtime),
+        {Path(file).stem: Path(file) for file in files.get("pieces", ())},
+    )
+
+
+@dataclass(frozen=True)
+class Piece:
+    """A clip, with what is needed to make its files.
+
+    name: of the clip. params: those of the rule and of this clip. input: name -> path, or a list of paths.
+    output: name -> path.
+    """
+
+    name: str
+    params: Mapping[str, Any]
+    input: Mapping[str, Any]
+    output: Mapping[str, str]
+
+
+def make_each(
+    snakemake: Any,
+    make: Callable[[Piece, logging.Logger], None],
+    *,
+    reads: Mapping[str, str] | None = None,
+    writes: Mapping[str, str],
+) -> None:
+    """Make the files of each clip of a batch, except those that are there already and still right.
+
+    The files get their places in the folder of the data set, such as motion/walk.npz, and stay there if the
+    job fails. Its output is the folder of the batch, with links to them. (Snakemake removes a job's outputs
+    before it runs and after it fails, so finished clips cannot be kept in there.) A record in .made/<rule>/
+    says of what the files were made: a hash of params and inputs, the files' checksums, and the seconds. The
+    folder .made can be deleted at any time. The next jobs then make the files again.
+
+    If a clip fails, its error is reported and the others are still made, unless the disk is full. Then the
+    process ends with status 1.
+
+    make: makes the files of a clip. reads, writes: name in `Piece.input` and `output` -> the file's name in
+    the folder of the data set. It contains {clip}, {original} or, for a file that only clips with mirrors
+    have, {mirror}; and {channel} for the clip's own channel, or {channels} for a list, one for each channel
+    in the param `channels`. Params: `clips` is a list of mappings with the params of each clip; `files` in it
+    maps names to further input files. `mirrored` says whether there are mirrors. Inputs of the rule that are
+    called neither `batches` nor `files` are inputs of each clip.
+    """
+    with _logged(snakemake) as log:
+        folder = Path(snakemake.output.batch)
+        folder.mkdir(parents=True, exist_ok=True)
+        maker = _Maker(snakemake, make, reads or {}, writes, folder)
+        kept = failed = 0
+        for params in snakemake.params.clips:
+            try:
+                kept += maker.make(params, log.logger)
+            except Exception as error:
+                log.error(error)
+                failed += 1
+                cause = error.__cause__ if isinstance(error, InputError) else error
+                if isinstance(cause, OSError) and cause.errno in DISK_ERRORS:
+                    break
+        count = len(snakemake.params.clips)
+        log.logger.info("%d pieces, %d of them kept from before, %d failed", count, kept, failed)
+        if failed:
+            sys.exit(1)
+
+
+class _Maker:
+    """Makes the clips of one job of `make_each`."""
+
+    def __init__(
+        self, snakemake: Any, make: Any, reads: Mapping[str, str], writes: Mapping[str, str], folder: Path
+    ) -> None:
+        self.make_files, self.reads, self.writes, self.folder = make, reads, writes, folder
+        self.root = folder.parents[2]  # the folder of the data set
+        self.records = self.root / RECORDS / snakemake.rule
+        self.params = {name: value for name, value in snakemake.params.items() if name != "clips"}
+        self.inputs = Inputs(snakemake.input)
+        self.shared = {
+            name: file for name, file in snakemake.input.items() if name not in ("batches", "files")
+        }
+        self.digests: dict[tuple[str, Any], str] = {}
+
+    def make(self, own: Mapping[str, Any], log: logging.Logger) -> bool:
+        """Make the files of one clip. Returns whether they were there already."""
+        began = time.monotonic()
+        files = {
+            name: [self.inputs(f) for f in value] if isinstance(value, list) else self.inputs(value)
+            for name, value in own.get("files", {}).items()
+        }
+        params = {**self.params, **{name: value for name, value in own.items() if name != "files"}}
+        reads = {
+            name: [self.inputs(file) for file in named]
+            if "{channels}" in self.reads[name]
+            else self.inputs(named[0])
+            for name, named in _names(self.reads, params).items()
+        }
+        writes = {name: named[0] for name, named in _names(self.writes, params).items()}
+        output = {name: str(self.root / file) for name, file in writes.items()}
+        piece = Piece(params["clip"], params, {**self.shared, **files, **reads}, output)
+        paths = [path for value in piece.input.values() for path in _as_list(value)]
+        before = _stamps(paths)
+        key = self._key(piece, before, writes)
+        record = self.records / f"{next(iter(writes.values()))}.json"
+        kept = _is_made(record, key, output.values())
+        if not kept:
+            for path in (record, *map(Path, output.values())):
+                path.unlink(missing_ok=True)  # a clip that fails leaves no older file
+            log.info("%s:", piece.name)
+            self.make_files(piece, log)
+            _check_unchanged(before)
+            checks = [_crc32(path) for path in output.values()]
+            seconds = round(time.monotonic() - began, 3)
+            write_text(record, json.dumps({"key": key, "files": checks, "seconds": seconds}))
+        for file in writes.values():
+            _link(self.root / file, self.folder / file)
+        return kept
+
+    def _key(self, piece: Piece, stamps: Mapping[str, Any], writes: Mapping[str, str]) -> str:
+        """Hash of everything on which the files of a clip depend."""
+        inputs = {
+            name: [(Path(path).name, self._digest(path, stamps.get(path))) for path in _as_list(value)]
+            for name, value in piece.input.items()
+        }
+        text = json.dumps([dict(piece.params), inputs, dict(writes)], sort_keys=True)
+        return hashlib.sha256(text.encode()).hexdigest()
+
+    def _digest(self, path: str, stamp: Any) -> str:
+        """SHA-256 of a file. A file that several clips need is read once."""
+        if (path, stamp) not in self.digests:
+            try:
+                with open(path, "rb") as file:
+                    self.digests[path, stamp] = hashlib.file_digest(file, "sha256").hexdigest()
+            except OSError:
+                return "cannot be read"  # no error here: what reads the file says why
+        return self.digests[path, stamp]
+
+
+def _names(patterns: Mapping[str, str], params: Mapping[str, Any]) -> dict[str, list[str]]:
+    """Name -> names of files, from patterns as in `make_each`. Files of mirrors only if there are mirrors."""
+    clip, out = params["clip"], {}
+    for name, pattern in patterns.items():
+        if "{mirror}" in pattern and not params.get("mirrored"):
+            continue
+        channels = params["channels"] if "{channels}" in pattern else [params.get("channel", "")]
+        out[name] = [
+            pattern.replace("{channels}", "{channel}")
+            .replace("{channel}", channel)
+            .replace("{original}", original(clip))
+            .replace("{mirror}", clip + MIRROR_SUFFIX)
+            .replace("{clip}", clip)
+            for channel in channels
+        ]
+    return out
+
+
+def _as_list(files: Any) -> list[str]:
+    return [files] if isinstance(files, str) else list(files)
+
+
+def _is_made(record: Path, key: str, paths: Iterable[str]) -> bool:
+    """Whether a record says that these files were made of this, and they are undamaged."""
+    try:
+        found = json.loads(record.read_text(encoding="utf-8"))
+        return bool(found["key"] == key and found["files"] == [_crc32(path) for path in paths])
+    except (OSError, ValueError, KeyError, TypeError):
+        return False
+
+
+def _crc32(path: str) -> int:
+    return zlib.crc32(Path(path).read_bytes())
+
+
+def _link(source: Path, target: Path) -> None:
+    """Give a file a second name, which takes no space, or copy it where the file system has no hard links."""
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        target.unlink(missing_ok=True)
+        try:
+            os.link(source, target)
+        except PermissionError:
+            shutil.copyfile(source, target)
+    except OSError as error:
+        raise failed_write_error(error, target) from error
+
+
+def _stamps(paths: Iterable[str]) -> dict[str, tuple[int, int, int]]:
+    """Path -> modification time (ns), size and inode, for those of the files that exist."""
+    out = {}
+    for path in paths:
+        if os.path.isfile(path):
+            # Wait if the file was written just now, because another write could get the same time.
+            if 0 <= time.time() - os.stat(path).st_mtime < CLOCK_TICK:
+                time.sleep(CLOCK_TICK)
+            status = os.stat(path)
+            out[path] = (status.st_mtime_ns, status.st_size, status.st_ino)
+    return out
+
+
+def _check_unchanged(before: Mapping[str, Any]) -> None:
+    """Raise InputError for a file that was changed, replaced or deleted since `_stamps` returned `before`."""
+    now = _stamps(before)
+    for path, stamp in before.items():
+        if now.get(path) != stamp:
+            raise InputError(path, "changed while it was being read", fix="Run the same command again.")
 
 
 @contextlib.contextmanager
-def check_and_record(inputs: Any, outputs: Any) -> Iterator[None]:
-    """Check the inputs before and after the work in this context, then write the outputs' checksums.
-
-    inputs, outputs: paths. Raises InputError for an input that is damaged or has changed.
-    """
-    before = checksums.stamps(inputs)
-    checksums.verify(inputs)
-    yield
-    checksums.check_unchanged(before)
-    checksums.record(outputs)
-
-
-@contextlib.contextmanager
-def log_job(snakemake: Any) -> Iterator[JobLog]:
-    """Run a script with logging and clear errors. If the run of Snakemake ends, the script ends, too.
-
-    Every message goes to the job's log file. Warnings and errors also go to the terminal. Every error ends
-    the process with status 1.
-    """
-    report = JobLog(str(snakemake.log[0]), family_of(snakemake.rule))
+def _logged(snakemake: Any) -> Iterator[_Log]:
+    """Run a script with a log. An error is reported and ends the process with status 1."""
+    log = _Log(str(snakemake.log[0]), snakemake.rule)
     try:
         with ends_with_run():
-            yield report
-        report.logger.info("took %.0f MB of memory at most", peak_memory_mb())
+            yield log
     except Exception as error:
-        report.error(error)
+        log.error(error)
         sys.exit(1)
     finally:
         logging.shutdown()
 
 
-class JobLog:
+class _Log:
     """Writes a job's messages to its log file, and warnings and errors also to the terminal.
 
     path: the log file. rule: name of the rule, with which each message on the terminal begins.
@@ -96,20 +362,15 @@ class JobLog:
             self.logger.error("%s", error)
         elif isinstance(error, MemoryError):
             self.logger.error("out of memory. Give the job more memory, or use a smaller data set or batch.")
-        elif isinstance(error, OSError):
-            # For example a full disk or a missing permission that no code has turned into a HobbleError.
-            path, reason = error.filename or "a file", error.strerror or error
-            self.logger.error("%s: %s. See %s", path, reason, self.path)
-            self._log_traceback(error)
         else:
-            self.logger.error("%s: %s. %s See %s", type(error).__name__, error, BUG, self.path)
-            self._log_traceback(error)
-
-    def _log_traceback(self, error: Exception) -> None:
-        """Write the traceback to the log file, not to the terminal."""
-        self.logger.removeHandler(self.terminal)
-        self.logger.error("%s", "".join(traceback.format_exception(error)))
-        self.logger.addHandler(self.terminal)
+            if isinstance(error, OSError):  # a full disk or a missing permission that nothing has explained
+                path, reason = error.filename or "a file", error.strerror or error
+                self.logger.error("%s: %s. See %s", path, reason, self.path)
+            else:
+                self.logger.error("%s: %s. %s See %s", type(error).__name__, error, BUG, self.path)
+            self.logger.removeHandler(self.terminal)  # the traceback goes only to the file
+            self.logger.error("%s", "".join(traceback.format_exception(error)))
+            self.logger.addHandler(self.terminal)
 
 
 class _LogFile(logging.FileHandler):

@@ -1,17 +1,16 @@
-"""Clears locks of killed runs, and ends all jobs together with their run. A run is one call of Snakemake.
+"""Locks the folder of a run, and ends all jobs together with their run. A run is one call of Snakemake.
 
-Snakemake's lock does not say which process made it. So the lock of a killed run stays until a person removes
-it. And after SIGINT or SIGTERM, Snakemake waits for running jobs. Therefore a run writes its process id next
-to its lock, and ends its jobs on these signals. Each job checks regularly whether its run still exists.
+Snakemake's own lock (version 9.27) stays after a kill until a person removes it, so the profiles turn it off
+and `lock` takes one that the system releases. After SIGINT or SIGTERM, Snakemake waits for running jobs, so a
+run ends its jobs on these signals. And each job checks regularly whether its run still exists.
 """
 
 from __future__ import annotations
 
 import contextlib
-import json
+import fcntl
+import getpass
 import os
-import platform
-import shutil
 import signal
 import threading
 import time
@@ -20,11 +19,9 @@ from pathlib import Path
 from types import FrameType
 from typing import Any
 
-from hobble.core.errors import HobbleError
-from hobble.core.files import write_json
+from hobble.core.errors import HobbleError, InputError
 
-LOCKS = Path(".snakemake/locks")  # Snakemake's folder of lock files; a run that ends removes it
-OWNER = "owner.json"  # file in this folder that says which process made the locks
+LOCK = Path(".snakemake/run.lock")
 RUN_VARIABLE = "HOBBLE_RUN"  # environment variable of a job: "<process id> <start time>" of its run
 CHECK_SECONDS = 0.5  # time between two checks of a job that its run exists
 GRACE_SECONDS = 2.0  # time for a job to clean up after SIGTERM
@@ -40,42 +37,37 @@ def this_process() -> str:
     return f"{os.getpid()} {_start_time(os.getpid())}"
 
 
-def record_lock_owner(locks: Path = LOCKS) -> None:
-    """Write a file into the folder `locks` that says that this process owns Snakemake's lock."""
-    if locks.is_dir():
-        owner = {"host": platform.node(), "pid": os.getpid(), "began": _start_time(os.getpid())}
-        # The file must be complete even if the run is killed here. With an empty one, no later run could tell
-        # whose lock it is, and so none would clear it.
-        with contextlib.suppress(HobbleError):
-            write_json(locks / OWNER, owner)
+def ensure_user_name() -> None:
+    """If the user has no name, as in a container, set the variable USER to the user's id.
 
-
-def clear_stale_lock(locks: Path = LOCKS) -> bool:
-    """Remove the lock if its owner is a process of this machine that has ended.
-
-    Returns whether the lock was removed.
+    Snakemake and PyTorch need a user name. Jobs inherit the variable.
     """
     try:
-        text = (locks / OWNER).read_text(encoding="utf-8")
-        owner = json.loads(text)
-        host, pid, began = owner["host"], int(owner["pid"]), str(owner["began"])
-    except (OSError, ValueError, TypeError, KeyError):
-        return False
-    if host != platform.node() or _is_alive(pid, began):
-        return False
-    # Rename the folder first. If two runs start together, this works for only one, which removes the lock.
-    stale = locks.with_name(f"{locks.name}.stale.{os.getpid()}")
+        getpass.getuser()
+    except (KeyError, OSError):  # Python 3.13 raises OSError
+        os.environ["USER"] = str(os.getuid())
+
+
+def lock(path: Path = LOCK) -> None:
+    """Let only one run work in this folder at a time. The lock ends with this process, however it ends.
+
+    Raises HobbleError if another run has the lock, and InputError if the folder cannot be written.
+    """
     try:
-        os.rename(locks, stale)
-        same_lock = (stale / OWNER).read_text(encoding="utf-8") == text
-        if same_lock:
-            locks.mkdir(exist_ok=True)  # Snakemake has made this folder already and expects it
-            shutil.rmtree(stale, ignore_errors=True)
-        else:
-            os.rename(stale, locks)  # another run has made a new lock meanwhile
-        return same_lock
-    except OSError:
-        return False
+        path.parent.mkdir(exist_ok=True)
+        handle = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)  # stays open; jobs do not inherit it
+    except OSError as error:
+        fix = "Work in a clone of your own, or ask the owner of this folder for permission."
+        raise InputError(path, f"cannot be written: {error.strerror}", fix=fix) from None
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        raise HobbleError(
+            "This folder cannot be locked, because another run of Snakemake is at work in it. "
+            "Wait until it has ended."
+        ) from None
+    except OSError:  # a file system without locks
+        return
 
 
 def end_jobs_on_signal() -> None:

@@ -13,6 +13,7 @@ from hobble.workflow.clips import Clips, original
 from hobble.workflow.configurations import Configurations
 from hobble.workflow.package import Package
 
+OF_CLIPS = ("clips", "summaries")  # inputs with a file for each clip
 NAMES = tuple(each.name for each in all_measures())  # the names of all measurements
 
 
@@ -45,8 +46,14 @@ class Measurements:
         return [module for one in all_measures() for module in one.shown_modules]
 
     def inputs(self, configuration: str, name: str) -> dict[str, str | list[str]]:
-        """Name of each input of the measurement -> its file or files."""
-        return {item: self._input(configuration, item) for item in measure_named(name).inputs}
+        """Name of each input of the measurement -> its file; `batches` -> the folders with rows of clips."""
+        wanted = measure_named(name).inputs
+        files: dict[str, str | list[str]] = {
+            item: self._input(configuration, item) for item in wanted if item not in OF_CLIPS
+        }
+        if set(OF_CLIPS) & set(wanted):
+            files["batches"] = self.configurations.batch_folders(configuration, "database")
+        return files
 
     def pieces(self, configuration: str, name: str) -> list[str]:
         """Paths of the JSON files of the measurement's pieces; [] if there are fewer than two pieces."""
@@ -58,18 +65,14 @@ class Measurements:
         pieces = chosen.pieces(options, runtime, self.configurations.model(configuration).modes)
         return [piece_file(configuration, name, piece) for piece in pieces] if len(pieces) > 1 else []
 
-    def _input(self, configuration: str, item: str) -> str | list[str]:
-        """The file or files of one input.
+    def _input(self, configuration: str, item: str) -> str:
+        """The file of one input.
 
         item: the input's name. If it is the name of another measurement, the input is this one's result.
         """
         configurations = self.configurations
         if item == "weights":
             return configurations.network(configuration, "weights.npz")
-        if item == "clips":
-            return configurations.dataset_files(configuration, "database/clips/{clip}.npz")
-        if item == "summaries":
-            return configurations.dataset_files(configuration, "database/clips/{clip}.json")
         if item == "skeleton":
             return self.clips.skeleton_file(configurations.dataset(configuration))
         if item == "published":
@@ -79,6 +82,14 @@ class Measurements:
     def splits(self, configuration: str, name: str) -> dict[str, str]:
         """Clip -> "train" or "held_out"; {} if the measurement does not read clips."""
         return self.configurations.splits(configuration) if "clips" in measure_named(name).inputs else {}
+
+    def summaries(self, configuration: str, name: str) -> list[str]:
+        """The clips whose summaries of rows the measurement reads."""
+        return (
+            list(self.configurations.splits(configuration))
+            if "summaries" in measure_named(name).inputs
+            else []
+        )
 
     def people(self, configuration: str, name: str) -> dict[str, str]:
         """Clip -> the person who walks in it; {} if the measurement does not need this.

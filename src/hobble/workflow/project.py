@@ -9,7 +9,7 @@ from typing import Any
 from hobble.config.load_configuration import Catalogue
 from hobble.config.sections import COMPARED
 from hobble.core.errors import HobbleError
-from hobble.workflow.clip_batches import Batches
+from hobble.workflow.batches import Batches
 from hobble.workflow.clips import Clips
 from hobble.workflow.comparison import COMPARE, ComparedConfigurations
 from hobble.workflow.configurations import Configurations
@@ -42,7 +42,7 @@ class Project:
         self.clips = Clips(base, _mocap_folder(config.get(MOCAP, base / "data")), self.catalogue)
         self.batches = Batches(self.clips)
         self.datasets = Datasets(self.catalogue, self.clips)
-        self.configurations = Configurations(self.catalogue, self.datasets)
+        self.configurations = Configurations(self.catalogue, self.datasets, self.batches)
         self.package = Package(base)
         self.measurements = Measurements(self.configurations, self.clips, self.package)
         self.comparison = ComparedConfigurations(

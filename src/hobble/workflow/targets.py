@@ -13,9 +13,7 @@ from typing import TYPE_CHECKING, get_args
 from hobble.channels import all_channels
 from hobble.config.sections import PhaseMode
 from hobble.core.errors import HobbleError, InputError
-from hobble.workflow.clip_batches import dataset_of, rules_of_job
 from hobble.workflow.comparison import COMPARE
-from hobble.workflow.identical_clips import refuse_copies
 from hobble.workflow.project import Project
 
 if TYPE_CHECKING:
@@ -47,17 +45,6 @@ def notes_on_unused_files(project: Project, targets: Iterable[str]) -> list[str]
     return [
         f"data set {name}: {note}" for name in names for note in project.clips.notes_on_unused_files(name)
     ]
-
-
-def needed_datasets(project: Project, arguments: Sequence[str]) -> list[str]:
-    """The names of the data sets that a run of Snakemake needs. arguments: the command line of the run.
-
-    A job on another machine is also a run of Snakemake. It needs only the data set of its rule, or none if
-    the rule has no data set. Any other run needs the data sets that `datasets_of` returns for its targets.
-    """
-    if rules := rules_of_job(arguments):
-        return [name for name in dict.fromkeys(map(dataset_of, rules)) if name]
-    return datasets_of(project, [argument for argument in arguments if argument.startswith("results/")])
 
 
 def datasets_of(project: Project, targets: Iterable[str]) -> list[str]:
@@ -109,7 +96,6 @@ def _check_configuration(project: Project, name: str) -> None:
     dataset = configuration.dataset
     _check_dataset(project, dataset)
     project.datasets.splits(dataset, configuration.channels)  # raises HobbleError for unusable clips
-    refuse_copies(project.clips, project.datasets, dataset, tuple(configuration.channels))
 
 
 def _check_symmetric(project: Project, name: str, configuration: Configuration) -> None:

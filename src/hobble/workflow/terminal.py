@@ -15,8 +15,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TextIO
 
-from hobble.workflow.clip_batches import RULE_NAME_SEPARATOR, dataset_of, family_of
-
 PROGRESS_SECONDS = 10.0  # between lines of progress if the output goes to a file
 WIDTH = 100  # columns of the line of progress on a terminal
 MAX_FAILURES_LISTED = 20  # the summary lists at most this many failed jobs
@@ -30,9 +28,6 @@ SUPERFLUOUS = re.compile(
     r"Exiting because a job execution failed|Look below for error messages|^Shutting down|"
     r"^At least one job did not complete|^WorkflowError:\s*At least one job did not complete"
 )
-# A line with names of rules, indented by eight spaces, in Snakemake's message about why it runs jobs. A rule
-# for a batch of clips is called <name>__<data set>__<number>.
-RULE_LIST = re.compile(rf"(?<=^        )\w+(?:{RULE_NAME_SEPARATOR}[^,\n]+)?(?:, [^,\n]+)*$", re.M)
 # Snakemake's messages that are shown although they are no warnings.
 SHOWN_MESSAGES = re.compile(r"^Nothing to be done|^Reasons:|^This was a dry-run|^Unlocking|^Touching|^Error")
 STOP_MESSAGE = "Terminating processes on user request"  # Snakemake prints this when the user stops the run
@@ -44,8 +39,7 @@ JOB_HINT = re.compile(r"^ *\(check individual jobs above for details\)\n", re.M)
 class Job:
     """What is printed about a job.
 
-    rule: the rule's name without data set and batch number. about: the job's wildcards, or its data set and
-    batch. log: path of the job's log file, or several paths with commas.
+    rule: the rule's name. about: the job's wildcards. log: path of its log, or several with commas.
     """
 
     rule: str
@@ -54,7 +48,7 @@ class Job:
 
     @property
     def name(self) -> str:
-        """The job's name in messages: its rule, then its wildcards or batch."""
+        """The job's name in messages: its rule, then its wildcards."""
         return f"{self.rule} {self.about}".strip()
 
 
@@ -114,10 +108,7 @@ class Terminal:
         """The jobs are planned: print how many jobs each rule has."""
         stats = data.get("stats") or {}  # name of a rule, or "total" -> number of jobs
         self.total = stats.get("total", self.total)
-        rules: Counter[str] = Counter()
-        for rule, count in stats.items():
-            if rule != "total":
-                rules[family_of(rule)] += count
+        rules = Counter({rule: count for rule, count in stats.items() if rule != "total"})
         if self.dryrun and not self.announced:
             self._print_line(_format_table(rules))
         elif not self.announced:
@@ -173,7 +164,7 @@ class Terminal:
             if not (JOB_ENDED.search(text) or SUPERFLUOUS.search(text)) and text:
                 self._print_line(text)
         elif record.levelno >= logging.WARNING or SHOWN_MESSAGES.search(text):
-            self._print_line(JOB_HINT.sub("", RULE_LIST.sub(_shorten_rule_list, text)))
+            self._print_line(JOB_HINT.sub("", text))
 
     def _print_line(self, text: str) -> None:
         """Print a line of text, in place of the line of progress if this is shown."""
@@ -191,10 +182,8 @@ class Terminal:
 def _job_of_event(data: Mapping[str, Any]) -> Job:
     """The job that an event of Snakemake is about. data: fields of the event's log record."""
     rule, logs = str(data["rule_name"]), [str(log) for log in data.get("log") or ()]
-    about = [str(value) for value in dict(data.get("wildcards") or {}).values()]
-    if (dataset := dataset_of(rule)) and logs:
-        about = [dataset, Path(logs[0]).stem]  # the log of a batch's job has the name of the batch
-    return Job(family_of(rule), " ".join(about), ", ".join(logs))
+    about = " ".join(str(value) for value in dict(data.get("wildcards") or {}).values())
+    return Job(rule, about, ", ".join(logs))
 
 
 def _format_table(rules: Mapping[str, int]) -> str:
@@ -203,11 +192,6 @@ def _format_table(rules: Mapping[str, int]) -> str:
     counts = [*rules.items(), ("total", sum(rules.values()))]
     lines = [f"{rule:<{width}}  {count:>7}" for rule, count in counts]
     return "\n".join(["Job stats:", f"{'job':<{width}}    count", f"{'-' * width}  -------", *lines])
-
-
-def _shorten_rule_list(found: re.Match[str]) -> str:
-    """The names in a match of RULE_LIST, without data sets and batch numbers, and each name once."""
-    return ", ".join(dict.fromkeys(family_of(rule) for rule in found[0].split(", ")))
 
 
 def _last_error(log: str) -> str:

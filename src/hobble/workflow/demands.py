@@ -1,9 +1,9 @@
 """Computes the memory and time that jobs request from a cluster.
 
 Memory and time grow with the length of the clips and the number of joints. Requests are made before any job
-has run, so the lengths are estimated from the configuration and the sizes of the user's files. The rates (MB
-or seconds for a thousand frames) were measured on clips of 10,000 and 40,000 frames with 31 joints.
-`benchmarks/demands.py` compares the requests with the logs of a finished run.
+has run, so the lengths are estimated from the configuration and the sizes of the user's files. The rates were
+measured on clips of 10,000 and 40,000 frames with 31 joints. `benchmarks/demands.py` compares the requests
+with what a finished run used.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ import functools
 import math
 import os
 import re
+from dataclasses import dataclass
 from pathlib import Path
 
 from hobble.channels import channel
@@ -20,7 +21,7 @@ from hobble.models import model_of_kind
 from hobble.models.model import TrainedModel
 from hobble.rows.layout import RowLayout
 from hobble.training.options import Machines
-from hobble.workflow.clip_batches import ClipBatch
+from hobble.workflow.batches import ClipBatch
 from hobble.workflow.clips import original
 from hobble.workflow.project import Project
 
@@ -34,73 +35,113 @@ CLIP_SECONDS = 0.1  # seconds for each clip, in addition to the seconds for its 
 ASSUMED_FRAMES = 20_000  # frames of a clip whose length is unknown, such as one that is not downloaded yet
 VISITS_PER_PASS = 10  # how often a pass of training uses a frame: once on each of the grounds fitted under it
 HEADER_BYTES = 1 << 20  # the motion of a BVH file begins within this many bytes
-# A shard is a part of a database that one job makes. It has one row for each frame of some of the clips.
-SHARD_MB = 10  # MB that this job needs for each thousand frames of the longest clip
-ROW_BYTES = 24  # bytes that this job needs for each row of the shard, for its position in the shuffled order
 EXCERPT_THOUSANDS = 2.0  # thousands of frames that a measurement reads at once if it reads only a sample
 WEEK_MINUTES = 7 * 24 * 60  # a job requests at most this time
+
+
+@dataclass(frozen=True)
+class Rate:
+    """What a job needs. mb: for a thousand frames of its longest clip. seconds: for a thousand frames of all.
+
+    mirrors: whether mirrors take as long as their clips. row_bytes: bytes for each frame of all clips. least:
+    the least number of minutes.
+    """
+
+    mb: float
+    seconds: float
+    mirrors: bool = False
+    row_bytes: float = 0.0
+    least: int = 1
+
+
+RATES = {
+    "synthetic": Rate(13, 0.2),
+    "motion": Rate(13, 0.3),
+    "labels": Rate(5, 0.25),
+    "channels": Rate(4, 0.2),  # for each channel
+    "hurt": Rate(20, 0.7),
+    "terrain": Rate(15, 0.3, mirrors=True, least=3),
+    "database": Rate(22, 0.15, mirrors=True),
+    "shard": Rate(10, 0.1, row_bytes=24, least=5),
+    "look": Rate(10, 0.1, row_bytes=24, least=5),
+    "report": Rate(12, 0.1, least=10),
+}
 
 
 class Demands:
     """Computes what a project's jobs request.
 
-    Arguments of the methods: dataset, configuration: names. batch: the clips that one job processes.
-    attempt: 1 for a job's first try, 2 for the second, ... The requests grow with it, so that a job that was
-    killed for lack of memory or time gets more. least: the least number of minutes that a job requests.
+    Arguments of the methods: dataset, configuration: names. stage: a key of RATES. attempt: 1 for a job's
+    first try, 2 for the second, ... The requests grow with it, so that a job that was killed for lack of
+    memory or time gets more.
     """
 
     def __init__(self, project: Project) -> None:
         self.project = project
 
-    def batch_memory(self, batch: ClipBatch, rate: float, attempt: int = 1) -> int:
-        """MB for a batch's job. rate: MB for a thousand frames of its longest clip, with 31 joints."""
-        return _megabytes(rate * max(self._thousands_of_frames(batch)), attempt)
+    def batch_memory(self, stage: str, batch: ClipBatch, attempt: int = 1) -> int:
+        """MB for the job of a batch, which holds one clip at a time."""
+        longest = max(self.thousands_of_frames(batch.dataset, clip) for clip in batch.clips)
+        return _megabytes(RATES[stage].mb * longest, attempt)
 
-    def batch_minutes(self, batch: ClipBatch, rate: float, attempt: int = 1, least: int = 1) -> int:
-        """Minutes for a batch's job that takes `rate` seconds for a thousand frames with 31 joints."""
-        seconds = sum(rate * thousands + CLIP_SECONDS for thousands in self._thousands_of_frames(batch))
-        return _minutes(seconds, attempt, least)
+    def batch_minutes(self, stage: str, batch: ClipBatch, attempt: int = 1) -> int:
+        """Minutes for the job of a batch."""
+        rate = RATES[stage]
+        times = 1 + (rate.mirrors and batch.mirrored)
+        if stage == "channels":
+            times = len(self.project.batches.channels(batch))
+        frames = sum(self.thousands_of_frames(batch.dataset, clip) for clip in batch.clips)
+        return _minutes(times * rate.seconds * frames + CLIP_SECONDS * len(batch.clips), attempt, rate.least)
 
-    def memory_of_longest(self, dataset: str, rate: float, row_bytes: float = 0.0, attempt: int = 1) -> int:
-        """MB for a job that reads one clip after another.
+    def clip_memory(self, stage: str, dataset: str, clip: str, attempt: int = 1) -> int:
+        """MB for a job that makes one clip."""
+        return self.batch_memory(stage, ClipBatch(dataset, clip, (clip,), False), attempt)
 
-        rate: MB for a thousand frames of the longest clip. row_bytes: bytes that the job keeps of each frame
-        of all clips.
-        """
-        longest = max(self.thousands_of_frames(dataset, clip) for clip in self.project.clips.entries(dataset))
-        return _megabytes(rate * longest + row_bytes * self.all_thousands_of_frames(dataset) / 1e3, attempt)
+    def clip_minutes(self, stage: str, dataset: str, clip: str, attempt: int = 1) -> int:
+        """Minutes for a job that makes one clip."""
+        return self.batch_minutes(stage, ClipBatch(dataset, clip, (clip,), False), attempt)
+
+    def dataset_memory(self, stage: str, dataset: str, attempt: int = 1) -> int:
+        """MB for a job that reads one clip after another of a data set."""
+        rate = RATES[stage]
+        kept = rate.row_bytes * self.all_thousands_of_frames(dataset) / 1e3
+        return _megabytes(rate.mb * self._longest(dataset) + kept, attempt)
+
+    def dataset_minutes(self, stage: str, dataset: str, attempt: int = 1) -> int:
+        """Minutes for a job that reads all clips and mirrors of a data set."""
+        rate = RATES[stage]
+        return _minutes(rate.seconds * self.all_thousands_of_frames(dataset), attempt, rate.least)
 
     def shard_memory(self, dataset: str, attempt: int = 1) -> int:
         """MB for a job that makes a shard. It holds one clip at a time, and a few numbers for each row."""
-        longest = max(self.thousands_of_frames(dataset, clip) for clip in self.project.clips.entries(dataset))
-        return _megabytes(SHARD_MB * longest + ROW_BYTES * self._shard_thousands(dataset) / 1e3, attempt)
+        rate = RATES["shard"]
+        rows = rate.row_bytes * self._shard_thousands(dataset) / 1e3
+        return _megabytes(rate.mb * self._longest(dataset) + rows, attempt)
 
-    def shard_minutes(self, dataset: str, rate: float, attempt: int = 1) -> int:
-        """Minutes for a job that takes `rate` seconds for a thousand frames of a shard."""
-        return _minutes(rate * self._shard_thousands(dataset), attempt, least=5)
+    def shard_minutes(self, dataset: str, attempt: int = 1) -> int:
+        """Minutes for a job that makes a shard."""
+        rate = RATES["shard"]
+        return _minutes(rate.seconds * self._shard_thousands(dataset), attempt, rate.least)
 
     def _shard_thousands(self, dataset: str) -> float:
         """Thousands of frames of the largest shard. It may have twice as many as the average shard."""
         shards = self.project.datasets.shards(dataset)
         return self.all_thousands_of_frames(dataset) * min(1.0, 2 / shards if shards > 1 else 1.0)
 
-    def minutes_of_all(self, dataset: str, rate: float, attempt: int = 1, least: int = 1) -> int:
-        """Minutes for a job that takes `rate` seconds for a thousand frames of all clips and mirrors."""
-        return _minutes(rate * self.all_thousands_of_frames(dataset), attempt, least)
-
     def measure_memory(self, configuration: str, name: str, attempt: int = 1) -> int:
         """MB for the job of the measurement `name`."""
         cost = measure_named(name).cost
         if self._measured_share(configuration, name) < 1:
             return _megabytes(cost.memory_mb + cost.mb_per_1000_frames * EXCERPT_THOUSANDS, attempt)
-        fixed = math.ceil(MEMORY_MARGIN * cost.memory_mb * attempt)
-        return fixed + self.evaluation_memory(configuration, cost.mb_per_1000_frames, attempt)
+        longest = self._longest(self.project.configurations.dataset(configuration))
+        return _megabytes(cost.memory_mb + cost.mb_per_1000_frames * longest, attempt)
 
     def measure_minutes(self, configuration: str, name: str, attempt: int = 1) -> int:
         """Minutes for the job of the measurement `name`."""
         cost = measure_named(name).cost
         rate = cost.seconds_per_1000_frames * self._measured_share(configuration, name)
-        return self.evaluation_minutes(configuration, rate, attempt, cost.least_minutes)
+        frames = self.all_thousands_of_frames(self.project.configurations.dataset(configuration))
+        return _minutes(rate * frames, attempt, cost.least_minutes)
 
     def _measured_share(self, configuration: str, name: str) -> float:
         """The share of a data set's frames that the measurement `name` reads; below 1 for a sample."""
@@ -111,18 +152,6 @@ class Demands:
         # `all_thousands_of_frames` is scaled with the number of joints; this factor undoes it.
         frames = 1e3 * self.all_thousands_of_frames(dataset) * MEASURED_JOINTS / self._joints(dataset)
         return min(1.0, section["sample_frames"] / max(frames, 1.0))
-
-    def evaluation_memory(self, configuration: str, rate: float, attempt: int = 1) -> int:
-        """MB for a job that reads one clip after another of the data set that the configuration uses.
-
-        rate: MB for a thousand frames of the longest clip.
-        """
-        return self.memory_of_longest(self.project.configurations.dataset(configuration), rate, 0.0, attempt)
-
-    def evaluation_minutes(self, configuration: str, rate: float, attempt: int = 1, least: int = 1) -> int:
-        """Minutes for a job that takes `rate` seconds for a thousand frames of the configuration's data."""
-        dataset = self.project.configurations.dataset(configuration)
-        return self.minutes_of_all(dataset, rate, attempt, least)
 
     def training_memory(self, configuration: str, attempt: int = 1) -> int:
         """MB for a training, on each of its machines.
@@ -190,9 +219,12 @@ class Demands:
         """Thousands of frames of a clip, multiplied by (its number of joints / MEASURED_JOINTS)."""
         return self._frames(dataset, original(clip)) / 1e3 * self._joints(dataset) / MEASURED_JOINTS
 
-    def _thousands_of_frames(self, batch: ClipBatch) -> list[float]:
-        """What `thousands_of_frames` returns, for each clip of a batch."""
-        return [self.thousands_of_frames(batch.dataset, clip) for clip in batch.clips]
+    @functools.cache  # noqa: B019 - one project lives as long as the process
+    def _longest(self, dataset: str) -> float:
+        """Thousands of frames of the longest clip, scaled like `thousands_of_frames`."""
+        return max(
+            self.thousands_of_frames(dataset, clip) for clip in self.project.clips.listed_entries(dataset)
+        )
 
     def parameter_count(self, configuration: str) -> float:
         """Number of trained parameters of a configuration's network; 0 if it is not trained."""

@@ -1,0 +1,52 @@
+# What the rules share. In functions of rules, `w` holds the job's wildcards. `project` is made in the Snakefile.
+from hobble.channels import channel_packages, display_modules
+from hobble.measures.measure import all_measures
+from hobble.workflow.demands import Demands
+
+catalogue, clips, datasets = project.catalogue, project.clips, project.datasets
+batches, demands, package = project.batches, Demands(project), project.package
+configurations, measurements = project.configurations, project.measurements
+comparison = project.comparison
+
+
+wildcard_constraints:
+    configuration="|".join(catalogue.names()),
+    dataset=r"[^/]+",
+    clip=r"[^/]+",
+    batch=r"[^/]+",
+    channels=r"plain|[a-z_+]+(?<!clips)",
+    measure="|".join(each.name for each in all_measures()),
+    piece="[a-z]+",
+    shard=r"\d+",
+
+
+def keep_local(files):
+    """Mark the files that are not results as local: they stay on disk if results are in an object store.
+
+    files: a path, a list of paths, or a dictionary with such values. The return value has the same form.
+    """
+    if isinstance(files, dict):
+        return {name: keep_local(value) for name, value in files.items()}
+    paths = [files] if isinstance(files, str) else files
+    marked = [path if path.startswith("results/") else local(path) for path in paths]
+    return marked[0] if isinstance(files, str) else marked
+
+
+def batch_of(w):
+    """The clips or hurt versions that one job of a stage processes, see hobble.workflow.batches."""
+    return batches.named(w.dataset, w.batch)
+
+
+def folders(*stages):
+    """An input function: the folders with the files that earlier stages have made of the batch's clips."""
+    return lambda w: batches.folders(w.dataset, batch_of(w).clips, *stages)
+
+
+def memory(stage):
+    """A resource function: the MB of a batch's job, see hobble.workflow.demands."""
+    return lambda w, attempt: demands.batch_memory(stage, batch_of(w), attempt)
+
+
+def minutes(stage):
+    """A resource function: the minutes of a batch's job."""
+    return lambda w, attempt: demands.batch_minutes(stage, batch_of(w), attempt)
