@@ -17,7 +17,7 @@ from runtime import SKELETON, load_skeleton, random_network
 
 from hobble.channels.injury.crowd_severities import severity_inputs
 from hobble.core.processors import processor_name
-from hobble.measures.rollouts_run import RollOutCrowd, RollOutInputs, RollOuts
+from hobble.measures.rollouts_run import RollOutCrowd, RollOutInputs
 from hobble.measures.walks import CrowdTarget, generate_walks
 from hobble.models.load import load_network
 from hobble.models.network import Network
@@ -71,7 +71,7 @@ def roll_outs(network: Network) -> tuple[float, float]:
     per = 1e6 / length / len(starts)
 
     def roll_out(chosen: np.ndarray) -> None:
-        for _ in RollOutCrowd(predictor, [RollOuts(recorded, chosen, length)]).frames():
+        for _ in RollOutCrowd(predictor, recorded, chosen, chosen + length).frames():
             pass
 
     together = seconds(lambda: roll_out(starts))

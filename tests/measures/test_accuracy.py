@@ -18,12 +18,13 @@ from hobble.measures.accuracy_run import (
     Errors,
     clip_errors,
     clips_table,
-    equivalent_joints,
     joint_errors,
     joint_indices,
+    joints_to_measure,
     measure_accuracy,
     predict_function,
 )
+from hobble.measures.measure import JointOptions, MeasureInputs
 from hobble.models.checks import NEEDED_ROLES
 from hobble.models.load import load_network
 from hobble.models.network import Network
@@ -211,8 +212,14 @@ def test_without_held_out_clips_their_error_is_none():
 
 
 def test_equivalent_joints_leave_out_joints_of_larger_skeletons(weights, tmp_path):
-    assert equivalent_joints({"maps": {"holden31": {"Foot": "LeftFoot", "Hips": "Hips"}}}) == ["Foot", "Hips"]
-    assert equivalent_joints({"joints": {}}) is None
+    for skeleton, expected in (
+        ({"maps": {"holden31": {"Foot": "LeftFoot", "Hips": "Hips"}}}, ["Foot", "Hips"]),
+        ({"joints": {}}, None),
+    ):
+        (tmp_path / "skeleton.yaml").write_text(json.dumps(skeleton))
+        inputs = MeasureInputs("x", {"skeleton": tmp_path / "skeleton.yaml"})
+        assert joints_to_measure(inputs, JointOptions(joints="equivalent")) == expected
+        assert joints_to_measure(inputs, JointOptions()) is None
     network = load_network(weights)
     assert joint_indices(network, ["Foot", "Hips"]) == [0, 2]
     assert joint_indices(network) == [0, 1, 2]

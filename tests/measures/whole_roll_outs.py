@@ -7,8 +7,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from hobble.core.quat import Array
-from hobble.measures import rollouts_run as module
-from hobble.measures.rollouts_run import RollOutCrowd, RollOutErrors, RollOutInputs, RollOuts
+from hobble.measures.rollouts_run import (
+    RollOutCrowd,
+    RollOutErrors,
+    RollOutInputs,
+    errors_of_stretches,
+    stretches_of,
+)
 from hobble.measures.sample import LoadedPart
 from hobble.models.network import Predictor
 from hobble.rows.clip_rows import ClipRows
@@ -22,16 +27,14 @@ def roll_out(
     For each age from 1 to `length` there is an array (n', J, 3), in the root frame of frame start + age - 1,
     with heights minus that frame's mean. It holds the first n' roll-outs, those still inside the stretch.
     """
-    crowd = RollOutCrowd(predictor, [RollOuts(inputs, starts, length)])
-    return [place for _, place, _ in crowd.frames()], crowd.phase
+    crowd = RollOutCrowd(predictor, inputs, starts, np.minimum(starts + length, len(inputs.x)))
+    return [place for *_, place in crowd.frames()], crowd.phase
 
 
 def clip_roll_outs(
     predictor: Predictor, rows: ClipRows, joints: Sequence[int], lengths: Sequence[int]
 ) -> dict[int, RollOutErrors]:
-    """Length -> errors of roll-outs over every frame of the clip.
-
-    No roll-out begins at the first frame of a stretch, because the root's movement before it is unknown.
-    """
-    groups = module._roll_out_groups(LoadedPart(rows, 0, len(rows)), predictor.network.layout, lengths)
-    return module._errors_of_parts(predictor, [groups], joints, lengths)[0]
+    """Length -> errors of all roll-outs of the clip."""
+    stretches = stretches_of(LoadedPart(rows, 0, len(rows)), predictor.network.layout)
+    found = errors_of_stretches(predictor, stretches, joints, lengths)
+    return {n: sum((of_stretch[n] for of_stretch in found), RollOutErrors()) for n in lengths}

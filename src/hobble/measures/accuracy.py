@@ -22,8 +22,6 @@ from hobble.core.files import Json
 from hobble.measures.compare import (
     ComparisonAddition,
     ConfigurationResults,
-    DifferenceOf,
-    PublishedRow,
     compare_series,
     published_row,
 )
@@ -442,13 +440,13 @@ def tables(compared: Json) -> dict[str, list[Row]]:
     return {NAME: rows}
 
 
-def accuracy_differences(all_measured: Sequence[ConfigurationResults]) -> list[DifferenceOf]:
+def accuracy_differences(all_measured: Sequence[ConfigurationResults]) -> list[dict[str, Any]]:
     """The difference between the errors of each two configurations, by eq. 3.2 of Segerstedt 2021.
 
     There is a row for each split and each clip on which both configurations were measured. `over` is the name
     of this split or clip.
     """
-    out: list[DifferenceOf] = []
+    out: list[dict[str, Any]] = []
     for a, b in combinations(all_measured, 2):
         errors_a, errors_b = ({**_errors_of_splits(m), **_errors_of_clips(m)} for m in (a, b))
         for over in errors_a:
@@ -469,7 +467,7 @@ def clip_means(found: Json, split: str) -> list[float]:
     return [c["mean"] for c in found["clips"] if c["split"] == split and c["mean"] is not None]
 
 
-def _published_splits(all_measured: Sequence[ConfigurationResults], published: Json) -> list[PublishedRow]:
+def _published_splits(all_measured: Sequence[ConfigurationResults], published: Json) -> list[dict[str, Any]]:
     """Published errors of each configuration, beside our errors on each split."""
     by_name = {m.name: m for m in all_measured}
     out = []
@@ -488,7 +486,7 @@ def _published_splits(all_measured: Sequence[ConfigurationResults], published: J
     return out
 
 
-def _published_clips(all_measured: Sequence[ConfigurationResults], published: Json) -> list[PublishedRow]:
+def _published_clips(all_measured: Sequence[ConfigurationResults], published: Json) -> list[dict[str, Any]]:
     """Published errors of single clips, beside the errors of each configuration on the same clips.
 
     The files of the clips that Holden et al. (2017) released have names that end in _000; the published names

@@ -7,21 +7,15 @@ network gets the captured input of every frame, never its own output.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from hobble.measures.accuracy import Options
-
 import logging
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Literal, NotRequired, TypedDict
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from hobble.core.errors import HobbleError, InputError
-from hobble.core.files import Json
 from hobble.core.quat import Array
 from hobble.database.statistics import Moments
 from hobble.measures.measure import SPLITS, JointOptions, MeasureInputs, Outcome, Row
@@ -32,69 +26,8 @@ from hobble.rows.clip_rows import ClipRows, pair_batches
 from hobble.rows.excerpts import Excerpt
 from hobble.rows.layout import RowLayout
 
-
-class ErrorNumbers(TypedDict):
-    """Errors over `frames` frames.
-
-    mean, sd, p05 to p95: mean, standard deviation and percentiles of the relative error of a joint, that is,
-    the error of its position as a fraction of its captured distance from the root (see
-    `hobble.measures.accuracy.run`). position_error_cm: mean distance between the predicted and the captured
-    position of a joint. If `frames` is 0, the means and sd are None, and there are no percentiles.
-    """
-
-    frames: int
-    mean: float | None
-    sd: float | None
-    position_error_cm: float | None
-    p05: NotRequired[float]
-    p25: NotRequired[float]
-    p50: NotRequired[float]
-    p75: NotRequired[float]
-    p95: NotRequired[float]
-
-
-class ErrorsOfClip(ErrorNumbers):
-    """The errors of one clip. split: "train" or "held_out"."""
-
-    clip: str
-    split: str
-
-
-class ErrorsOfExcerpt(ErrorsOfClip):
-    """The errors of an excerpt of a clip. first_frame, last_frame: its first and last frame in the clip."""
-
-    first_frame: int
-    last_frame: int
-
-
-class ErrorsOfSplit(ErrorNumbers):
-    """The errors over all clips of a split.
-
-    clips: number of clips with measured frames. mean_of_clips: the mean of the mean relative errors of these
-    clips. interval: "mean" or "position_error_cm" -> half the width of its 95 % confidence interval, if only
-    a sample was measured.
-    """
-
-    clips: int
-    mean_of_clips: float | None
-    interval: NotRequired[dict[str, float]]
-
-
-class Accuracy(TypedDict):
-    """The content of accuracy.json, and `excerpts`, which are written to a table instead.
-
-    joints: number of measured joints. sample, excerpts: the size of the sample and the errors of each of its
-    excerpts; missing if all clips were measured as a whole.
-    """
-
-    configuration: str
-    joints: int
-    clips: list[ErrorsOfClip]
-    train: ErrorsOfSplit
-    held_out: ErrorsOfSplit
-    sample: NotRequired[dict[str, int]]
-    excerpts: NotRequired[list[ErrorsOfExcerpt]]
-
+if TYPE_CHECKING:
+    from hobble.measures.accuracy import Options
 
 # A prediction of n frames: inputs (n, X) and phases (n,) -> outputs (n, Y), not standardised. X and Y are the
 # numbers of input and output columns of the network.
@@ -105,7 +38,7 @@ LEAST_DISTANCE = 1e-3  # cm: a joint nearer to the root counts as this far from 
 # With the option `joints: equivalent`, only joints with a counterpart on this skeleton are measured.
 REFERENCE = "holden31"
 # Keys of the errors that have a confidence interval, if only a sample was measured.
-WITH_INTERVAL: tuple[Literal["mean"], Literal["position_error_cm"]] = ("mean", "position_error_cm")
+WITH_INTERVAL = ("mean", "position_error_cm")
 QUANTILES = {"p05": 0.05, "p25": 0.25, "p50": 0.5, "p75": 0.75, "p95": 0.95}
 # Columns of the table of clips.
 COLUMNS = ("clip", "split", "frames", "mean", "sd", "position_error_cm", *QUANTILES)
@@ -133,30 +66,25 @@ class Errors:
             self.frames + other.frames, self.moments + other.moments, self.histogram + other.histogram
         )
 
-    def weighted_by(self, weight: float) -> Errors:
+    def __mul__(self, weight: float) -> Errors:
         """The same errors with `weight` times their weights. `frames` stays the number of measured frames."""
-        return self if weight == 1 else Errors(self.frames, self.moments * weight, self.histogram * weight)
+        return Errors(self.frames, self.moments * weight, self.histogram * weight)
 
     def quantile(self, share: float) -> float:
         """The relative error below which `share` of all errors lie, accurate to about 1 % of its value."""
         below = np.concatenate([[0.0], np.cumsum(self.histogram)])  # weight of the errors below each of EDGES
         return float(np.interp(share * below[-1], below, EDGES))
 
-    def to_dict(self) -> ErrorNumbers:
+    def to_dict(self) -> dict[str, Any]:
         """Plain data for accuracy.json, with quantiles of the relative error; None if there was no frame."""
         if not self.frames:
             return {"frames": 0, "mean": None, "sd": None, "position_error_cm": None}
-        mean, sd = self.moments.mean, self.moments.std
         return {
             "frames": self.frames,
-            "mean": float(mean[0]),
-            "sd": float(sd[0]),
-            "position_error_cm": float(mean[1]),
-            "p05": self.quantile(QUANTILES["p05"]),
-            "p25": self.quantile(QUANTILES["p25"]),
-            "p50": self.quantile(QUANTILES["p50"]),
-            "p75": self.quantile(QUANTILES["p75"]),
-            "p95": self.quantile(QUANTILES["p95"]),
+            "mean": float(self.moments.mean[0]),
+            "sd": float(self.moments.std[0]),
+            "position_error_cm": float(self.moments.mean[1]),
+            **{name: self.quantile(share) for name, share in QUANTILES.items()},
         }
 
 
@@ -225,91 +153,72 @@ def measure_accuracy(
     configuration: str,
     joint_names: Sequence[str] | None = None,
     sample: Sample | None = None,
-) -> Accuracy:
+) -> dict[str, Any]:
     """The content of accuracy.json: errors over the frames of each split, and of each clip, sorted by name.
 
     weights: the network's file. clips: name -> file of rows. splits: name -> "train" or "held_out".
     joint_names: the joints to measure; all by default. sample: the excerpts to measure in place of all clips;
-    then the result also has the size of the sample, confidence intervals, and the errors of each excerpt. In
-    the result, `mean_of_clips` is the mean of the mean errors of clips, as in the published tables. Raises
-    InputError if rows and network have different layouts.
+    then the result also has the size of the sample, confidence intervals, and `excerpts`, the errors of each
+    excerpt. In the result, `mean_of_clips` is the mean of the mean errors of clips, as in the published
+    tables. Raises InputError if rows and network have different layouts.
     """
     network = load_network(weights)
     joints, predict = joint_indices(network, joint_names), predict_function(network)
     of_clip: dict[str, Errors] = {}
-    excerpts: dict[Excerpt, ErrorsOfExcerpt] = {}
-    totals: dict[str, Errors] = dict.fromkeys(SPLITS, Errors())
+    excerpts: dict[Excerpt, dict[str, Any]] = {}
+    totals = dict.fromkeys(SPLITS, Errors())
     for part in clip_parts(clips, sample):
         loaded = part.load()
         check_layout(part.path, loaded.rows, network)
         errors = clip_errors(network, loaded.rows, joints, predict)
         split = splits[part.clip]
-        totals[split] += errors.weighted_by(part.weight)
-        of_clip[part.clip] = of_clip.get(part.clip, Errors()) + errors.weighted_by(part.weight)
+        totals[split] += errors * part.weight
+        of_clip[part.clip] = of_clip.get(part.clip, Errors()) + errors * part.weight
         values = errors.to_dict()
         if part.excerpt is not None:
             first, last = loaded.first_and_last_frame
             place = {"clip": part.clip, "split": split, "first_frame": first, "last_frame": last}
-            excerpts[part.excerpt] = ErrorsOfExcerpt(**place, **values)  # type: ignore[typeddict-item]
+            excerpts[part.excerpt] = {**place, **values}
         log.info("%s: %s", part.excerpt or part.clip, values)
-    entries: list[ErrorsOfClip] = [
-        {"clip": name, "split": splits[name], **errors.to_dict()} for name, errors in of_clip.items()
-    ]
-    train, held_out = (_errors_of_split(split, totals[split], entries) for split in SPLITS)
-    result: Accuracy = {
-        "configuration": configuration,
-        "joints": len(joints),
-        "clips": entries,
-        "train": train,
-        "held_out": held_out,
-    }
-    return result if sample is None else _with_intervals(result, sample, excerpts)
+    entries = [{"clip": name, "split": splits[name], **errors.to_dict()} for name, errors in of_clip.items()]
+    result: dict[str, Any] = {"configuration": configuration, "joints": len(joints), "clips": entries}
+    for split, errors in totals.items():
+        means = [e["mean"] for e in entries if e["split"] == split and e["mean"] is not None]
+        of_clips = {"clips": len(means), "mean_of_clips": float(np.mean(means)) if means else None}
+        result[split] = {**errors.to_dict(), **of_clips}
+    if sample is not None:
+        _add_intervals(result, sample, excerpts)
+        result |= {"sample": sample.to_dict(), "excerpts": list(excerpts.values())}
+    return result
 
 
-def _errors_of_split(split: str, errors: Errors, entries: Sequence[ErrorsOfClip]) -> ErrorsOfSplit:
-    """The entry of a split. errors: over all its frames. entries: the entries of the clips of both splits."""
-    means = [e["mean"] for e in entries if e["split"] == split and e["mean"] is not None]
-    mean = float(np.mean(means)) if means else None
-    return {**errors.to_dict(), "clips": len(means), "mean_of_clips": mean}
-
-
-def _with_intervals(
-    result: Accuracy, sample: Sample, excerpts: Mapping[Excerpt, ErrorsOfExcerpt]
-) -> Accuracy:
-    """The result with the size of the sample, the excerpts, and 95 % confidence intervals for each split.
+def _add_intervals(
+    result: dict[str, Any], sample: Sample, excerpts: Mapping[Excerpt, Mapping[str, Any]]
+) -> None:
+    """Add 95 % confidence intervals to the entry of each split.
 
     `mean_of_clips` becomes a mean over the excerpts, weighted to represent all clips. excerpts: the errors of
     each excerpt that was measured.
     """
     for split in SPLITS:
-        # Excerpt of this split -> its errors.
         of_split = {excerpt: entry for excerpt, entry in excerpts.items() if entry["split"] == split}
         weights = [sample.clip_weights[excerpt] for excerpt in of_split]
-        # Every excerpt of a sample has rows, so no value is None. (`or 0.0` tells the type checker.)
-        means, distances = (
-            {excerpt: entry[key] or 0.0 for excerpt, entry in of_split.items()} for key in WITH_INTERVAL
-        )
-        errors = result[split]
+        result[split]["interval"] = {}
         if of_split:
-            errors["mean_of_clips"] = float(np.average(list(means.values()), weights=weights))
-        pairs = zip(WITH_INTERVAL, (means, distances), strict=True) if of_split else ()
-        errors["interval"] = {key: sample.confidence_half_width(split, values) for key, values in pairs}
-    return {**result, "sample": sample.to_dict(), "excerpts": list(excerpts.values())}
-
-
-def equivalent_joints(skeleton: Json, reference: str = REFERENCE) -> list[str] | None:
-    """Names of the joints of a skeleton that have a counterpart on the skeleton named `reference`.
-
-    skeleton: the content of config/skeletons/<name>.yaml. If its `maps` do not list `reference`, the result
-    is None, which stands for all joints.
-    """
-    counterparts = skeleton.get("maps", {}).get(reference)
-    return None if counterparts is None else list(counterparts)
+            means = [entry["mean"] for entry in of_split.values()]
+            result[split]["mean_of_clips"] = float(np.average(means, weights=weights))
+            for key in WITH_INTERVAL:
+                values = {excerpt: entry[key] for excerpt, entry in of_split.items()}
+                result[split]["interval"][key] = sample.confidence_half_width(split, values)
 
 
 def joints_to_measure(inputs: MeasureInputs, options: JointOptions) -> list[str] | None:
-    """Names of the joints that the options select; None for all."""
-    return equivalent_joints(inputs.skeleton) if options.joints == "equivalent" else None
+    """Names of the joints that the options select; None for all.
+
+    For `equivalent` they are those that have a counterpart on REFERENCE, if the skeleton's `maps` list it.
+    """
+    counterparts = inputs.skeleton.get("maps", {}).get(REFERENCE) if options.joints == "equivalent" else None
+    return None if counterparts is None else list(counterparts)
 
 
 def joint_indices(network: Network, names: Sequence[str] | None = None) -> list[int]:
@@ -345,21 +254,16 @@ def check_layout(where: str | Path, rows: ClipRows, network: Network) -> None:
         )
 
 
-def clips_table(result: Accuracy) -> list[Row]:
+def clips_table(result: Mapping[str, Any]) -> list[Row]:
     """The entries of the clips as rows of a table. Each row has all COLUMNS; a missing value is None."""
     return [{key: clip.get(key) for key in COLUMNS} for clip in result["clips"]]
 
 
 def run(inputs: MeasureInputs, options: Options) -> Outcome:
     """accuracy.json, and the tables `clips` and, if a sample was measured, `excerpts`, with their errors."""
-    sample = sample_to_measure(inputs, options)
+    joints, sample = joints_to_measure(inputs, options), sample_to_measure(inputs, options)
     result = measure_accuracy(
-        inputs.weights,
-        inputs.clips,
-        inputs.splits,
-        inputs.configuration,
-        joints_to_measure(inputs, options),
-        sample,
+        inputs.weights, inputs.clips, inputs.splits, inputs.configuration, joints, sample
     )
     excerpts = {"excerpts": result.pop("excerpts")} if sample else {}
     return Outcome(result, {"clips": clips_table(result), **excerpts})

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Literal, TypedDict
+from typing import Any
 
 import numpy as np
 import yaml
@@ -13,6 +13,9 @@ import yaml
 from hobble.core.files import Json, read_json, read_numbers
 from hobble.measures.measure import Row, functions
 from hobble.models import network_options
+
+# Stage -> what the publications call its files.
+STORED = {"database": "database", "terrain": "patches"}
 
 
 def difference_in_sds(mean_a: float, sd_a: float, mean_b: float, sd_b: float) -> float | None:
@@ -28,25 +31,13 @@ def difference_in_sds(mean_a: float, sd_a: float, mean_b: float, sd_b: float) ->
     return 2 * abs(mean_a - mean_b) / deviations if deviations > 0 else None
 
 
-class StraightLine(TypedDict):
-    """The line y = intercept + slope x. points: number of points. r2: coefficient of determination.
+def fit_line(x: Sequence[float], y: Sequence[float]) -> dict[str, Any]:
+    """The least-squares line y = intercept + slope x through points, and its coefficient of determination r2.
 
-    Unknown values are None.
-    """
-
-    slope: float | None
-    intercept: float | None
-    r2: float | None
-    points: int
-
-
-def fit_line(x: Sequence[float], y: Sequence[float]) -> StraightLine | None:
-    """The least-squares line through the points (x, y); None if x has fewer than two different values.
-
-    `r2` is None if all y are equal.
+    All are None if x has fewer than two different values; `r2` is None if all y are equal.
     """
     if len(set(x)) < 2:
-        return None
+        return {"slope": None, "intercept": None, "r2": None, "points": len(x)}
     slope, intercept = np.polyfit(np.asarray(x, float), np.asarray(y, float), 1)
     rest = np.asarray(y) - (intercept + slope * np.asarray(x, float))
     spread = float(np.sum((np.asarray(y) - np.mean(y)) ** 2))
@@ -80,8 +71,8 @@ class ConfigurationResults:
         """The name of the configuration's data set."""
         return self.resolved["configuration"]["dataset"]
 
-    def stage_value(self, stage: str, key: Literal["seconds", "bytes"]) -> float | None:
-        """The value `key` of a stage in pipeline.json; None if it does not list the stage."""
+    def stage_value(self, stage: str, key: str) -> float | None:
+        """The value "seconds" or "bytes" of a stage in pipeline.json; None if it does not list the stage."""
         return next((s[key] for s in self.pipeline["stages"] if s["stage"] == stage), None)
 
 
@@ -102,7 +93,8 @@ class ComparisonAddition:
     """What one measurement adds to compare.json.
 
     entries: the results of each configuration, under the measurement's name. about: configuration -> entries
-    to add to its description. differences: rows such as `DifferenceOf`. against_published: rows from
+    to add to its description. differences: rows of `compare_series` with the names `a` and `b` of both
+    configurations and `over`, what was compared: a split, a clip or a phase mode. against_published: rows of
     `published_row`. milliseconds: what was measured with a clock, key -> rows. `difference` and
     `against_published` are such keys, and a measurement may have others.
     """
@@ -114,73 +106,30 @@ class ComparisonAddition:
     milliseconds: Mapping[str, Sequence[Row]] = field(default_factory=dict, repr=False)
 
 
-class Difference(TypedDict):
-    """Means and standard deviations (sd) of two series a and b, and their difference. See `compare_series`.
-
-    mean_a, sd_a, mean_b, sd_b: over single frames. sd_of_means_a, sd_of_means_b: standard deviation of the
-    means of single clips or laps.
-    """
-
-    mean_a: float
-    sd_a: float
-    mean_b: float
-    sd_b: float
-    difference: float | None
-    sd_of_means_a: float | None
-    sd_of_means_b: float | None
-    difference_of_means: float | None
-
-
-class DifferenceOf(Difference):
-    """The difference of two configurations, named `a` and `b`.
-
-    over: what was compared: a split, a clip or a phase mode (how the network looks up the phase).
-    """
-
-    a: str
-    b: str
-    over: str
-
-
-class PublishedRow(TypedDict):
-    """A published number next to ours. See `published_row`."""
-
-    measure: str
-    configuration: str
-    unit: str
-    published: float
-    ours: float | None
-    source: str
-    table: str | None
-    other_figure: str | None
-
-
-def compare_series(a: Json, b: Json) -> Difference:
+def compare_series(a: Json, b: Json) -> dict[str, Any]:
     """Means and standard deviations of two series, and their difference by eq. 3.2 of Segerstedt 2021.
 
     a, b: have `mean` and `sd` over single frames, and may have `means`, the mean of each clip or lap.
     `difference` is |mean_a - mean_b| in units of the average sd. `difference_of_means` is the same for the
     means and the sd of `means`, as in the publication. It is None if a or b has fewer than two means.
     """
-    means_of_both = [np.asarray(series.get("means", ()), float) for series in (a, b)]
-    sds = [float(values.std()) if len(values) > 1 else None for values in means_of_both]
+    means_a, means_b = (np.asarray(series.get("means", ()), float) for series in (a, b))
+    sd_a, sd_b = (float(means.std()) if len(means) > 1 else None for means in (means_a, means_b))
     difference_of_means = None
-    if sds[0] is not None and sds[1] is not None:
-        mean_a, mean_b = (float(values.mean()) for values in means_of_both)
-        difference_of_means = difference_in_sds(mean_a, sds[0], mean_b, sds[1])
+    if sd_a is not None and sd_b is not None:
+        difference_of_means = difference_in_sds(float(means_a.mean()), sd_a, float(means_b.mean()), sd_b)
     return {
-        "mean_a": a["mean"],
-        "sd_a": a["sd"],
-        "mean_b": b["mean"],
-        "sd_b": b["sd"],
+        **{f"{key}_{name}": series[key] for name, series in (("a", a), ("b", b)) for key in ("mean", "sd")},
         "difference": difference_in_sds(a["mean"], a["sd"], b["mean"], b["sd"]),
-        "sd_of_means_a": sds[0],
-        "sd_of_means_b": sds[1],
+        "sd_of_means_a": sd_a,
+        "sd_of_means_b": sd_b,
         "difference_of_means": difference_of_means,
     }
 
 
-def published_row(measure: str, row: Json, theirs: float, ours: float | None, unit: str = "") -> PublishedRow:
+def published_row(
+    measure: str, row: Json, theirs: float, ours: float | None, unit: str = ""
+) -> dict[str, Any]:
     """A published number (`theirs`) next to ours, which is None if it was not measured.
 
     measure: what was measured, in words. row: the entry of published.yaml. It has `configuration` and
@@ -212,9 +161,7 @@ def compare_configurations(all_measured: Sequence[ConfigurationResults], publish
     by_measure = {name: compared(all_measured, published) for name, compared in functions("compared")}
     times = ComparisonAddition(milliseconds={"against_published": stage_times(all_measured, published)})
     additions = [*by_measure.values(), times]
-    clock_keys = dict.fromkeys(
-        key for added in additions for key in added.milliseconds
-    )  # each once, in order
+    clock_keys = dict.fromkeys(key for added in additions for key in added.milliseconds)
     return {
         "configurations": [describe_configuration(m, by_measure.values()) for m in all_measured],
         **{name: list(added.entries) for name, added in by_measure.items()},
@@ -254,23 +201,22 @@ def describe_configuration(results: ConfigurationResults, additions: Iterable[Co
     }
 
 
-def stage_sizes(all_measured: Sequence[ConfigurationResults], published: Json) -> list[PublishedRow]:
+def stage_sizes(all_measured: Sequence[ConfigurationResults], published: Json) -> list[dict[str, Any]]:
     """Published sizes of the database and of the terrain patches, next to ours. Sizes are in bytes."""
     by_name = {m.name: m for m in all_measured}
     out = []
     for row in published["stages"]:
-        m = by_name.get(row["configuration"])
-        if row["stage"] == "database":
-            database = m.pipeline.get("database") if m else None
-            ours: float | None = database["bytes"] if database else None
-            out.append(published_row("database", row, row["bytes"], ours, "bytes"))
-        elif row["stage"] == "terrain":
-            ours = m.stage_value("terrain", "bytes") if m else None
-            out.append(published_row("patches", row, row["bytes"], ours, "bytes"))
+        m, ours = by_name.get(row["configuration"]), None
+        if m and row["stage"] == "database":
+            ours = (m.pipeline.get("database") or {}).get("bytes")
+        elif m:
+            ours = m.stage_value("terrain", "bytes")
+        if row["stage"] in STORED:
+            out.append(published_row(STORED[row["stage"]], row, row["bytes"], ours, "bytes"))
     return out
 
 
-def stage_times(all_measured: Sequence[ConfigurationResults], published: Json) -> list[PublishedRow]:
+def stage_times(all_measured: Sequence[ConfigurationResults], published: Json) -> list[dict[str, Any]]:
     """Published times of whole stages of the workflow, in seconds, next to ours."""
     by_name = {m.name: m for m in all_measured}
     out = []
@@ -307,25 +253,16 @@ def flatten(row: Row) -> Row:
     """The row without mappings as values: the entry `b` of a mapping under the key `a` gets the key `a_b`."""
     out: dict[str, object] = {}
     for key, value in row.items():
-        if isinstance(value, Mapping):
-            out |= {f"{key}_{inner}": v for inner, v in value.items()}
-        else:
-            out[key] = value
+        out |= {f"{key}_{k}": v for k, v in value.items()} if isinstance(value, Mapping) else {key: value}
     return out
 
 
 def _training(compared: Json) -> list[Row]:
     """A row for each pass of each training. A value that the training did not record is None."""
-    rows: list[Row] = []
-    columns = list(dict.fromkeys(key for entry in compared["training"] for key in entry))
-    for entry in compared["training"]:
-        for i in range(len(entry.get("pass", ()))):
-            rows.append(
-                {
-                    column: entry[column]
-                    if column == "configuration"
-                    else entry.get(column, [None] * (i + 1))[i]
-                    for column in columns
-                }
-            )
-    return rows
+    columns = dict.fromkeys(key for entry in compared["training"] for key in entry if key != "configuration")
+    return [
+        {"configuration": entry["configuration"]}
+        | {column: entry[column][i] if column in entry else None for column in columns}
+        for entry in compared["training"]
+        for i in range(len(entry.get("pass", ())))
+    ]

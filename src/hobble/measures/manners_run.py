@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import combinations
-from typing import NotRequired, TypedDict
+from typing import Any
 
 import numpy as np
 
@@ -25,110 +25,6 @@ from hobble.models.network import Network
 from hobble.rows.captured import Captured
 from hobble.rows.layout import GAITS
 from hobble.runtime.options import Runtime
-
-
-class LeftOut(TypedDict):
-    """How well the manner of captured people is recognised after learning from all other people.
-
-    shrinkage: how much the recogniser's covariance is shrunk towards its diagonal, 0 to 1. people: number of
-    people. people_of: manner -> number of people. windows: number of windows that were named. right: share of
-    these windows that were named right. by_manner: manner -> share of its windows that were named right.
-    presence_right: share of windows for which the recogniser says correctly whether there is any manner.
-    """
-
-    shrinkage: float
-    people: int
-    people_of: dict[str, int]
-    windows: int
-    right: float | None
-    by_manner: dict[str, float | None]
-    presence_right: float | None
-
-
-class NamedWindows(TypedDict):
-    """The names that the recogniser gives to the windows of a generated walk with no, one or two manners.
-
-    manners: the manners of the walk. value: .5 or 1, the value of the manner; 0 without a manner, None for
-    two manners. windows: number of windows. share: share of windows named right; with two manners, either
-    name is right. named: manner -> number of windows that got this name. between: for two manners, how far
-    the features of the walk are from those with the first manner alone (0) to those with the second alone
-    (1).
-    """
-
-    manners: list[str]
-    value: float | None
-    windows: int
-    share: float | None
-    named: dict[str, int]
-    between: NotRequired[float]
-
-
-class CombinedResult(TypedDict):
-    """The names that the recogniser gives to the windows of a generated walk with values of two channels.
-
-    In the channel `channel`, `manner` has the value 1, or all values are 0 if it is "none". In the channel
-    `other`, `column` has its highest value. windows: number of windows. share: share of windows named right.
-    named: manner -> number of windows that got this name.
-    """
-
-    channel: str
-    manner: str
-    other: str
-    column: str
-    windows: int
-    share: float | None
-    named: dict[str, int]
-
-
-class Effect(TypedDict):
-    """How much a manner changes the quantity `effect` from the neutral walk.
-
-    effect: one of EFFECTS in `hobble.measures.manners.windows`; `MannerWindow` there has the units. captured:
-    the change in captured walks; None without neutral clips. generated: the change in generated walks in
-    which the manner has the value 1. generated_at_half: the same with the value .5.
-    """
-
-    channel: str
-    manner: str
-    effect: str
-    captured: float | None
-    generated: float
-    generated_at_half: float
-
-
-class ChannelResult(TypedDict):
-    """The result for one channel.
-
-    title: the channel's name on the page. manners: those that were learnt. speed_asked: the middle one of the
-    target speeds of generated walks, m/s. captured: recognition of captured people. generated: for walks
-    without a manner, with each manner at .5 and at 1, and with each pair of manners, how often a recogniser
-    trained on the training clips is right. right_at_1: share of windows named right in all walks with one
-    manner at 1. together: recognition of each manner while a column of another channel is at its highest
-    value. effects: how much each manner changes each quantity from the neutral walk.
-    """
-
-    channel: str
-    title: str
-    manners: list[str]
-    speed_asked: float
-    captured: LeftOut
-    generated: list[NamedWindows]
-    right_at_1: float | None
-    together: list[CombinedResult]
-    effects: list[Effect]
-
-
-class Manners(TypedDict):
-    """The content of manners.json.
-
-    applies: whether there are manners to measure. reason: why not, if `applies` is false. channels: the
-    result for each channel, if `applies` is true.
-    """
-
-    applies: bool
-    reason: NotRequired[str]
-    channels: NotRequired[list[ChannelResult]]
-
 
 NONE = "none"  # the manner of a clip whose values are all 0
 WALK = GAITS.index("walk")
@@ -249,7 +145,7 @@ SHRINKAGES = (0.02, 0.1, 0.3, 0.6)
 
 def recognise_left_out(
     windows: Sequence[MannerWindow], people: Mapping[str, str], shrinkages: Sequence[float] = SHRINKAGES
-) -> LeftOut:
+) -> dict[str, Any]:
     """Recognise the manner in each person's windows after learning from the windows of all other people.
 
     people: clip -> person. shrinkages: the shares to try, see SHRINKAGES. The result is for the shrinkage
@@ -267,7 +163,7 @@ def recognise_left_out(
 
 def _recognise_with_shrinkage(
     values: Array, manner: np.ndarray, person: np.ndarray, shrinkage: float
-) -> LeftOut:
+) -> dict[str, Any]:
     """The result for one shrinkage.
 
     values: (n, D) features of n windows. manner, person: (n,) names of each window's manner and person.
@@ -313,7 +209,7 @@ def measure_manners(
     splits: Mapping[str, str],
     people: Mapping[str, str],
     runtime: Runtime,
-) -> Manners:
+) -> dict[str, Any]:
     """The content of manners.json. If manners cannot be measured, `applies` is false and `reason` says why.
 
     motion: the captured stretches of all clips. splits: clip -> "train" or "held_out". people: clip -> person
@@ -338,7 +234,7 @@ def measure_channel(
     splits: Mapping[str, str],
     people: Mapping[str, str],
     runtime: Runtime,
-) -> ChannelResult | None:
+) -> dict[str, Any] | None:
     """The result for the channel `name`; None if walks of training clips show fewer than two manners.
 
     windows: the captured windows of all clips. splits: clip -> "train" or "held_out". people: clip -> person
@@ -362,14 +258,17 @@ def measure_channel(
     by_case = [[w for walk in walks[i : i + paces] for w in walk] for i in range(0, len(walks), paces)]
     # manner -> its windows at HALF, and at FULL. In `cases`, these follow the case without a manner.
     half, full = (dict(zip(learnt, by_case[1 + k * len(learnt) :], strict=False)) for k in (0, 1))
-    rows = [
-        _name_windows(recogniser, values, of_case) for values, of_case in zip(cases, by_case, strict=True)
-    ]
-    for row, values, of_case in zip(rows, cases, by_case, strict=True):
+    rows = []
+    for values, of_case in zip(cases, by_case, strict=True):
+        value = next(iter(values.values()), 0.0) if len(values) < 2 else None
+        named = _name_windows(recogniser, of_case, set(values) or {NONE})
+        rows.append({"manners": list(values), "value": value, **named})
         if len(values) == 2:
             alone = (_mean_features(full[manner]) for manner in values)
-            row["between"] = _position_between(_mean_features(of_case), *alone)
-    at_full = [(row["share"], row["windows"]) for row in rows if row["value"] == FULL]
+            rows[-1]["between"] = _position_between(_mean_features(of_case), *alone)
+    at_full = [row for row in rows if row["value"] == FULL]
+    total = sum(row["windows"] for row in at_full)
+    right = sum((row["share"] or 0.0) * row["windows"] for row in at_full)
     return {
         "channel": name,
         "title": channel(name).title,
@@ -377,10 +276,15 @@ def measure_channel(
         "speed_asked": round(speed * FPS / 100, 5),
         "captured": captured,
         "generated": rows,
-        "right_at_1": _mean_share(at_full),
+        "right_at_1": round(right / total, 5) if total else None,
         "together": recognise_together(network, name, recogniser, learnt, speed, runtime),
         "effects": [
-            _measure_effect(name, manner, effect, training, by_case[0], half[manner], full[manner])
+            {"channel": name, "manner": manner, "effect": effect}
+            | _measure_effect(
+                effect,
+                [[w for w in training if w.manner == which] for which in (NONE, manner)],
+                [by_case[0], half[manner], full[manner]],
+            )
             for manner in learnt
             for effect in EFFECTS
         ],
@@ -394,7 +298,7 @@ def recognise_together(
     learnt: Sequence[str],
     speed: float,
     runtime: Runtime,
-) -> list[CombinedResult]:
+) -> list[dict[str, Any]]:
     """How often each manner at 1 is recognised while a column of another channel is at its highest value.
 
     The result has a row for each pair of a manner (or NONE) and a column of another channel that was above 0
@@ -415,21 +319,11 @@ def recognise_together(
         for m, other, column in cases
     ]
     walks = generated_windows(network, walkers, name, runtime)
-    rows: list[CombinedResult] = []
-    for (manner, other, column), windows in zip(cases, walks, strict=True):
-        names = recogniser.likeliest_classes(feature_table(windows))
-        rows.append(
-            {
-                "channel": name,
-                "manner": manner,
-                "other": other,
-                "column": column,
-                "windows": len(names),
-                "share": share_of_true([n == manner for n in names]),
-                "named": _counts(names),
-            }
-        )
-    return rows
+    return [
+        {"channel": name, "manner": manner, "other": other, "column": column}
+        | _name_windows(recogniser, windows, {manner})
+        for (manner, other, column), windows in zip(cases, walks, strict=True)
+    ]
 
 
 def run(inputs: MeasureInputs, options: SampleOptions) -> Outcome:
@@ -440,64 +334,42 @@ def run(inputs: MeasureInputs, options: SampleOptions) -> Outcome:
         load_network(inputs.weights), motion, inputs.splits, inputs.people, inputs.runtime
     )
     channels = result.get("channels", [])
+    effects, together = ([row for one in channels for row in one[key]] for key in ("effects", "together"))
     tables: dict[str, list[Row]] = {
-        "effects": [row for of_channel in channels for row in of_channel["effects"]],
-        "together": [
-            {k: v for k, v in row.items() if k != "named"}
-            for of_channel in channels
-            for row in of_channel["together"]
-        ],
+        "effects": effects,
+        "together": [{k: v for k, v in row.items() if k != "named"} for row in together],
     }
     log_line = "; ".join(f"{one['channel']}, share named right: {one['right_at_1']}" for one in channels)
     return Outcome(with_sample(result, sample), tables, log_line or result.get("reason", ""))
 
 
 def _name_windows(
-    recogniser: Discriminant, values: Mapping[str, float], windows: Sequence[MannerWindow]
-) -> NamedWindows:
-    """The names that the recogniser gives to windows of generated walks. values: manner -> its value."""
+    recogniser: Discriminant, windows: Sequence[MannerWindow], right: set[str]
+) -> dict[str, Any]:
+    """The names that the recogniser gives to windows of generated walks, and the share of `right` ones."""
     names = recogniser.likeliest_classes(feature_table(windows))
-    right_names = set(values) or {NONE}
     return {
-        "manners": list(values),
-        "value": next(iter(values.values()), 0.0) if len(values) < 2 else None,
         "windows": len(names),
-        "share": share_of_true([name in right_names for name in names]),
-        "named": _counts(names),
+        "share": share_of_true([name in right for name in names]),
+        "named": {name: names.count(name) for name in sorted(set(names))},
     }
 
 
-def _counts(names: Sequence[str]) -> dict[str, int]:
-    """Name -> how often it occurs."""
-    return {name: names.count(name) for name in sorted(set(names))}
-
-
 def _measure_effect(
-    name: str,
-    manner: str,
-    effect: str,
-    training: Sequence[MannerWindow],
-    plain: Sequence[MannerWindow],
-    half: Sequence[MannerWindow],
-    full: Sequence[MannerWindow],
-) -> Effect:
+    effect: str, captured: Sequence[Sequence[MannerWindow]], generated: Sequence[Sequence[MannerWindow]]
+) -> dict[str, float | None]:
     """How much a manner changes the quantity `effect`.
 
-    name: the channel. training: captured windows of training clips. plain, half, full: windows generated
-    without a manner, with this manner at .5, and with it at 1.
+    captured: windows of training clips without a manner, and with this manner. generated: windows without a
+    manner, with this manner at .5, and with it at 1.
     """
-    neutral = [w for w in training if w.manner == NONE]
-    captured = [w for w in training if w.manner == manner]
-    base = mean_effect(plain, effect)
+    neutral, manner = captured
+    plain, half, full = (mean_effect(windows, effect) for windows in generated)
+    change = mean_effect(manner, effect) - mean_effect(neutral, effect) if neutral else None
     return {
-        "channel": name,
-        "manner": manner,
-        "effect": effect,
-        "captured": round(mean_effect(captured, effect) - mean_effect(neutral, effect), 4)
-        if neutral
-        else None,
-        "generated": round(mean_effect(full, effect) - base, 4),
-        "generated_at_half": round(mean_effect(half, effect) - base, 4),
+        "captured": None if change is None else round(change, 4),
+        "generated": round(full - plain, 4),
+        "generated_at_half": round(half - plain, 4),
     }
 
 
@@ -513,9 +385,3 @@ def _position_between(pair: Array, first: Array, second: Array) -> float:
 def _mean_features(windows: Sequence[MannerWindow]) -> Array:
     """(D,) mean of each feature over the windows."""
     return np.asarray(feature_table(windows).mean(axis=0))
-
-
-def _mean_share(shares: Sequence[tuple[float | None, int]]) -> float | None:
-    """The mean of shares, weighted by numbers of windows; None without windows. shares: (share, windows)."""
-    total = sum(windows for _, windows in shares)
-    return round(sum((right or 0.0) * windows for right, windows in shares) / total, 5) if total else None

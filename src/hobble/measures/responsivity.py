@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import combinations
-from typing import Annotated, Any, TypedDict
+from typing import Annotated, Any
 
 import numpy as np
 from pydantic import Field
@@ -24,9 +24,6 @@ from hobble.core.section import PhaseMode, Positive, Section
 from hobble.measures.compare import (
     ComparisonAddition,
     ConfigurationResults,
-    DifferenceOf,
-    PublishedRow,
-    StraightLine,
     compare_series,
     fit_line,
     flatten,
@@ -524,33 +521,6 @@ NAME = "responsivity"
 COUNTS = ("true", "table_6_1", "table_6_1_as_printed")
 
 
-class Sizes(TypedDict):
-    """The size of a network.
-
-    computations: name in COUNTS -> that count of weights and biases, None for a network without layers.
-    weights_bytes: phase mode -> bytes of weights in memory. exact: the phase mode that approximates nothing.
-    """
-
-    computations: dict[str, int | None]
-    weights_bytes: dict[str, int]
-    exact: str
-
-
-class TimeLine(StraightLine):
-    """A straight line fitted to times `y` (ms) over counts of computations `x`, one point per configuration.
-
-    slope, intercept and r2 are None if all x are equal. whose: whose times, "hobble" or "published". mode:
-    phase mode; None for published times. step, computations: which times and which counts, see `fit_lines`.
-    """
-
-    whose: str
-    mode: str | None
-    step: str
-    computations: str
-    x: list[int]
-    y: list[float]
-
-
 def compared(all_measured: Sequence[ConfigurationResults], published: Json) -> ComparisonAddition:
     """The laps of the track in each phase mode, the networks' sizes, and published sizes and times."""
     sizes = {m.name: _sizes(m) for m in all_measured}
@@ -581,7 +551,7 @@ def mode_entries(results: ConfigurationResults) -> list[Json]:
     return [{**entry, "configuration": results.name} for entry in found.get("modes", [found])]
 
 
-def _sizes(results: ConfigurationResults) -> Sizes:
+def _sizes(results: ConfigurationResults) -> dict[str, Any]:
     found = results.results_of(NAME)
     counts = found["parameters"]
     return {
@@ -591,12 +561,12 @@ def _sizes(results: ConfigurationResults) -> Sizes:
     }
 
 
-def time_differences(all_measured: Sequence[ConfigurationResults]) -> list[DifferenceOf]:
+def time_differences(all_measured: Sequence[ConfigurationResults]) -> list[dict[str, Any]]:
     """How much the frame times of any two configurations differ, in each phase mode that both have run.
 
     The difference is computed by eq. 3.2 of Segerstedt (2021), see `pair`.
     """
-    out: list[DifferenceOf] = []
+    out: list[dict[str, Any]] = []
     for a, b in combinations(all_measured, 2):
         entries_of_b = {entry["mode"]: entry for entry in mode_entries(b)}
         for entry in mode_entries(a):
@@ -613,7 +583,7 @@ def time_differences(all_measured: Sequence[ConfigurationResults]) -> list[Diffe
     return out
 
 
-def fit_lines(all_measured: Sequence[ConfigurationResults], published: Json) -> list[TimeLine]:
+def fit_lines(all_measured: Sequence[ConfigurationResults], published: Json) -> list[dict[str, Any]]:
     """Straight lines of milliseconds per frame over computations, for our times and for the published times.
 
     computations: one of COUNTS. step: which time is fitted. "total" is the mean time of a whole frame; the
@@ -651,19 +621,16 @@ def _time(milliseconds: Json, step: str) -> float:
     return (milliseconds["spread"] if step == "median" else milliseconds)[step]
 
 
-def _fit(whose: str, mode: str | None, step: str, counts: str, points: list[tuple[int, float]]) -> TimeLine:
-    """The line through `points`: (computations, ms) of each configuration. For the rest see `TimeLine`."""
-    unfitted: StraightLine = {"slope": None, "intercept": None, "r2": None, "points": len(points)}
-    fitted = fit_line([x for x, _ in points], [y for _, y in points])
-    return {
-        "whose": whose,
-        "mode": mode,
-        "step": step,
-        "computations": counts,
-        "x": [x for x, _ in points],
-        "y": [y for _, y in points],
-        **(fitted or unfitted),
-    }
+def _fit(
+    whose: str, mode: str | None, step: str, counts: str, points: list[tuple[int, float]]
+) -> dict[str, Any]:
+    """The line through `points`: (computations, ms) of each configuration.
+
+    whose: "hobble" or "published". mode: None for published times. step, counts: see `fit_lines`.
+    """
+    x, y = [x for x, _ in points], [y for _, y in points]
+    head = {"whose": whose, "mode": mode, "step": step, "computations": counts}
+    return {**head, "x": x, "y": y, **fit_line(x, y)}
 
 
 def lap_means(entry: Json) -> list[float]:
@@ -671,7 +638,7 @@ def lap_means(entry: Json) -> list[float]:
     return [lap["milliseconds"]["total"] for lap in entry["laps"]]
 
 
-def _published_sizes(sizes_of: Mapping[str, Sizes], published: Json) -> list[PublishedRow]:
+def _published_sizes(sizes_of: Mapping[str, Json], published: Json) -> list[dict[str, Any]]:
     """Published sizes of networks next to ours. sizes_of: configuration -> sizes of its network."""
     out = []
     for row in published["computations"]:
@@ -693,7 +660,7 @@ def _published_sizes(sizes_of: Mapping[str, Sizes], published: Json) -> list[Pub
     return out
 
 
-def _published_times(all_measured: Sequence[ConfigurationResults], published: Json) -> list[PublishedRow]:
+def _published_times(all_measured: Sequence[ConfigurationResults], published: Json) -> list[dict[str, Any]]:
     """Published times next to ours: of a frame, and of a prediction in each phase mode."""
     by_name = {m.name: m for m in all_measured}
     out = []

@@ -10,22 +10,18 @@ To measure the times, one character alone walks the beginning of each lap again.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from hobble.measures.responsivity import Options
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from time import perf_counter
-from typing import Any, TypedDict
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from hobble.core.files import Json
 from hobble.core.quat import Array
 from hobble.measures.measure import MeasureInputs, Outcome, Row
-from hobble.measures.walks import foot_slide, turns_between
+from hobble.measures.walks import FPS, foot_slide, turns_between
 from hobble.models.load import load_network
 from hobble.models.network import Network
 from hobble.runtime.animation import ProceduralAnimation, world_rotations
@@ -33,163 +29,31 @@ from hobble.runtime.controller import STEPS
 from hobble.runtime.options import Runtime
 from hobble.runtime.waypoints import TRACK, Waypoint
 
+if TYPE_CHECKING:
+    from hobble.measures.responsivity import Options
 
-class Spread(TypedDict):
-    """Statistics of the time of a frame, ms. The time of a frame is the sum of its `Steps`.
-
-    sd, median, p99: standard deviation, median and 99th percentile. whole_call: mean time of a call of
-    `next_pose`, which also does some work outside the steps.
-    """
-
-    sd: float
-    median: float
-    p99: float
-    whole_call: float
-
-
-class Steps(TypedDict):
-    """Milliseconds of each step of a frame. See `hobble.runtime.controller` for what each step does."""
-
-    prepare: float
-    input: float
-    insert: float
-    predict: float
-    output: float
-    update: float
-
-
-class Milliseconds(Steps):
-    """Mean time of each step, ms.
-
-    total: mean time of a whole frame, ms. sd: standard deviation of the time of each step, ms. spread:
-    statistics of the time of a whole frame.
-    """
-
-    total: float
-    sd: Steps
-    spread: Spread
-
-
-class LapWalk(TypedDict):
-    """How one lap of the track went.
-
-    lap: its number, from 1. finished: whether all waypoints were reached. path_overshoot_cm,
-    path_distance_cm: the largest and the mean distance from the line between waypoints. foot_slide_cm: mean
-    slide of a toe in a stance; None without a stance. steps: number of stances. largest_turn_degrees: largest
-    turn of a joint in one frame, as drawn. predicted_turn_degrees: largest turn of a joint in one frame, as
-    the network predicts it, before the runtime limits turns. turns_held_back: number of frames in which the
-    runtime limited a turn.
-    """
-
-    lap: int
-    finished: bool
-    frames: int
-    seconds: float
-    waypoints_reached: int
-    path_overshoot_cm: float
-    path_distance_cm: float
-    foot_slide_cm: float | None
-    steps: int
-    largest_turn_degrees: float
-    predicted_turn_degrees: float
-    turns_held_back: int
-
-
-class Lap(LapWalk):
-    """How one lap went, and the time of a frame.
-
-    milliseconds: measured while one character alone walks the beginning of the lap again.
-    """
-
-    milliseconds: Milliseconds
-
-
-class LapPath(TypedDict):
-    """The path of a lap: a place every `seconds_between` seconds.
-
-    x, z: places, m. off_cm: largest distance from the line between waypoints since the previous stored place.
-    """
-
-    lap: int
-    seconds_between: float
-    x: list[float]
-    z: list[float]
-    off_cm: list[float]
-
-
-class ModeResults(TypedDict):
-    """All laps of one phase mode: a way to evaluate the network, such as cubic interpolation over the phase.
-
-    waypoints: number of waypoints in all laps together. waypoints_reached, turns_held_back: sums over the
-    laps. mean_lap_seconds: mean over the finished laps; None if there are none. foot_slide_cm: mean over the
-    laps. path_overshoot_cm, largest_turn_degrees, predicted_turn_degrees: the largest values of all laps, see
-    `LapWalk`.
-    """
-
-    mode: str
-    laps: list[Lap]
-    laps_finished: int
-    waypoints_reached: int
-    waypoints: int
-    mean_lap_seconds: float | None
-    path_overshoot_cm: float
-    foot_slide_cm: float | None
-    largest_turn_degrees: float
-    predicted_turn_degrees: float
-    turns_held_back: int
-    milliseconds: Milliseconds
-
-
-class PieceResults(TypedDict):
-    """What one job of this measurement writes: all laps in one phase mode.
-
-    laps: the results. runs: the paths of the first laps.
-    """
-
-    laps: ModeResults
-    runs: list[LapPath]
-
-
-class Track(TypedDict):
-    """The closed track, a line through waypoints.
-
-    waypoints: how many. metres: length of the line. gaits: the gait on the way to each waypoint. x, z: places
-    of the waypoints, m.
-    """
-
-    waypoints: int
-    metres: float
-    gaits: list[str]
-    x: list[float]
-    z: list[float]
-
-
-class Responsivity(ModeResults):
-    """responsivity.json: the results of the configured phase mode, and in `modes` those of all modes.
-
-    runs: the paths of the first laps in the configured mode. parameters: three counts of the weights and
-    biases that one frame uses, None for a network without layers. `true`: the actual count; `table_6_1`: by
-    the formula of Segerstedt (2021, table 6.1); `table_6_1_as_printed`: by the same formula, but with one
-    hidden layer fewer than the network has, as in the numbers printed in that table. stored: mode -> how many
-    numbers the network keeps in memory, each of `bytes_each` bytes. exact: the mode that evaluates the
-    network without approximation. laps_other_modes: number of laps in each other mode.
-    """
-
-    configuration: str
-    track: Track
-    runs: list[LapPath]
-    parameters: dict[str, int] | None
-    stored: dict[str, int]
-    bytes_each: int
-    exact: str
-    laps_other_modes: int
-    modes: list[ModeResults]
-
-
-FPS = 60
 PATH_STEP = 15  # of a path, the place in every 15th frame is stored
-AT_ONCE = 60  # frames: the rotations of at most this many are in memory at the same time
+STORED_PATHS = 5  # the paths of this many laps are stored
 RUN_UP = 1000.0  # cm; a character starts at most this far before the waypoint where its lap begins
+# The largest numbers of frames that are timed: in each lap, and in all laps together.
+TIMED_OF_LAP, TIMED_OF_ALL = 10 * FPS, 100 * FPS
+WARM_UP = 60  # the first frames are not measured, because compiled code is loaded in them
+# The first columns of the table of laps, and the statistics of a frame's time that come last.
+LAP_COLUMNS = (
+    "lap",
+    "finished",
+    "frames",
+    "seconds",
+    "waypoints_reached",
+    "path_overshoot_cm",
+    "path_distance_cm",
+    "foot_slide_cm",
+    "steps",
+    "largest_turn_degrees",
+    "predicted_turn_degrees",
+    "turns_held_back",
+)
+SPREAD = ("sd", "median", "p99", "whole_call")
 
 
 @dataclass(frozen=True)
@@ -237,7 +101,7 @@ def lap_starts(track: Sequence[Waypoint], laps: int) -> LapStarts:
 
 def walk_laps(
     network: Network, runtime: Runtime, laps: int, longest: int, track: Sequence[Waypoint]
-) -> list[tuple[LapWalk, LapPath]]:
+) -> list[tuple[dict[str, Any], dict[str, Any]]]:
     """Walk `laps` laps of at most `longest` frames. Returns how each lap went, and its path.
 
     If a character does not reach the waypoint where its lap begins within `longest` frames, its lap begins at
@@ -259,7 +123,7 @@ class _Recorded:
     distance from the track, cm. reached: index of the next waypoint; after the last waypoint of the track it
     goes on rising. drawn_turn, predicted_turn: the largest turn of a joint since the frame before, as drawn
     and as predicted, degrees (0 in the first frame). limited: whether the runtime limited the turn of any
-    joint.
+    joint, between the prediction and the placing of the feet, which gives the drawn rotation.
     """
 
     toes: Array
@@ -281,74 +145,34 @@ def _record(animation: ProceduralAnimation, first: np.ndarray, longest: int) -> 
     assert follower is not None
     goal = first + len(follower.track)  # value of `reached` at the end of each lap
     toes = [skeleton.role("left_toe"), skeleton.role("right_toe")]
-    recorded: list[list[Array]] = [[], [], [], [], []]  # for each value of `now`, the values of all frames
-    turns, lap_frames, frames = _Turns(), np.zeros(count, int), 0
+    recorded: list[tuple[Array, ...]] = []  # for each frame, the fields of `_Recorded`
+    before: tuple[Array, Array] | None = None  # drawn and predicted rotations in the frame before
+    lap_frames = np.zeros(count, int)
     while True:
         begun = follower.reached >= first
         lap_frames[begun] += 1
         # A lap is over at its goal or after `longest` frames, or if it has not begun after `longest` frames.
-        if np.all((follower.reached >= goal) | (lap_frames >= longest) | (~begun & (frames >= longest))):
+        late = ~begun & (len(recorded) >= longest)
+        if np.all((follower.reached >= goal) | (lap_frames >= longest) | late):
             break
         pose = animation.next_pose()
-        positions = pose.positions.reshape(count, -1, 3)
-        now = (
-            positions[:, toes],
-            np.atleast_2d(pose.contacts),
-            np.atleast_2d(pose.root)[:, ::2],
-            follower.off_path.copy(),
-            follower.reached.copy(),
-        )
-        for values, value in zip(recorded, now, strict=True):
-            values.append(value)
-        turns.add(animation, pose.rotations.reshape(count, -1, 4))
-        frames += 1
-    of_toes, contacts, places, off_track, reached = (np.array(values) for values in recorded)
-    return _Recorded(of_toes, contacts, places, off_track, reached.astype(int), *turns.all_measured())
-
-
-class _Turns:
-    """The turns of joints from frame to frame, measured whenever AT_ONCE frames have been added.
-
-    A joint has three rotations in a frame. The network predicts the first. The runtime limits the turn, which
-    gives the second. It then places the feet, which gives the third, the drawn one.
-    """
-
-    def __init__(self) -> None:
-        self._drawn: list[Array] = []
-        self._limited: list[Array] = []
-        self._predicted: list[tuple[Array, Array]] = []
-        self._before: tuple[Array, Array] | None = None
-        self._measured: list[tuple[Array, Array, np.ndarray]] = []
-
-    def add(self, animation: ProceduralAnimation, drawn: Array) -> None:
-        """Add the last frame of C characters. drawn: (C, J, 4) rotations of the drawn pose."""
-        self._drawn.append(drawn)
-        self._limited.append(animation.state.joint_rotation.copy())
-        self._predicted.append(animation.predicted_turns)
-        if len(self._drawn) == AT_ONCE:
-            self._measure()
-
-    def all_measured(self) -> tuple[Array, Array, np.ndarray]:
-        """The fields `drawn_turn`, `predicted_turn` and `limited` of `_Recorded`, for all added frames."""
-        if self._drawn:
-            self._measure()
-        drawn, predicted, limited = (np.concatenate(parts) for parts in zip(*self._measured, strict=True))
-        return drawn, predicted, limited
-
-    def _measure(self) -> None:
-        """Measure the turns of the frames added since the last call, and forget their rotations."""
-        drawn = np.array(self._drawn)
-        predicted = world_rotations(*(np.array(part) for part in zip(*self._predicted, strict=True)))
-        before = self._before or (drawn[0], predicted[0])
-        self._measured.append(
+        drawn = pose.rotations.reshape(count, -1, 4)
+        predicted = world_rotations(*animation.predicted_turns)
+        before = before or (drawn, predicted)
+        recorded.append(
             (
-                turns_between(np.concatenate([before[0][None], drawn])),
-                turns_between(np.concatenate([before[1][None], predicted])),
-                turn_was_limited(predicted, np.array(self._limited)),
+                pose.positions.reshape(count, -1, 3)[:, toes],
+                np.atleast_2d(pose.contacts),
+                np.atleast_2d(pose.root)[:, ::2],
+                follower.off_path.copy(),
+                follower.reached.astype(int),
+                turns_between(np.stack([before[0], drawn]))[0],
+                turns_between(np.stack([before[1], predicted]))[0],
+                turn_was_limited(predicted, animation.state.joint_rotation),
             )
         )
-        self._before = drawn[-1], predicted[-1]
-        self._drawn, self._limited, self._predicted = [], [], []
+        before = drawn, predicted
+    return _Recorded(*(np.array(values) for values in zip(*recorded, strict=True)))
 
 
 def turn_was_limited(predicted: Array, limited: Array) -> np.ndarray:
@@ -363,7 +187,7 @@ def turn_was_limited(predicted: Array, limited: Array) -> np.ndarray:
 
 def _measure_lap(
     recorded: _Recorded, c: int, first: int, waypoints: int, longest: int
-) -> tuple[LapWalk, LapPath]:
+) -> tuple[dict[str, Any], dict[str, Any]]:
     """How the lap of character c went, and its path.
 
     first: the value of `reached` with which the lap begins. waypoints: number of waypoints of the track.
@@ -377,7 +201,7 @@ def _measure_lap(
     span, turned = slice(begin, end), slice(begin + 1, end)
     slides = foot_slide(recorded.toes[span, c], recorded.contacts[span, c])
     off_track, reached_in_lap = recorded.off_track[span, c], max(0, int(reached[end - 1]) - first)
-    lap: LapWalk = {
+    lap = {
         "lap": c + 1,
         "finished": reached_in_lap == waypoints,
         "frames": end - begin,
@@ -394,7 +218,7 @@ def _measure_lap(
     return lap, _path(c + 1, recorded.places[span, c], off_track)
 
 
-def _path(lap: int, places: Array, off_track: Array) -> LapPath:
+def _path(lap: int, places: Array, off_track: Array) -> dict[str, Any]:
     """The path of a lap. The place in every PATH_STEP-th frame is stored.
 
     lap: its number. places: (F, 2) x and z, cm. off_track: (F,) distance from the track, cm. Each stored
@@ -410,17 +234,12 @@ def _path(lap: int, places: Array, off_track: Array) -> LapPath:
     }
 
 
-# The largest numbers of frames that are timed: in each lap, and in all laps together.
-TIMED_OF_LAP, TIMED_OF_ALL = 10 * FPS, 100 * FPS
-WARM_UP = 60  # the first frames are not measured, because compiled code is loaded in them
-
-
 def timed_frames(
     network: Network, runtime: Runtime, laps: int, longest: int, track: Sequence[Waypoint]
 ) -> list[Array]:
     """For each lap, (F, steps + 1) seconds: of each step in its first F frames, then of the whole call.
 
-    The laps begin as in `hobble.measures.responsivity.laps.walk_laps`, but are walked one after another, with
+    The laps begin as in `walk_laps`, but are walked one after another, with
     one character at a time. A character alone does the same as among others, to the last bit. longest: the
     largest number of frames of a lap. F is the least of three numbers: TIMED_OF_LAP, `longest`, and
     TIMED_OF_ALL divided by the number of laps.
@@ -443,14 +262,18 @@ def timed_frames(
     return out
 
 
-def milliseconds(seconds: Array) -> Milliseconds:
+def milliseconds(seconds: Array) -> dict[str, Any]:
     """Statistics of frame times. seconds: (F, steps + 1), see `timed_frames`."""
+
+    def of_steps(values: Array) -> dict[str, float]:
+        return {step: round(float(v), 6) for step, v in zip(STEPS, values, strict=False)}
+
     ms = 1000 * seconds
     total = ms[:, : len(STEPS)].sum(axis=1)
     return {
-        **_named_steps(ms.mean(axis=0)),
+        **of_steps(ms.mean(axis=0)),
         "total": round(float(total.mean()), 6),
-        "sd": _named_steps(ms.std(axis=0)),
+        "sd": of_steps(ms.std(axis=0)),
         "spread": {
             "sd": round(float(total.std()), 6),
             "median": round(float(np.median(total)), 6),
@@ -458,22 +281,6 @@ def milliseconds(seconds: Array) -> Milliseconds:
             "whole_call": round(float(ms[:, -1].mean()), 6),
         },
     }
-
-
-def _named_steps(values: Array) -> Steps:
-    """Step -> its value. values: in the order of STEPS; further values are ignored."""
-    prepare, inputs, insert, predict, output, update = (round(float(v), 6) for v in values[: len(STEPS)])
-    return {
-        "prepare": prepare,
-        "input": inputs,
-        "insert": insert,
-        "predict": predict,
-        "output": output,
-        "update": update,
-    }
-
-
-STORED_PATHS = 5  # the paths of this many laps are stored
 
 
 def measure_responsivity(
@@ -486,8 +293,8 @@ def measure_responsivity(
     laps_other_modes: int | None = None,
     modes: Sequence[str] | None = None,
     track: Sequence[Waypoint] = TRACK,
-    done: Mapping[str, PieceResults] | None = None,
-) -> Responsivity:
+    done: Mapping[str, Json] | None = None,
+) -> dict[str, Any]:
     """Laps of the track of Segerstedt (2021), in the phase mode of `runtime` and in other modes.
 
     laps: number of laps in the mode of `runtime`. lap_seconds: simulated time after which a lap ends, even if
@@ -538,16 +345,16 @@ def laps_of_mode(
     laps: int,
     lap_seconds: float,
     track: Sequence[Waypoint] = TRACK,
-) -> PieceResults:
+) -> dict[str, Any]:
     """All laps in the mode of `runtime`. For the arguments see `measure_responsivity`."""
     longest = int(lap_seconds * FPS)
     times = timed_frames(network, runtime, laps, longest, track)
     walked = walk_laps(network, runtime, laps, longest, track)
-    results: list[Lap] = [
+    results = [
         {**lap, "milliseconds": milliseconds(seconds)}
         for (lap, _), seconds in zip(walked, times, strict=True)
     ]
-    entry: ModeResults = {
+    entry = {
         "mode": runtime.mode,
         "laps": results,
         "laps_finished": sum(lap["finished"] for lap in results),
@@ -583,22 +390,20 @@ def parameter_counts(sizes: Sequence[int]) -> dict[str, int]:
     }
 
 
-def lap_rows(result: Responsivity) -> list[Row]:
+def lap_rows(result: Json) -> list[Row]:
     """The laps of every mode as rows for a CSV file. The last columns are the times and their spread."""
     rows: list[Row] = []
     for entry in result["modes"]:
         for lap in entry["laps"]:
-            # Laps read from a file have sorted keys. The columns have the order of the fields of `Lap`.
-            values: Row = {"mode": entry["mode"]} | lap
-            row = {key: values[key] for key in ("mode", *Lap.__annotations__) if key != "milliseconds"}
-            times: dict[str, Any] = {**lap["milliseconds"]}
+            times = lap["milliseconds"]
+            row = {"mode": entry["mode"], **{key: lap[key] for key in LAP_COLUMNS}}
             row |= {f"milliseconds_{key}": times[key] for key in (*STEPS, "total")}
             row |= {f"milliseconds_{key}_sd": times["sd"][key] for key in STEPS}
-            rows.append(row | {f"milliseconds_{key}": times["spread"][key] for key in Spread.__annotations__})
+            rows.append(row | {f"milliseconds_{key}": times["spread"][key] for key in SPREAD})
     return rows
 
 
-def run_piece(inputs: MeasureInputs, options: Options, piece: str) -> PieceResults:
+def run_piece(inputs: MeasureInputs, options: Options, piece: str) -> dict[str, Any]:
     """The laps in one phase mode. piece: the name of the mode."""
     laps = options.laps if piece == inputs.runtime.mode else min(options.laps, options.laps_other_modes)
     runtime = inputs.runtime.model_copy(update={"mode": piece})
@@ -607,7 +412,6 @@ def run_piece(inputs: MeasureInputs, options: Options, piece: str) -> PieceResul
 
 def run(inputs: MeasureInputs, options: Options) -> Outcome:
     """responsivity.json, and its laps as a table."""
-    done: dict[str, Any] = inputs.measured_pieces()
     result = measure_responsivity(
         load_network(inputs.weights),
         configuration=inputs.configuration,
@@ -616,7 +420,7 @@ def run(inputs: MeasureInputs, options: Options) -> Outcome:
         lap_seconds=options.lap_seconds,
         laps_other_modes=options.laps_other_modes,
         modes=options.modes,
-        done=done,
+        done=inputs.measured_pieces(),
     )
     reached = [
         f"{m['mode']}: {m['waypoints_reached']} of {m['waypoints']} waypoints" for m in result["modes"]

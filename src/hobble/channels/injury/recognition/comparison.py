@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from hobble.channels.injury.recognition.run import confusion_rows
 from hobble.core.files import Json
-from hobble.measures.compare import ComparisonAddition, ConfigurationResults, PublishedRow, published_row
+from hobble.measures.compare import ComparisonAddition, ConfigurationResults, published_row
 from hobble.measures.measure import Row
 
 NAME = "recognition"  # name of the measurement
@@ -29,7 +29,7 @@ def tables(compared: Json) -> dict[str, list[Row]]:
     return {NAME: [{"configuration": name, **row} for name, row in named_rows]}
 
 
-def _against_people(results: ConfigurationResults, people: Json) -> list[PublishedRow]:
+def _against_people(results: ConfigurationResults, people: Json) -> list[Row]:
     """The shares of hurt parts that the classifier recognises, each next to the share of people.
 
     people: the published result, with the key `share`.
