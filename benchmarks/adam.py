@@ -19,8 +19,8 @@ from products import least
 from hobble.core.processors import multiplies_bfloat16, processor_name
 from hobble.models.pfnn.fused import FusedPfnnStep
 from hobble.models.pfnn.trainable import untrained_network
+from hobble.training.checkpoint import use_threads
 from hobble.training.optimiser import Adam, l1_slopes
-from hobble.training.start import use_threads
 
 POINTS, KEEP, L1, RATE, BETAS = 4, 0.97, 0.01, 1e-4, (0.9, 0.999)
 

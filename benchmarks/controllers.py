@@ -20,7 +20,7 @@ import numpy as np
 from stability import random_targets, stability
 
 from hobble.core.processors import processor_name
-from hobble.database.manifest import Manifest
+from hobble.database.chunks import Manifest
 from hobble.measures.responsivity_run import measure_responsivity
 from hobble.measures.rollouts_run import measure_roll_outs
 from hobble.models.load import load_network

@@ -23,8 +23,8 @@ import numpy as np
 from own_process import arguments, child, cold, status
 
 from hobble.core.processors import processor_name
-from hobble.database.merge import write_database
 from hobble.database.reader import Database
+from hobble.database.write import write_database
 from hobble.rows.clip_rows import ClipRows, save_clip_rows
 from hobble.rows.layout import RowLayout
 
@@ -208,8 +208,8 @@ def training(folder: Path, memory_mb: int, rounds: int) -> None:
     from hobble.config.sections import Training
     from hobble.models.pfnn.options import PfnnOptions
     from hobble.training.batches import HostRows
-    from hobble.training.start import new_state, step_for, use_threads
-    from hobble.training.update import update_for
+    from hobble.training.checkpoint import new_state, step_for, use_threads
+    from hobble.training.optimiser import update_for
 
     use_threads(int(os.environ.get("OMP_NUM_THREADS", "2")))
     options = Training(memory_mb=memory_mb)

@@ -41,8 +41,8 @@ from hobble.models.mann.step import MannStep
 from hobble.models.mann.trainable import untrained_network, with_one
 from hobble.models.products import product
 from hobble.rows.layout import RowLayout
+from hobble.training.checkpoint import use_threads
 from hobble.training.optimiser import Adam
-from hobble.training.start import use_threads
 
 KEEP, EXPERTS = 0.97, 8
 CALLS = 200

@@ -35,9 +35,9 @@ from hobble.models.load import load_network
 from hobble.models.pfnn.options import PfnnOptions
 from hobble.runtime.options import Runtime
 from hobble.runtime.waypoints import TRACK, Waypoint
-from hobble.training.held_out import HeldOutErrors
+from hobble.training.batches import HeldOutErrors
+from hobble.training.run import write_weights
 from hobble.training.train import train
-from hobble.training.weights import write_weights
 
 LENGTHS = (1, 10, 60)
 

@@ -17,8 +17,8 @@ from pathlib import Path
 import numpy as np
 
 from hobble.config.sections import Training
-from hobble.database.manifest import Manifest
-from hobble.database.merge import write_database
+from hobble.database.chunks import Manifest
+from hobble.database.write import write_database
 from hobble.measures.accuracy_run import measure_accuracy
 from hobble.models.pfnn.options import PfnnOptions
 from hobble.training.run import run

@@ -28,7 +28,7 @@ from hobble.core.processors import processor_name
 from hobble.models import products
 from hobble.models.pfnn.fused import FusedPfnnStep
 from hobble.models.pfnn.trainable import untrained_network
-from hobble.training.start import use_threads
+from hobble.training.checkpoint import use_threads
 
 POINTS = 4
 SECONDS = 1.0  # for all ways of one product or step

@@ -29,8 +29,8 @@ import torch
 
 from hobble.config.load_configuration import Catalogue
 from hobble.database.reader import Database
+from hobble.training.batches import HeldOutErrors
 from hobble.training.checkpoint import State
-from hobble.training.held_out import HeldOutErrors
 from hobble.training.train import train
 
 ROOT = Path(__file__).resolve().parents[1]

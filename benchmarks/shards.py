@@ -23,13 +23,12 @@ from database import made_up
 
 from hobble.config.sections import Training
 from hobble.core.processors import processor_name
-from hobble.database.merge import merge_shards, write_database
 from hobble.database.reader import Database
-from hobble.database.shard import write_shard
+from hobble.database.write import merge_shards, write_database, write_shard
 from hobble.models.pfnn.options import PfnnOptions
 from hobble.training.batches import HostRows
-from hobble.training.start import new_state, step_for, use_threads
-from hobble.training.update import update_for
+from hobble.training.checkpoint import new_state, step_for, use_threads
+from hobble.training.optimiser import update_for
 
 SAMPLES = 50_000  # of a turn of reading; a tenth of them in a turn of training
 OPTIONS = {"channels": ["injury"], "joint_weight": 0.1}

@@ -33,8 +33,8 @@ from hobble.models.pfnn.fused import FusedPfnnStep
 from hobble.models.pfnn.step import PfnnStep
 from hobble.models.pfnn.trainable import coefficients, untrained_network
 from hobble.models.products import product
+from hobble.training.checkpoint import use_threads
 from hobble.training.optimiser import Adam
-from hobble.training.start import use_threads
 
 KEEP, L1, RATE, POINTS = 0.7, 0.01, 1e-4, 4
 PART = 64

@@ -26,15 +26,14 @@ from database import made_up
 from training import L1, POINTS, RATE, Batch, products
 
 from hobble.config.sections import Training
-from hobble.database.merge import write_database
 from hobble.database.reader import Database
+from hobble.database.write import write_database
 from hobble.models.pfnn.options import PfnnOptions
 from hobble.models.pfnn.trainable import untrained_network
 from hobble.training.batches import LossWatch
+from hobble.training.checkpoint import step_for, use_threads
 from hobble.training.device_rows import DeviceRows
-from hobble.training.optimiser import Adam
-from hobble.training.start import step_for, use_threads
-from hobble.training.update import Update, update_for
+from hobble.training.optimiser import Adam, Update, update_for
 
 WHOLE = 93_198_000  # samples: 465,990 frames, ten fits, 20 passes
 SECTIONS = 10

@@ -79,7 +79,7 @@ def main() -> None:
         return
     from database import made_up
 
-    from hobble.database.merge import write_database
+    from hobble.database.write import write_database
 
     print("database MB   memory_mb   batch   before training MB   peak MB")
     for size in map(int, options.sizes_mb.split(",")):

@@ -25,11 +25,10 @@ from hobble.core.processors import processor_name
 import torch
 
 from hobble.models.pfnn.trainable import untrained_network
-from hobble.training.optimiser import Adam
+from hobble.training.checkpoint import step_for, use_threads
+from hobble.training.optimiser import Adam, update_for
 from hobble.training.options import Training
 from hobble.training.processes import ALONE, Processes, join_processes
-from hobble.training.start import step_for, use_threads
-from hobble.training.update import update_for
 
 POINTS, SECONDS = 4, 1.0
 LINKS = {

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from hobble.database.merge import write_database
 from hobble.database.reader import Database
+from hobble.database.write import write_database
 
 STATED = 8  # MB
 ROWS = 40_000

@@ -17,10 +17,9 @@ import numpy as np
 import pytest
 
 from hobble.core.errors import HobbleError, InputError
-from hobble.database import plan, scatter, write_in_order
-from hobble.database.buckets import INDEX, Buckets
-from hobble.database.merge import write_database
+from hobble.database import write
 from hobble.database.reader import Database
+from hobble.database.write import ROW_INDEX, Buckets, write_database
 from hobble.rows.clip_rows import load_clip_rows, save_clip_rows
 from hobble.rows.layout import RowLayout
 
@@ -59,8 +58,8 @@ def test_rows_round_trip_and_files_merge_like_rows_in_memory(rows_of, tmp_path):
 
 
 def test_every_row_is_stored_once_whatever_the_bucket_size(rows_of, tmp_path, monkeypatch):
-    monkeypatch.setattr(plan, "BUCKET_BYTES", 90_000)
-    monkeypatch.setattr(scatter, "PART_ROWS", 17)
+    monkeypatch.setattr(write, "BUCKET_BYTES", 90_000)
+    monkeypatch.setattr(write, "PART_ROWS", 17)
     rows = {name: rows_of(name, 150, None, seed=i) for i, name in enumerate("ab")}
     manifest = write_database(tmp_path / "db", rows, {"a": "train", "b": "held_out"}, **OPTIONS)
     chunks = manifest.chunks["train"]
@@ -72,7 +71,7 @@ def test_every_row_is_stored_once_whatever_the_bucket_size(rows_of, tmp_path, mo
 def test_buckets_put_rows_and_their_fits_into_the_final_order(tmp_path):
     rng = np.random.default_rng(0)
     count = rng.choice([1, 3], 100)
-    index = np.zeros(100, INDEX)
+    index = np.zeros(100, ROW_INDEX)
     index["place"], index["count"] = rng.permutation(100), count
     index["frame"] = index["place"]
     frames = index["place"][:, None].astype(np.float32)
@@ -130,7 +129,7 @@ def test_the_database_is_smaller_than_the_original_layout(rows_of, tmp_path):
 
 
 def test_memory_does_not_grow_with_the_number_of_clips(rows_of, tmp_path, monkeypatch):
-    monkeypatch.setattr(plan, "BUCKET_BYTES", 200_000)
+    monkeypatch.setattr(write, "BUCKET_BYTES", 200_000)
     files = {}
     for i in range(12):
         files[f"c{i}"] = tmp_path / f"c{i}.npz"
@@ -199,7 +198,7 @@ def test_a_full_disk_gives_a_message_and_keeps_the_old_database(rows_of, tmp_pat
     def full(*_: object) -> None:
         raise OSError(errno.ENOSPC, "No space left on device")
 
-    monkeypatch.setattr(write_in_order, "write_chunk", full)
+    monkeypatch.setattr(write, "write_chunk", full)
     with pytest.raises(HobbleError, match="disk is full"):
         write_database(tmp_path / "db", {"a": rows_of("a", 61)}, {"a": "train"}, **OPTIONS)
     assert contents(tmp_path / "db") == before

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hobble.core.errors import HobbleError
-from hobble.database.precision import to_floats, to_stored_type
+from hobble.database.chunks import to_floats, to_stored_type
 
 
 @given(st.lists(st.floats(-(2.0**99), 2.0**99, width=32), min_size=1, max_size=40))

@@ -14,8 +14,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hobble.core.errors import HobbleError, InputError
-from hobble.database.merge import write_database
 from hobble.database.reader import Block, Database, read_ahead
+from hobble.database.write import write_database
 from hobble.rows.clip_rows import pair_batches
 
 MEMORY = 4096  # MB: everything at once

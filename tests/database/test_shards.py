@@ -11,10 +11,9 @@ import numpy as np
 import pytest
 
 from hobble.core.errors import HobbleError, InputError
-from hobble.database import plan
-from hobble.database.merge import merge_shards, write_database
+from hobble.database import write
 from hobble.database.reader import Block, Database
-from hobble.database.shard import write_shard
+from hobble.database.write import merge_shards, write_database, write_shard
 from hobble.rows.clip_rows import load_clip_rows, save_clip_rows
 from hobble.rows.layout import GAITS, RowLayout
 
@@ -74,7 +73,7 @@ def a_pass(path: Path, split: str, memory: int) -> Block:
 def test_a_pass_over_shards_has_the_pairs_of_an_unsharded_database(
     clips, tmp_path, monkeypatch, groups, memory
 ):
-    monkeypatch.setattr(plan, "BUCKET_BYTES", 50_000)
+    monkeypatch.setattr(write, "BUCKET_BYTES", 50_000)
     write_database(tmp_path / "one", clips, SPLITS, sources=SOURCES, **OPTIONS)
     many = in_shards(tmp_path, clips, SPLITS, groups, sources=SOURCES)
     for split in ("train", "held_out"):
@@ -186,7 +185,7 @@ def test_scales_of_other_shards_are_refused(clips, tmp_path):
 
 
 def test_the_memory_of_a_job_does_not_grow_with_the_shards(rows_of, tmp_path, monkeypatch):
-    monkeypatch.setattr(plan, "BUCKET_BYTES", 100_000)
+    monkeypatch.setattr(write, "BUCKET_BYTES", 100_000)
     files = {}
     for number in range(16):
         files[f"c{number:02d}"] = tmp_path / f"c{number}.npz"

@@ -7,7 +7,7 @@ from itertools import accumulate, chain, pairwise, product
 import numpy as np
 import pytest
 
-from hobble.database.sharing import SampleRange, SectionSharing
+from hobble.database.order import SampleRange, SectionSharing
 
 
 def read(sharing: SectionSharing) -> list[list[int]]:

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hobble.database.merge import write_database
-from hobble.database.sizes import RELEASED_FLAT, RELEASED_FRAMES, database_sizes
+from hobble.database.chunks import RELEASED_FLAT, RELEASED_FRAMES, database_sizes
+from hobble.database.write import write_database
 from hobble.rows.layout import RowLayout
 
 PUBLISHED = {31: 7.12e9, 191: 10.4e9}  # bytes; the larger figure's with a quarter of the frames

@@ -8,8 +8,7 @@ import pytest
 from hobble.measures.sample import Sample, Stratum, captured_motion
 from hobble.measures.walks import acceleration, in_root_coordinates
 from hobble.rows.captured import captured_stretches, root_path, unbroken_stretches
-from hobble.rows.clip_rows import ClipRows, save_clip_rows
-from hobble.rows.excerpts import Excerpt
+from hobble.rows.clip_rows import ClipRows, Excerpt, save_clip_rows
 from hobble.rows.layout import GAITS, RowLayout
 
 LAYOUT = RowLayout(3, channels=(("injury", 2),))

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from hobble.core.skeleton import Skeleton
-from hobble.database.merge import write_database
 from hobble.database.reader import Database
+from hobble.database.write import write_database
 from hobble.models.pfnn.options import PfnnOptions
 from hobble.rows.clip_rows import ClipRows, save_clip_rows
 from hobble.rows.layout import RowLayout

@@ -15,10 +15,19 @@ from hobble.measures.accuracy_run import measure_accuracy
 from hobble.measures.rollouts import rollout_chart
 from hobble.measures.rollouts_run import measure_roll_outs
 from hobble.measures.sample import LEAST_EXCERPTS, Sample, Stratum, draw_sample
-from hobble.rows.clip_rows import save_clip_rows
-from hobble.rows.excerpts import LONGEST, Excerpt, ExcerptKind, cut_into_excerpts, load_excerpt
+from hobble.rows.clip_rows import (
+    LONGEST,
+    Excerpt,
+    ExcerptKind,
+    RowsSummary,
+    cut_into_excerpts,
+    load_excerpt,
+    load_summary,
+    save_clip_rows,
+    save_summary,
+    summary_of_rows,
+)
 from hobble.rows.layout import GAITS
-from hobble.rows.summary import RowsSummary, load_summary, save_summary, summary_of_rows
 
 _spec = importlib.util.spec_from_file_location("of_accuracy", Path(__file__).with_name("test_accuracy.py"))
 assert _spec is not None

@@ -15,8 +15,7 @@ from hobble.labels.options import LabelOptions
 from hobble.motion.edit import mirror_clip
 from hobble.rows.build_rows import build_clip_rows, cycle_frames
 from hobble.rows.clip_rows import ClipRows, Pairs, pair_batches
-from hobble.rows.layout import RowLayout
-from hobble.rows.mirror_columns import ColumnMirror, mirror_of_x, mirror_of_y
+from hobble.rows.layout import ColumnMirror, RowLayout, mirror_of_x, mirror_of_y
 from hobble.synthetic.generate_clip import walk_from_plan
 from hobble.synthetic.plan import Segment
 

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from hobble.models.pfnn.network import Pfnn
-from hobble.rows.compose import compose, frame_inputs
-from hobble.rows.layout import RowLayout
+from hobble.rows.layout import RowLayout, compose, frame_inputs
 from hobble.runtime.animation import ProceduralAnimation
 
 ORDERS = [

@@ -11,14 +11,13 @@ import pytest
 import torch
 
 from hobble.core.skeleton import Skeleton
-from hobble.database.merge import merge_shards
 from hobble.database.reader import Database
-from hobble.database.shard import write_shard
+from hobble.database.write import merge_shards, write_shard
 from hobble.models.pfnn.options import PfnnOptions
 from hobble.rows.clip_rows import ClipRows
 from hobble.rows.layout import RowLayout
+from hobble.training.optimiser import Update
 from hobble.training.options import Training
-from hobble.training.update import Update
 
 SPLITS = {"walk": "train", "hop": "train", "turn": "held_out"}
 

@@ -19,12 +19,11 @@ from hobble.database.reader import Database
 from hobble.models import network_options
 from hobble.models.trainable import Trainable
 from hobble.training import train as module
+from hobble.training.augment import OtherPoses, RollOut
 from hobble.training.batches import HostRows, SampleBatch
 from hobble.training.device_rows import DeviceRows
 from hobble.training.options import Training
-from hobble.training.other_poses import OtherPoses
 from hobble.training.processes import ALONE, Processes, join_processes
-from hobble.training.rollout import RollOut
 
 WINDOW = Database.chunks_per_window
 

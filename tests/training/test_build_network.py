@@ -10,8 +10,8 @@ import pytest
 
 from hobble.core.errors import HobbleError
 from hobble.core.skeleton import Skeleton
-from hobble.database.merge import write_database
 from hobble.database.reader import Database
+from hobble.database.write import write_database
 from hobble.models.load import load_network
 from hobble.models.matching.options import MatchingOptions
 from hobble.rows.clip_rows import save_clip_rows

@@ -12,13 +12,12 @@ import pytest
 import torch
 
 from hobble.core.errors import HobbleError
-from hobble.database.merge import write_database
 from hobble.database.reader import Database
+from hobble.database.write import write_database
 from hobble.training import train
-from hobble.training.checkpoint import State
-from hobble.training.held_out import HeldOutErrors
+from hobble.training.batches import HeldOutErrors
+from hobble.training.checkpoint import State, recipe_hash
 from hobble.training.run import run
-from hobble.training.start import recipe_hash
 
 from .conftest import clip_rows
 

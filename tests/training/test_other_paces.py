@@ -10,9 +10,9 @@ import pytest
 import torch
 
 from hobble.database.reader import Database
-from hobble.training.other_paces import RISE, OtherPaces
+from hobble.training.augment import RISE, OtherPaces
+from hobble.training.optimiser import Update
 from hobble.training.train import train
-from hobble.training.update import Update
 
 CPU = torch.device("cpu")
 ROWS, SPEED, SLOPE, FACTOR = 400, 1.5, 0.2, 1.5  # SPEED: cm a frame, SLOPE: cm of height a sample

@@ -10,7 +10,7 @@ import pytest
 import torch
 
 from hobble.database.reader import Database
-from hobble.training.other_poses import BEYOND, NEAR, REMEMBERED_ROWS, OtherPoses
+from hobble.training.augment import BEYOND, NEAR, REMEMBERED_ROWS, OtherPoses
 from hobble.training.train import train
 
 CPU = torch.device("cpu")

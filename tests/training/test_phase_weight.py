@@ -12,7 +12,7 @@ from hobble.database.reader import Database
 from hobble.models.pfnn.forward import forward
 from hobble.models.pfnn.options import PfnnOptions
 from hobble.training import run as stage
-from hobble.training.held_out import HeldOutErrors
+from hobble.training.batches import HeldOutErrors
 from training.conftest import Recipe
 
 CPU = torch.device("cpu")

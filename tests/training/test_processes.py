@@ -21,7 +21,7 @@ import pytest
 
 from hobble.core.errors import HobbleError
 from hobble.core.files import load_npz
-from hobble.database.merge import write_database
+from hobble.database.write import write_database
 from hobble.training.options import Machines
 from hobble.workflow import lifetime
 from hobble.workflow.training_processes import command, on_machines, train_together

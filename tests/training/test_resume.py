@@ -14,9 +14,8 @@ from hobble.core.errors import InputError
 from hobble.core.files import load_npz, save_npz
 from hobble.database.reader import Database
 from hobble.rows.layout import CONTACTS, GAITS, RowLayout
-from hobble.training.checkpoint import State, pack
+from hobble.training.checkpoint import State, pack, recipe_hash
 from hobble.training.run import run
-from hobble.training.start import recipe_hash
 from hobble.training.train import train
 
 Settings = dict[str, Any]

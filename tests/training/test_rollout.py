@@ -15,10 +15,10 @@ from hobble.measures.rollouts_run import RollOutInputs
 from hobble.models.pfnn.fused import FusedPfnnStep
 from hobble.models.pfnn.step import PfnnStep
 from hobble.models.pfnn.trainable import untrained_network
+from hobble.training.augment import RollOut
 from hobble.training.batches import HostRows
-from hobble.training.rollout import RollOut
+from hobble.training.optimiser import Update
 from hobble.training.train import train
-from hobble.training.update import Update
 from tests.measures.whole_roll_outs import roll_out
 
 CPU = torch.device("cpu")

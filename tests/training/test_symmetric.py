@@ -11,16 +11,16 @@ import torch
 
 from hobble.core.errors import HobbleError
 from hobble.core.skeleton import Skeleton
-from hobble.database.merge import write_database
 from hobble.database.reader import Database
+from hobble.database.write import write_database
 from hobble.models.mann.options import MannOptions
 from hobble.models.options import Options
 from hobble.models.pfnn.options import PfnnOptions
 from hobble.models.plain.options import PlainOptions
 from hobble.models.trainable import Trainable
-from hobble.rows.mirror_columns import mirror_of_x, mirror_of_y
-from hobble.training.start import new_state
-from hobble.training.symmetric import Symmetry
+from hobble.rows.layout import mirror_of_x, mirror_of_y
+from hobble.training.checkpoint import new_state
+from hobble.training.optimiser import Symmetry
 from hobble.training.train import train
 from training.conftest import SPLITS, Recipe, clip_rows, figure
 

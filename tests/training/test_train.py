@@ -14,15 +14,13 @@ import torch
 
 from hobble.core import files
 from hobble.core.errors import HobbleError, InputError
-from hobble.database.merge import write_database
 from hobble.database.reader import Block, Database
+from hobble.database.write import write_database
 from hobble.models.pfnn.trainable import untrained_network
-from hobble.training import checkpoint, start, train
-from hobble.training.batches import HostRows
-from hobble.training.checkpoint import State
+from hobble.training import checkpoint, train
+from hobble.training.batches import HeldOutErrors, HostRows
+from hobble.training.checkpoint import State, columns, write_history
 from hobble.training.device_rows import DeviceRows, gpu_has_room, rows_on_device_or_host
-from hobble.training.held_out import HeldOutErrors
-from hobble.training.history import columns, write_history
 
 from .conftest import SPLITS, clip_rows
 
@@ -208,9 +206,9 @@ def test_a_full_disk_ends_in_a_message(run: Run, monkeypatch: pytest.MonkeyPatch
 
 def test_cuda_without_a_gpu_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(torch.cuda, "is_available", lambda: False)
-    assert start.choose_device("auto").type == "cpu"
+    assert checkpoint.choose_device("auto").type == "cpu"
     with pytest.raises(HobbleError, match=r"training\.device is cuda"):
-        start.choose_device("cuda")
+        checkpoint.choose_device("cuda")
 
 
 def test_more_sections_than_samples_are_refused(run: Run) -> None:
@@ -241,7 +239,7 @@ def test_bfloat16_is_chosen_where_a_device_has_it(
     monkeypatch.setattr(torch.cuda, "is_bf16_supported", supported)
     network = untrained_network((4, 3, 2), 4, 1).to("meta")
     monkeypatch.setattr(type(network), "step", lambda self, dropout, half: half)
-    assert start.step_for(network, training | {"batch": 256}) is half
+    assert checkpoint.step_for(network, training | {"batch": 256}) is half
 
 
 def test_where_rows_are_kept_does_not_depend_on_free_memory(

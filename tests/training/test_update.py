@@ -11,8 +11,7 @@ import torch
 from hobble.models.pfnn.fused import FusedPfnnStep
 from hobble.models.pfnn.step import PfnnStep
 from hobble.models.pfnn.trainable import untrained_network
-from hobble.training.optimiser import Adam
-from hobble.training.update import CapturedUpdate, Update, update_for
+from hobble.training.optimiser import Adam, CapturedUpdate, Update, update_for
 
 ROWS = 12
 

@@ -12,12 +12,12 @@ import pytest
 import torch
 
 from hobble.core.quat import Array
-from hobble.database.merge import write_database
 from hobble.database.reader import Block, Database
+from hobble.database.write import write_database
 from hobble.rows.clip_rows import ClipRows
-from hobble.training import version_poses
+from hobble.training import augment
+from hobble.training.augment import CANDIDATES, VersionPoses
 from hobble.training.train import train
-from hobble.training.version_poses import CANDIDATES, VersionPoses
 from training.conftest import clip_rows
 
 CPU = torch.device("cpu")
@@ -163,7 +163,7 @@ def test_two_processes_get_what_one_gets(healthy_and_hurt: Database) -> None:
 
 def test_a_full_table_keeps_fewer_rows(healthy_and_hurt: Database, monkeypatch: pytest.MonkeyPatch) -> None:
     every = VersionPoses(healthy_and_hurt, 1.0, 10, CPU).key
-    monkeypatch.setattr(version_poses, "TABLE_BYTES", version_poses.TABLE_BYTES // 10_000)
+    monkeypatch.setattr(augment, "TABLE_BYTES", augment.TABLE_BYTES // 10_000)
     some = VersionPoses(healthy_and_hurt, 1.0, 10, CPU).key
     assert 2 * CANDIDATES < len(some) < len(every)
     assert set(some.tolist()) <= set(every.tolist())

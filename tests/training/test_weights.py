@@ -18,7 +18,7 @@ from hobble.models import model_of_kind
 from hobble.models.pfnn.options import PfnnOptions
 from hobble.models.training_facts import TrainingFacts
 from hobble.rows.layout import CONTACTS, GAITS, RowLayout
-from hobble.training.weights import write_weights
+from hobble.training.run import write_weights
 
 from .conftest import figure
 

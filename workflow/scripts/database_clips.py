@@ -8,8 +8,7 @@ from hobble.core.clip import load_clip
 from hobble.core.files import load_npz
 from hobble.database.options import RowOptions
 from hobble.rows.build_rows import build_clip_rows
-from hobble.rows.clip_rows import save_clip_rows
-from hobble.rows.summary import save_summary, summary_of_rows
+from hobble.rows.clip_rows import save_clip_rows, save_summary, summary_of_rows
 from hobble.workflow.job import make_each
 
 

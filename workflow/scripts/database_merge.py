@@ -7,9 +7,9 @@ from pathlib import Path
 
 from hobble.core.clip import load_clip
 from hobble.core.files import read_json
-from hobble.database.merge import merge_shards, write_database
 from hobble.database.options import Merging
 from hobble.database.split_check import refuse_split_pairs
+from hobble.database.write import merge_shards, write_database
 from hobble.motion.look import clip_digest, duplicate_pairs, load_digests
 from hobble.workflow.job import Inputs, job
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from hobble.core.clip import load_clip
 from hobble.core.files import read_json
 from hobble.database.options import Merging
-from hobble.database.shard import write_shard
+from hobble.database.write import write_shard
 from hobble.motion.look import clip_digest, save_digests
 from hobble.workflow.job import Inputs, job
 

@@ -1,8 +1,4 @@
-"""Chunks: a database stores its rows in files of a few MB, each with a checksum in the database's manifest.
-
-A chunk is a safetensors file, which other tools can open. It begins with the length of its header (8 bytes,
-little-endian). Then come the header (JSON: type, shape and place of each array) and the arrays.
-"""
+"""The files of a database: chunks with its rows, the types of their numbers, and the manifest."""
 
 from __future__ import annotations
 
@@ -10,14 +6,60 @@ import json
 import os
 import zlib
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, TypedDict
 
 import numpy as np
 
-from hobble.core.errors import InputError
+from hobble.core.errors import HobbleError, InputError
+from hobble.core.files import read_json, write_json
+from hobble.core.quat import Array
+from hobble.rows.layout import RowLayout, column_count_without_terrain, fit_column_count
 
+# Name of a precision -> NumPy's type of the stored numbers.
+STORED: dict[str, np.dtype[Any]] = {
+    "float32": np.dtype("<f4"),
+    "float16": np.dtype("<f2"),
+    "bfloat16": np.dtype("<u2"),
+}
+
+
+def to_stored_type(values: Array, precision: str) -> np.ndarray:
+    """Convert float values to the type that is stored for `precision`, a key of STORED.
+
+    Rounds to the nearest number, and a value halfway between two numbers to the one whose last bit is 0.
+    Raises HobbleError if a value is too large for the type.
+    """
+    if precision != "bfloat16":
+        with np.errstate(over="ignore"):
+            out = np.asarray(values, STORED[precision])
+        if not np.isfinite(out).all():
+            largest = float(np.abs(values).max())
+            raise HobbleError(
+                f"a standardised value of {largest:.3g} does not fit {precision}. "
+                "Set database.dtype to bfloat16 or float32."
+            )
+        return out
+    # The lower 16 bits are cut off. To round, add 0x7FFF first, and 1 more if the last bit that stays is 1.
+    bits = np.asarray(values, "<f4").view("<u4")
+    return ((bits + np.uint32(0x7FFF) + ((bits >> 16) & 1)) >> 16).astype("<u2")
+
+
+def to_floats(values: np.ndarray) -> Array:
+    """Convert stored bfloat16 (uint16) to float32. Other types are returned unchanged."""
+    if values.dtype != STORED["bfloat16"]:
+        return values
+    return (values.astype("<u4") << 16).view("<f4")
+
+
+# Chunks: a database stores its rows in files of a few MB, each with a checksum in the database's manifest.
+#
+# A chunk is a safetensors file, which other tools can open. It begins with the length of its header (8 bytes,
+# little-endian). Then come the header (JSON: type, shape and place of each array) and the arrays.
+
+
+INDEX_BYTES = 16  # in a chunk, for each row: its number of terrain fits, clip, frame and phase
 LENGTH = 8  # bytes of the number, at the start of the file, that says how long the header is
 MOST_PARTS = 16  # one call of `preadv` fills at most this many buffers; every POSIX system allows so many
 # NumPy's name of a type -> its name in safetensors. NumPy has no bfloat16, so uint16 numbers hold its bits.
@@ -123,3 +165,155 @@ def _checksum(parts: Sequence[memoryview]) -> int:
     for part in parts:
         crc = zlib.crc32(part, crc)
     return crc
+
+
+# The file manifest.json of a database: what the database contains.
+#
+# A database is made by merging shards. Each shard has the rows of some clips, in files called chunks. The
+# manifest is written last, so a folder without it is not a complete database.
+
+
+FILE = "manifest.json"
+STATISTICS = "statistics.npz"  # means and deviations of all training rows
+SCALES = "scales.npz"  # for each shard, the statistics with which its chunks are standardised
+VERSION = 2  # of the database's format
+SPLITS = ("train", "held_out")
+
+
+@dataclass(frozen=True)
+class ShardCounts:
+    """How many clips a shard has, and how many chunks it has in each of the splits `train` and `held_out`."""
+
+    clips: int
+    train: int
+    held_out: int
+
+
+@dataclass(frozen=True)
+class Manifest:
+    """What a database contains.
+
+    folder: subfolder with the chunks and statistics. Its name contains a hash of their content.
+    layout: the columns of the rows that a network gets. skeleton: see `Skeleton.to_dict`.
+    visits: how often a pass over the data uses each row. dtype: type of the numbers on disk.
+    joint_weight: factor by which the standardised joints in the network's input are multiplied.
+    clips: one entry for each clip, shard after shard: `clip` (its name), `split`, number of `rows` and of
+    `pairs` (of a row and one of its terrain fits), and for a hurt version `source`, the name of the healthy
+    clip from which it was computed.
+    shards: number of clips and of chunks of each shard.
+    chunks: split -> its chunks, shard after shard. Each chunk file numbers the clips of its shard from 0.
+    original_bytes: size of the same data in the layout of Holden et al. (2017), which has each row `visits`
+    times. bytes: size of all chunks. limits: channel -> speed limits (`hobble.channels.speed_limits`).
+    """
+
+    folder: str
+    layout: RowLayout
+    skeleton: Mapping[str, Any]
+    visits: int
+    dtype: str
+    joint_weight: float
+    clips: list[dict[str, Any]]
+    shards: list[ShardCounts]
+    chunks: Mapping[str, list[Chunk]]
+    original_bytes: int
+    bytes: int
+    limits: Mapping[str, Any] = field(default_factory=dict)
+
+    def row_count(self, split: str) -> int:
+        """Number of rows of a split."""
+        return sum(chunk.rows for chunk in self.chunks[split])
+
+    def shard_of_chunk(self, split: str) -> np.ndarray:
+        """(chunks,) the number of the shard of each chunk of a split."""
+        return np.repeat(np.arange(len(self.shards)), [getattr(shard, split) for shard in self.shards])
+
+    def first_clip(self) -> np.ndarray:
+        """(shards,) the index in `clips` of each shard's first clip."""
+        count = np.array([shard.clips for shard in self.shards])
+        return np.cumsum(count) - count
+
+    def save(self, path: Path) -> None:
+        """Write manifest.json into the database folder `path`, completely or not at all."""
+        values = {**vars(self), "format": "hobble database", "version": VERSION}
+        values["layout"] = self.layout.to_dict()
+        # The skeleton is stored as text, because write_json sorts keys, but joints have to keep their order.
+        values["skeleton"] = json.dumps(self.skeleton)
+        values["shards"] = [asdict(shard) for shard in self.shards]
+        values["chunks"] = {split: [c.to_dict() for c in chunks] for split, chunks in self.chunks.items()}
+        write_json(path / FILE, values)
+
+    @classmethod
+    def load(cls, path: Path) -> Manifest:
+        """Read the manifest of the database folder `path`. Raises InputError if it is missing or wrong."""
+        file = path / FILE
+        if not file.exists():
+            raise InputError(
+                path, f"not a complete database: it has no {FILE}, so its build did not finish", fix=HINT
+            )
+        values = read_json(file)
+        try:
+            if values.pop("format") != "hobble database" or values.pop("version") != VERSION:
+                raise InputError(file, f"not a database of format version {VERSION}", fix=HINT)
+            values["layout"] = RowLayout.from_dict(values["layout"])
+            values["skeleton"] = json.loads(values["skeleton"])
+            values["shards"] = [ShardCounts(**shard) for shard in values["shards"]]
+            chunks = values["chunks"]
+            values["chunks"] = {split: [Chunk(**chunk) for chunk in chunks[split]] for split in SPLITS}
+            return cls(**values)
+        except (KeyError, TypeError, ValueError, AttributeError) as error:
+            raise InputError(file, f"not a database's manifest ({error})", fix=HINT) from error
+
+
+# Size of a database, and of the same data in the layout of Holden et al. (2017).
+#
+# Also estimates the size of a database of the clips that Holden et al. released.
+
+
+# Number of frames at 60 Hz, mirrored ones included, in the clips released with Holden, Komura, Saito (2017).
+RELEASED_FRAMES = 465_990
+# Share of these frames that are on flat ground. Such a frame has one terrain fit, another frame has ten.
+RELEASED_FLAT = 0.479
+
+
+class Sizes(TypedDict):
+    """Sizes of a database. A terrain fit of a frame is a set of ground heights that suit its motion.
+
+    joints: number of joints. dtype: type of the numbers on disk. frames: number of frames in both splits
+    together. pairs: number of pairs of a frame and a terrain fit that one pass over the data uses. It counts
+    the single fit of a frame on flat ground as often as the pass uses it. bytes: size of all chunks.
+    original_bytes: size of all pairs as rows of X, Y and P in float32. share: bytes / original_bytes.
+    bytes_a_frame: bytes / frames, with the terrain fits. released_frames: number of frames of the released
+    clips. released_bytes: their estimated size with the columns and number type of this database.
+    """
+
+    joints: int
+    dtype: str
+    frames: int
+    pairs: int
+    bytes: int
+    original_bytes: int
+    share: float
+    bytes_a_frame: float
+    released_frames: int
+    released_bytes: int
+
+
+def database_sizes(manifest: Manifest) -> Sizes:
+    """The sizes of a database."""
+    frames = sum(manifest.row_count(split) for split in manifest.chunks)
+    layout, number_bytes = manifest.layout, STORED[manifest.dtype].itemsize
+    frame_bytes = number_bytes * (column_count_without_terrain(layout) + layout.y_size) + INDEX_BYTES
+    fits_a_frame = RELEASED_FLAT + (1 - RELEASED_FLAT) * manifest.visits
+    released = RELEASED_FRAMES * (frame_bytes + fits_a_frame * number_bytes * fit_column_count(layout))
+    return {
+        "joints": layout.joints,
+        "dtype": manifest.dtype,
+        "frames": frames,
+        "pairs": frames * manifest.visits,
+        "bytes": manifest.bytes,
+        "original_bytes": manifest.original_bytes,
+        "share": manifest.bytes / manifest.original_bytes,
+        "bytes_a_frame": manifest.bytes / frames,
+        "released_frames": RELEASED_FRAMES,
+        "released_bytes": round(released),
+    }

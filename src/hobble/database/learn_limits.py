@@ -17,8 +17,7 @@ from hobble.channels.speed_limits import LimitLearner
 from hobble.core.errors import HobbleError
 from hobble.core.skeleton import Skeleton
 from hobble.rows.clip_rows import ClipRows
-from hobble.rows.compose import body_layout
-from hobble.rows.layout import GAITS, RowLayout
+from hobble.rows.layout import GAITS, RowLayout, body_layout
 
 
 def make_limit_learners(layout: RowLayout, skeleton: Mapping[str, Any]) -> dict[str, LimitLearner]:

@@ -9,7 +9,7 @@ memory together. A parameter `window` is the number of these chunks.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from itertools import chain, cycle
@@ -18,18 +18,200 @@ from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
-from hobble.core.errors import HobbleError
+from hobble.core.errors import HobbleError, InputError
 from hobble.core.files import load_npz
 from hobble.core.quat import Array
 from hobble.database import order
-from hobble.database.chunk_window import Buffers, ChunkWindow, empty_buffers, load_chunks
-from hobble.database.manifest import STATISTICS, Manifest
-from hobble.database.precision import to_floats
-from hobble.database.scale import ShardConversions
-from hobble.database.sharing import SampleRange
+from hobble.database.chunks import (
+    HINT,
+    SCALES,
+    SPLITS,
+    STATISTICS,
+    STORED,
+    Manifest,
+    read_chunk,
+    to_floats,
+    to_stored_type,
+)
+from hobble.database.order import SampleRange
 from hobble.database.statistics import Statistics
-from hobble.rows.compose import compose
-from hobble.rows.layout import RowLayout
+from hobble.rows.layout import RowLayout, column_count_without_terrain, compose, fit_column_count
+
+PART_ROWS = 256  # 16-bit rows are converted so many at a time, so that their float32 copy is small
+
+# (C,) factors and (C,) summands of C columns, float32. A value v becomes v * factor + summand.
+FactorsAndSummands = tuple[Array, Array]
+
+
+@dataclass(frozen=True)
+class Conversion:
+    """How to convert a shard's rows to the statistics of the whole database.
+
+    x: for the columns of X without terrain. y: for the columns of Y. fits: for the columns of a terrain fit.
+    """
+
+    x: FactorsAndSummands = field(repr=False)
+    y: FactorsAndSummands = field(repr=False)
+    fits: FactorsAndSummands = field(repr=False)
+
+    def apply(self, x: np.ndarray, y: np.ndarray, fits: np.ndarray, dtype: str) -> None:
+        """Convert the arrays of a chunk in place. dtype: type of the numbers on disk."""
+        for values, factors_and_summands in ((x, self.x), (y, self.y), (fits, self.fits)):
+            _convert(values, factors_and_summands, dtype)
+
+
+def _convert(values: np.ndarray, factors_and_summands: FactorsAndSummands, dtype: str) -> None:
+    factor, summand = factors_and_summands
+    if values.dtype == np.float32:
+        np.multiply(values, factor, out=values)
+        np.add(values, summand, out=values)
+        return
+    for start in range(0, len(values), PART_ROWS):
+        part = values[start : start + PART_ROWS]
+        part[...] = to_stored_type(to_floats(part).astype(np.float32) * factor + summand, dtype)
+
+
+def _factors_and_summands(mean: Array, std: Array, to_mean: Array, to_std: Array) -> FactorsAndSummands:
+    """How to convert values standardised by (C,) mean and std to values standardised by to_mean and to_std.
+
+    v becomes (v * std + mean - to_mean) / to_std.
+    """
+    factor, summand = np.float64(std) / to_std, (np.float64(mean) - to_mean) / to_std
+    return factor.astype(np.float32), summand.astype(np.float32)
+
+
+def make_conversion(whole: Statistics, own: Statistics, terrain: slice) -> Conversion | None:
+    """The conversion from a shard's statistics (`own`) to those of the database (`whole`).
+
+    None if the statistics are equal. terrain: the terrain columns of X.
+    """
+    if all(np.array_equal(vars(own)[name], values) for name, values in vars(whole).items()):
+        return None
+    factor, summand = _factors_and_summands(own.x_mean, own.x_std, whole.x_mean, whole.x_std)
+    x = np.delete(factor, terrain), np.delete(summand, terrain)
+    y = _factors_and_summands(own.y_mean, own.y_std, whole.y_mean, whole.y_std)
+    # The last column of a fit is a height in cm. It is not standardised, so it stays as it is.
+    fits = np.append(factor[terrain], np.float32(1)), np.append(summand[terrain], np.float32(0))
+    return Conversion(x, y, fits)
+
+
+class ShardConversions:
+    """The conversions of all shards of a database.
+
+    dtype: type of the numbers on disk. conversions: one for each shard, None if a shard needs none.
+    first_clip: (shards,) number of each shard's first clip in the database. shard_of_chunk: split ->
+    (chunks,) index of each chunk's shard.
+    """
+
+    def __init__(self, path: Path, manifest: Manifest, whole: Statistics) -> None:
+        """Read the statistics of all shards of the database folder `path`.
+
+        whole: the statistics of the whole database. Raises InputError if the shapes of the arrays in the file
+        do not fit the number of shards or of columns.
+        """
+        data = load_npz(path / manifest.folder / SCALES)
+        count, terrain = len(manifest.shards), manifest.layout.x_terrain
+        if any(data[name].shape != (count, *values.shape) for name, values in vars(whole).items()):
+            raise InputError(
+                path / manifest.folder / SCALES, f"not the statistics of {count} shards", fix=HINT
+            )
+        of_shards = [Statistics(**{name: data[name][n] for name in vars(whole)}) for n in range(count)]
+        self.dtype = manifest.dtype
+        self.conversions = [make_conversion(whole, own, terrain) for own in of_shards]
+        self.first_clip = manifest.first_clip()
+        self.shard_of_chunk = {split: manifest.shard_of_chunk(split) for split in SPLITS}
+
+    def convert(self, split: str, chunk: int, tables: Mapping[str, np.ndarray]) -> None:
+        """Convert a chunk in place, from its shard's statistics and clip numbers to those of the database.
+
+        chunk: number of the chunk in the split. tables: the arrays of its file, by name. A shard numbers its
+        own clips from 0.
+        """
+        shard = self.shard_of_chunk[split][chunk]
+        if (conversion := self.conversions[shard]) is not None:
+            conversion.apply(tables["x"], tables["y"], tables["fits"], self.dtype)
+        tables["clip"][...] += np.int32(self.first_clip[shard])
+
+
+# Loads the rows of some chunks into memory. A chunk is a file of a few MB with rows of a database.
+
+
+Buffers = Mapping[str, np.ndarray]
+
+
+@dataclass(frozen=True)
+class ChunkWindow:
+    """The rows of some chunks of a split ("train" or "held_out"), chunk after chunk.
+
+    chunks: the numbers of the chunks in the split. rows: number of rows of each chunk. The arrays hold R rows
+    with together S terrain fits (patches of ground that suit the motion), in the types of the chunk files.
+    x: (R, columns of X without terrain). y: (R, Y). count: (R,) number of fits of each row. fits: (S,
+    columns) the fits, row after row. first_fit: (R,) index of each row's first fit in `fits`. clip: (R,)
+    number of each row's clip in the database. frame: (R,) frame in this clip. phase: (R,).
+    """
+
+    chunks: Sequence[int]
+    rows: Sequence[int]
+    first_fit: np.ndarray
+    x: Array
+    y: Array
+    fits: Array
+    count: np.ndarray
+    clip: np.ndarray
+    frame: np.ndarray
+    phase: Array
+
+
+def empty_buffers(manifest: Manifest, split: str, count: int) -> dict[str, np.ndarray]:
+    """Empty arrays, by name, that are large enough for any `count` chunks of a split.
+
+    The names and their order are those of the arrays in a chunk file.
+    """
+    chunks = manifest.chunks[split]
+    # the `count` largest chunks together
+    rows = sum(sorted(chunk.rows for chunk in chunks)[-count:])
+    fits = sum(sorted(chunk.fits for chunk in chunks)[-count:])
+    floats = STORED[manifest.dtype]
+    return {
+        "x": np.empty((rows, column_count_without_terrain(manifest.layout)), floats),
+        "y": np.empty((rows, manifest.layout.y_size), floats),
+        "fits": np.empty((fits, fit_column_count(manifest.layout)), floats),
+        "count": np.empty(rows, np.int32),
+        "clip": np.empty(rows, np.int32),
+        "frame": np.empty(rows, np.int32),
+        "phase": np.empty(rows, np.float32),
+    }
+
+
+def load_chunks(
+    folder: Path,
+    manifest: Manifest,
+    split: str,
+    numbers: Sequence[int],
+    into: Buffers,
+    shards: ShardConversions,
+    verified: set[str],
+) -> ChunkWindow:
+    """Read some chunks of a split, one after another, directly into the arrays `into` (`empty_buffers`).
+
+    folder: the chunks' folder. numbers: the numbers of the chunks. shards: converts the rows, which are
+    standardised by the statistics of their shard (a part of the database), to the statistics of the whole
+    database. verified: names of chunk files with a correct checksum, which are not checked again. The names
+    of the files read are added to it. Raises InputError, which names the file, if a chunk is damaged.
+    """
+    wanted = [manifest.chunks[split][i] for i in numbers]
+    all_rows, all_fits = sum(c.rows for c in wanted), sum(c.fits for c in wanted)
+    tables = {name: table[: all_fits if name == "fits" else all_rows] for name, table in into.items()}
+    row = fit = 0  # where the rows and the fits of the next chunk begin
+    for number, chunk in zip(numbers, wanted, strict=True):
+        rows, fits = slice(row, row + chunk.rows), slice(fit, fit + chunk.fits)
+        parts = {name: table[fits if name == "fits" else rows] for name, table in tables.items()}
+        read_chunk(folder, chunk, parts, verify=chunk.file not in verified)
+        verified.add(chunk.file)
+        shards.convert(split, number, parts)
+        row, fit = rows.stop, fits.stop
+    return ChunkWindow(numbers, [c.rows for c in wanted], order.first_fits(tables["count"]), **tables)
+
 
 Item = TypeVar("Item")
 # n rows to compose: a window, (n,) indices of rows in it, and (n,) for each row the index of one of its fits.

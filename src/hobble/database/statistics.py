@@ -15,8 +15,7 @@ from hobble.channels import channel
 from hobble.channels.channel import CONSTANT_BELOW, SILENCING_STD
 from hobble.core.quat import Array
 from hobble.rows.clip_rows import ClipRows
-from hobble.rows.compose import TERRAIN, body_layout
-from hobble.rows.layout import RowLayout
+from hobble.rows.layout import TERRAIN, RowLayout, blocks_without_terrain, body_layout, lower_joints
 
 UNSEEN = 1e-10  # input weight of a joint that the network shall not see, as in Holden et al. (2017)
 BATCH = 2048  # rows of a clip are converted to float64 so many at a time, to use little memory
@@ -199,3 +198,31 @@ def unseen_joints(skeleton: Mapping[str, Any]) -> list[int]:
     """
     joints = list(skeleton["joints"])
     return [joints.index(name) for name in skeleton.get("unseen", ())]
+
+
+# Standardises raw rows for a database, so that the reader needs little time to compose a row with a fit.
+
+
+def standardise_rows(
+    layout: RowLayout, statistics: Statistics, x: Array, y: Array, fits: Array, count: np.ndarray
+) -> tuple[Array, Array, Array]:
+    """Standardised (x, y, fits) from raw ones, with the same shapes.
+
+    x: (R, columns of X without terrain). y: (R, Y). fits: (S, columns of a terrain fit): ground heights, then
+    their mean height on the path, cm. count: (R,) number of fits of each row.
+
+    A composed row has joint heights above the mean height of its fit. For each row, this function subtracts
+    the average of the mean heights of all its fits. The reader subtracts the rest, the fit's mean height
+    minus this average. The rest is called the lift (cm) and becomes the last column of the fits. It is a
+    small number, which 16 bits store well.
+    """
+    s, terrain = statistics, layout.x_terrain
+    fit_row = np.repeat(np.arange(len(count)), count)  # index of each fit's row
+    row_mean = np.bincount(fit_row, fits[:, -1].astype(np.float64) / count[fit_row], len(count))
+    x, y = x.astype(np.float64), y.astype(np.float64)
+    lower_joints(x, blocks_without_terrain(layout)["joint_position"], row_mean[:, None])
+    lower_joints(y, layout.y_joint_position, row_mean[:, None])
+    x = (x - np.delete(s.x_mean, terrain)) / np.delete(s.x_std, terrain)
+    heights = (fits[:, :-1].astype(np.float64) - s.x_mean[terrain]) / s.x_std[terrain]
+    lift = fits[:, -1] - row_mean[fit_row]
+    return x, (y - s.y_mean) / s.y_std, np.concatenate([heights, lift[:, None]], axis=1)

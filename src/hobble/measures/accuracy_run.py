@@ -22,8 +22,7 @@ from hobble.measures.measure import SPLITS, JointOptions, MeasureInputs, Outcome
 from hobble.measures.sample import Sample, clip_parts, sample_to_measure
 from hobble.models.load import load_network
 from hobble.models.network import Network
-from hobble.rows.clip_rows import ClipRows, pair_batches
-from hobble.rows.excerpts import Excerpt
+from hobble.rows.clip_rows import ClipRows, Excerpt, pair_batches
 from hobble.rows.layout import RowLayout
 
 if TYPE_CHECKING:

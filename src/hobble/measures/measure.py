@@ -220,7 +220,7 @@ class MeasureInputs:
     configuration: its name. files: name of an input -> its file, such as the network or the JSON of another
     measurement. clips: clip -> its file of rows. splits: clip -> "train" or "held_out". people: clip -> the
     person who walks in it. If the person is not known, the clip, its mirror and the hurt clips made from it
-    count as one more person. summaries: the `hobble.rows.summary` file of each clip. runtime: the values of
+    count as one more person. summaries: the `hobble.rows.clip_rows` file of each clip. runtime: the values of
     the keys in `Measure.runtime`; the other keys have defaults. pieces: if the measurement was split into
     pieces that ran as jobs of their own, name of a piece -> its JSON file.
     """

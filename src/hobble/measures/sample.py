@@ -1,6 +1,6 @@
 """The clips that are measured: all of them, or a stratified sample of a large data set.
 
-The sample consists of excerpts of clips (`hobble.rows.excerpts`), so that no long clip is measured as a
+The sample consists of excerpts of clips (`hobble.rows.clip_rows`), so that no long clip is measured as a
 whole. An excerpt is a range of consecutive rows; a clip has one row for each frame of its gait cycles.
 
 The excerpts are put into groups of similar excerpts, the strata. A stratum has one split (training or
@@ -28,9 +28,16 @@ import numpy as np
 from hobble.core.files import Json
 from hobble.measures.measure import MeasureInputs, SampleOptions
 from hobble.rows.captured import Captured, captured_stretches
-from hobble.rows.clip_rows import ClipRows, load_clip_rows
-from hobble.rows.excerpts import Excerpt, ExcerptKind, load_excerpt, shuffle_key
-from hobble.rows.summary import RowsSummary, load_summary
+from hobble.rows.clip_rows import (
+    ClipRows,
+    Excerpt,
+    ExcerptKind,
+    RowsSummary,
+    load_clip_rows,
+    load_excerpt,
+    load_summary,
+    shuffle_key,
+)
 
 LEAST_EXCERPTS = 2  # drawn from a stratum, because its variance needs two
 SPEED_RANGES = 3  # ranges of speed into which the excerpts of each gait are divided

@@ -9,7 +9,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from hobble.rows.mirror_columns import ColumnMirror
+from hobble.rows.layout import ColumnMirror
 
 
 class LayerMirror(NamedTuple):

@@ -14,7 +14,7 @@ import torch
 from torch import Tensor
 
 from hobble.models.layer_mirror import LayerMirror
-from hobble.rows.mirror_columns import ColumnMirror
+from hobble.rows.layout import ColumnMirror
 
 ALL_ROWS = slice(None)
 

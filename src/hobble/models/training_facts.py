@@ -12,8 +12,7 @@ import numpy as np
 from hobble.core.errors import InputError
 from hobble.core.quat import Array
 from hobble.models import checks
-from hobble.rows.compose import compose
-from hobble.rows.layout import GAITS, RowLayout
+from hobble.rows.layout import GAITS, RowLayout, compose
 
 # Name in the network's file -> field of `TrainingFacts`, for the fields with a number for each column.
 ARRAYS = {

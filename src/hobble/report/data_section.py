@@ -16,8 +16,7 @@ from hobble.core.skeleton import Skeleton
 from hobble.motion.retarget import MOST_DIFFERENCE, most_different
 from hobble.report.gather import ReportMaterial
 from hobble.report.parts import Chart, Column, Table, axis, bar_trace
-from hobble.rows.clip_rows import row_count
-from hobble.rows.excerpts import Excerpt, cut_into_excerpts, load_excerpt, shuffle_key
+from hobble.rows.clip_rows import Excerpt, cut_into_excerpts, load_excerpt, row_count, shuffle_key
 from hobble.rows.layout import GAITS
 
 MOST_SHOWN = 150  # at most this many clips have label curves, a row in the table and views of their ground

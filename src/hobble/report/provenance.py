@@ -19,9 +19,8 @@ from typing import Any
 from hobble.core.errors import InputError
 from hobble.core.files import read_json, read_numbers
 from hobble.core.processors import processor_name
-from hobble.database.manifest import FILE as MANIFEST
-from hobble.database.manifest import Manifest
-from hobble.database.sizes import database_sizes
+from hobble.database.chunks import FILE as MANIFEST
+from hobble.database.chunks import Manifest, database_sizes
 
 WEB = Path(__file__).parent / "web"  # the page's scripts
 # The Python packages whose versions are reported.
@@ -95,7 +94,7 @@ def summarise_pipeline(
 
     The result has `stages` (for each stage: jobs, seconds, `longest` job in seconds, max_rss_mb, cpu_seconds,
     files, bytes; and `rules`, which has the same for each rule, but not files and bytes), `total_seconds`,
-    `total_bytes`, `database` (see `hobble.database.sizes`; None without a database), `missing`, `machine`,
+    `total_bytes`, `database` (see `hobble.database.chunks`; None without a database), `missing`, `machine`,
     `versions`. Raises InputError for a malformed benchmark or history.
     """
     missing: list[str] = []

@@ -9,8 +9,7 @@ import numpy as np
 
 from hobble.core.quat import Array
 from hobble.rows.clip_rows import ClipRows
-from hobble.rows.compose import lower_joints
-from hobble.rows.layout import GAITS
+from hobble.rows.layout import GAITS, lower_joints
 
 
 @dataclass(frozen=True)

@@ -6,9 +6,11 @@ only on the frame are stored once for each row. Values that depend on the fit ar
 
 from __future__ import annotations
 
+import hashlib
 import json
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -16,10 +18,9 @@ import numpy as np
 
 from hobble.core.array_parts import ArrayParts
 from hobble.core.errors import InputError
-from hobble.core.files import load_npz, save_npz
+from hobble.core.files import load_npz, read_json, save_npz, write_json
 from hobble.core.quat import Array
-from hobble.rows.compose import body_column_count, compose, frame_inputs
-from hobble.rows.layout import RowLayout
+from hobble.rows.layout import GAITS, RowLayout, body_column_count, body_layout, compose, frame_inputs
 
 CHANNEL_PREFIX = "channel_"  # in a file, the name of each channel's array begins with it
 DELETE_IT = "Delete it; the next run makes it again."
@@ -228,3 +229,148 @@ def _read_part(file: ArrayParts, first: int, stop: int) -> dict[str, Any]:
     first_fit = int(file.read_rows("fits", 0, first).sum())  # number of fits of the rows before `first`
     stop_fit = first_fit + int(rows["fits"].sum())
     return {**whole, **rows, **{name: file.read_rows(name, first_fit, stop_fit) for name in of_fits}}
+
+
+# Cuts clips into excerpts, from which a sample of a large data set is drawn.
+#
+# With excerpts, a long clip need not be read whole. A clip is cut into as few excerpts as possible, of about
+# equal length. A short clip is one excerpt.
+
+
+# An excerpt has at most this many rows. 1200 rows are 20 seconds, which is long enough for several steps. It
+# is also short enough to cut an hour of walking into many excerpts.
+LONGEST = 1200
+
+
+class Excerpt(NamedTuple):
+    """Consecutive rows of a clip.
+
+    clip: name of the clip. first: index of the excerpt's first row in the clip. rows: number of rows of the
+    excerpt. clip_rows: number of rows of the whole clip.
+    """
+
+    clip: str
+    first: int
+    rows: int
+    clip_rows: int
+
+    @property
+    def is_whole_clip(self) -> bool:
+        """Whether the excerpt is the whole clip."""
+        return self.rows == self.clip_rows
+
+    @property
+    def stop(self) -> int:
+        """Index in the clip of the first row after the excerpt."""
+        return self.first + self.rows
+
+
+@dataclass(frozen=True)
+class ExcerptKind:
+    """What kind of motion is in an excerpt.
+
+    gait: the gait with the largest mean share. speed: mean speed of the root, cm a frame. channels: names of
+    the channels that have a value other than 0 in some row.
+    """
+
+    gait: str
+    speed: float
+    channels: tuple[str, ...]
+
+
+def cut_into_excerpts(clip: str, rows: int, longest: int = LONGEST) -> list[Excerpt]:
+    """Cut a clip of `rows` rows into excerpts of at most `longest` rows each.
+
+    The lengths of the excerpts differ by at most one row.
+
+    >>> [(excerpt.first, excerpt.rows) for excerpt in cut_into_excerpts("walk", 2500)]
+    [(0, 833), (833, 833), (1666, 834)]
+    >>> cut_into_excerpts("empty", 0)
+    []
+    """
+    count = -(-rows // longest)  # rows / longest, rounded up
+    edges = [rows * i // count for i in range(count + 1)] if count else []
+    return [Excerpt(clip, a, b - a, rows) for a, b in pairwise(edges)]
+
+
+def excerpt_kind(rows: ClipRows, first: int, stop: int) -> ExcerptKind:
+    """What kind of motion is in the rows from `first` up to `stop`, which is not included.
+
+    There has to be at least one such row.
+    """
+    layout, part = rows.layout, slice(first, stop)
+    channels = tuple(name for name, values in rows.channels.items() if np.any(values[part] != 0))
+    shares = rows.x[part, body_layout(layout).x_gait].reshape(stop - first, len(GAITS), layout.samples)
+    # Of the samples around each frame, the middle one is the frame itself.
+    gait = GAITS[int(shares[:, :, layout.samples // 2].mean(axis=0).argmax())]
+    speed = np.hypot(*rows.y[part, layout.y_root_velocity].astype(float).T).mean()
+    return ExcerptKind(gait, float(speed), channels)
+
+
+def load_excerpt(path: str | Path, excerpt: Excerpt, before: int = 0, after: int = 0) -> ClipRows:
+    """Read the rows of an excerpt, with neighbouring rows of its clip.
+
+    path: the clip's file of rows. before, after: how many rows before and after the excerpt to add, if the
+    clip has them. Only these rows are read from the file. Raises InputError if the file is damaged, or if the
+    clip does not have `excerpt.clip_rows` rows.
+    """
+    first, stop = max(0, excerpt.first - before), min(excerpt.clip_rows, excerpt.stop + after)
+    rows = load_clip_rows(path, None if stop - first == excerpt.clip_rows else (first, stop))
+    if len(rows) != stop - first:
+        raise InputError(
+            path, f"does not have as many rows as its summary says ({excerpt.clip_rows})", fix=DELETE_IT
+        )
+    return rows
+
+
+# A summary of a clip's rows, so that excerpts of the clip can be chosen before its rows are read.
+
+
+@dataclass(frozen=True)
+class RowsSummary:
+    """A summary of a clip's rows.
+
+    clip: name of the clip. rows: number of rows. kinds: what kind of motion is in each excerpt of the clip,
+    in the order of `hobble.rows.clip_rows.excerpts`.
+    """
+
+    clip: str
+    rows: int
+    kinds: tuple[ExcerptKind, ...] = field(repr=False)
+
+    @property
+    def excerpts(self) -> dict[Excerpt, ExcerptKind]:
+        """Each excerpt of the clip -> what kind of motion is in it."""
+        return dict(zip(cut_into_excerpts(self.clip, self.rows), self.kinds, strict=True))
+
+
+def summary_of_rows(rows: ClipRows) -> RowsSummary:
+    """Make the summary of a clip's rows."""
+    parts = cut_into_excerpts(rows.clip, len(rows))
+    return RowsSummary(
+        rows.clip, len(rows), tuple(excerpt_kind(rows, part.first, part.stop) for part in parts)
+    )
+
+
+def save_summary(path: str | Path, summary: RowsSummary) -> None:
+    """Write a summary as JSON."""
+    write_json(Path(path), asdict(summary))
+
+
+def load_summary(path: str | Path) -> RowsSummary:
+    """Read what `save_summary` wrote. Raises InputError if the file holds something else."""
+    values: Mapping[str, Any] = read_json(Path(path))
+    try:
+        kinds = tuple(
+            ExcerptKind(**{**kind, "channels": tuple(kind["channels"])}) for kind in values["kinds"]
+        )
+        summary = RowsSummary(str(values["clip"]), int(values["rows"]), kinds)
+        summary.excerpts  # noqa: B018 - raises ValueError if there is not one kind for each excerpt
+    except (KeyError, TypeError, ValueError) as error:
+        raise InputError(path, f"not the summary of a clip ({error})", fix=DELETE_IT) from error
+    return summary
+
+
+def shuffle_key(name: str) -> bytes:
+    """A key for sorting names. The order looks random, but a new name does not change that of the others."""
+    return hashlib.sha256(name.encode()).digest()

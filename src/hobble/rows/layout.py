@@ -6,11 +6,16 @@ The columns depend on the skeleton, the window of the trajectory, and the channe
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
-from hobble.channels import channel_of_old_key
+import numpy as np
+
+from hobble.channels import channel, channel_of_old_key
+from hobble.core.errors import HobbleError
+from hobble.core.quat import Array
+from hobble.core.skeleton import Skeleton
 
 GAITS = ("stand", "walk", "jog", "crouch", "jump", "bump")
 CONTACTS = ("left_heel", "left_toe", "right_heel", "right_toe")
@@ -208,3 +213,212 @@ class RowLayout:
         # `vars` lists the properties in the order of their definition, which is the column order of Y.
         names = [n for n in vars(type(self)) if n.startswith("y_") and n != "y_size"]
         return {name[2:]: getattr(self, name) for name in names}
+
+
+# Composes rows of X from the body's columns, the channels, and the ground heights of one terrain fit.
+#
+# A terrain fit is a set of ground heights that suit the motion. A row may have several, so they are stored
+# apart from the columns that depend only on the frame. `compose` and `lower_joints` take numpy arrays or
+# PyTorch tensors, raw or standardised. In shapes, n is the number of rows.
+
+
+TERRAIN = "terrain"  # name of the block of ground heights in X
+
+
+def body_column_count(layout: RowLayout) -> int:
+    """Number of columns of X without terrain and channels."""
+    return column_count_without_terrain(layout) - sum(columns for _, columns in layout.channels)
+
+
+def body_layout(layout: RowLayout) -> RowLayout:
+    """`layout` without channels, and with the blocks of X in the order of `hobble.rows.layout.BODY`."""
+    return replace(layout, channels=(), order=())
+
+
+def column_count_without_terrain(layout: RowLayout) -> int:
+    """Number of columns of X without terrain. These columns depend only on the frame."""
+    return layout.x_size - 3 * layout.samples
+
+
+def fit_column_count(layout: RowLayout) -> int:
+    """Number of values that a database stores for a terrain fit: ground heights and their mean."""
+    return 3 * layout.samples + 1
+
+
+def joint_heights(joints: slice) -> slice:
+    """The columns of y, the height, in a block `joints` of joint positions x, y, z."""
+    return slice(joints.start + 1, joints.stop, 3)
+
+
+def frame_inputs(layout: RowLayout, body: Array, channels: Mapping[str, Array]) -> Array:
+    """X without its terrain columns, (n, columns), in the order of the layout.
+
+    body: (n, columns) X without terrain and channels, in the order of `body_layout`. channels: channel ->
+    values (n, columns).
+    """
+    if not layout.order:  # the blocks of the body come first, then the channels
+        return np.concatenate([body, *(channels[name] for name, _ in layout.channels)], axis=1)
+    body_blocks = blocks_without_terrain(body_layout(layout))
+    values = {name: body[:, block] for name, block in body_blocks.items()} | dict(channels)
+    return np.concatenate([values[name] for name in blocks_without_terrain(layout)], axis=1)
+
+
+def blocks_without_terrain(layout: RowLayout) -> dict[str, slice]:
+    """Name -> columns of each block of X, counted without the terrain columns."""
+    terrain = layout.x_terrain
+    width = terrain.stop - terrain.start
+    return {
+        name: slice(block.start - width, block.stop - width) if block.start >= terrain.stop else block
+        for name, block in layout.blocks("x").items()
+        if name != TERRAIN
+    }
+
+
+def compose(
+    layout: RowLayout,
+    frames: Any,
+    ground: Any,
+    mean_height: Any,
+    x: Any,
+    y: Any,
+    x_std: Any = None,
+    y_std: Any = None,
+) -> None:
+    """Fill x (n, X) in place, then subtract `mean_height` from the joint heights of x and y (n, Y) in place.
+
+    frames: (n, columns) X without terrain, see `frame_inputs`. ground: (n, 3 * samples) ground heights. If
+    `frames` and `ground` are standardised, so is x. mean_height: (n, 1) mean height of the ground, always in
+    cm; None subtracts nothing. x_std (X,), y_std (Y,): standard deviations by which standardised rows were
+    divided; None for raw rows.
+    """
+    terrain = layout.x_terrain
+    x[:, : terrain.start] = frames[:, : terrain.start]
+    x[:, terrain.stop :] = frames[:, terrain.start :]
+    x[:, terrain] = ground
+    if mean_height is not None:
+        lower_joints(x, layout.x_joint_position, mean_height, x_std)
+        lower_joints(y, layout.y_joint_position, mean_height, y_std)
+
+
+def lower_joints(values: Any, joints: slice, by: Any, std: Any = None) -> None:
+    """Subtract `by` (n, 1), in cm, from the joint heights in `values` (n, columns), in place.
+
+    joints: the block of joint positions. std: (columns,) by which standardised values were divided; None for
+    raw values.
+    """
+    heights = joint_heights(joints)
+    values[:, heights] -= by if std is None else by / std[heights]
+
+
+# Mirrors rows, as if the motion were mirrored: left and right columns swap, and some columns change sign.
+
+
+POINT = (-1, 1, 1)  # signs that mirror x, y, z of a point or a velocity: +x is the left
+# Signs that mirror x, y, z of a rotation, given as axis times angle. They are the negative of POINT, because
+# a mirror also reverses the sense of every turn.
+ROTATION = (1, -1, -1)
+
+
+@dataclass(frozen=True)
+class ColumnMirror:
+    """Mirrors rows of C columns: the mirrored row is row[source] * sign + shift.
+
+    Mirroring twice gives the original row. source: (C,) int, the column from which each column is taken.
+    sign: (C,) 1 or -1. shift: (C,) what is added; 0 unless the rows are standardised.
+    """
+
+    source: np.ndarray = field(repr=False)
+    sign: np.ndarray = field(repr=False)
+    shift: Array = field(repr=False)
+
+    def __call__(self, values: Array) -> Array:
+        """Mirror the rows `values` (..., C)."""
+        return values[..., self.source] * self.sign + self.shift
+
+    def for_standardised_rows(self, mean: Array, std: Array) -> ColumnMirror:
+        """The mirror of rows that are standardised: (row - mean) / std. mean, std: (C,).
+
+        `shift` makes up for the different means of a column and its mirror. Raises HobbleError if a column
+        and its mirror have different standard deviations.
+        """
+        mean, std = mean.astype(float), std.astype(float)
+        if len(unequal := np.flatnonzero(std != std[self.source])):
+            a, b = unequal[0], self.source[unequal[0]]
+            raise HobbleError(
+                f"training.symmetric: columns {a} and {b} of the rows mirror each other, but their standard "
+                f"deviations are {std[a]:.6g} and {std[b]:.6g}. Use a data set with `mirror: true`."
+            )
+        return ColumnMirror(self.source, self.sign, (mean[self.source] * self.sign - mean) / std)
+
+
+def mirror_of_x(layout: RowLayout, skeleton: Skeleton) -> ColumnMirror:
+    """The mirror of rows of X that are not standardised.
+
+    The phase is not a column of X. The caller has to add half a cycle to it. Raises HobbleError if the joints
+    or links of the skeleton do not form pairs of left and right.
+    """
+    # The gait shares are not mentioned, because they stay the same.
+    collected = _Columns(layout.x_size, skeleton)
+    collected.trajectory(layout.x_position)
+    collected.trajectory(layout.x_direction)
+    collected.joints(layout.x_joint_position, POINT)
+    collected.joints(layout.x_joint_velocity, POINT)
+    collected.swap(layout.x_terrain, np.arange(len(SIDES))[::-1])
+    for name, columns in layout.channels:
+        # Mirrors the numbers of the columns, which shows from which column each one is taken.
+        swapped = channel(name).mirror(np.arange(columns, dtype=float)[None], skeleton)[0]
+        collected.swap(layout.x_channel(name), swapped.astype(int))
+    return collected.mirror()
+
+
+def mirror_of_y(layout: RowLayout, skeleton: Skeleton) -> ColumnMirror:
+    """The mirror of rows of Y that are not standardised. Raises HobbleError as `mirror_of_x` does."""
+    # The change of phase is not mentioned, because it stays the same.
+    collected = _Columns(layout.y_size, skeleton)
+    collected.trajectory(layout.y_root_velocity)
+    collected.trajectory(layout.y_position)
+    collected.trajectory(layout.y_direction)
+    collected.sign[layout.y_turn] = -1
+    collected.swap(layout.y_contacts, np.array([CONTACTS.index(_on_other_foot(name)) for name in CONTACTS]))
+    collected.joints(layout.y_joint_position, POINT)
+    collected.joints(layout.y_joint_velocity, POINT)
+    collected.joints(layout.y_joint_rotation, ROTATION)
+    return collected.mirror()
+
+
+def _on_other_foot(contact: str) -> str:
+    """The name of the same contact of the other foot: right_toe for left_toe."""
+    side, part = contact.split("_")
+    return f"{'right' if side == 'left' else 'left'}_{part}"
+
+
+class _Columns:
+    """Collects the mirror of `count` columns, block by block. Columns of all other blocks stay the same."""
+
+    def __init__(self, count: int, skeleton: Skeleton) -> None:
+        self.source, self.sign = np.arange(count), np.ones(count)
+        self.mirror_joints = skeleton.mirror_joints
+
+    def trajectory(self, block: slice) -> None:
+        """Mirror a block that has x of every sample, then z of every sample: x changes its sign."""
+        self.sign[block.start : (block.start + block.stop) // 2] = -1
+
+    def joints(self, block: slice, signs: tuple[int, int, int]) -> None:
+        """Mirror a block that has x, y, z of every joint.
+
+        Left and right joints swap, and x, y, z are multiplied by `signs`.
+        """
+        self.swap(block, self.mirror_joints)
+        self.sign[block] = np.tile(signs, len(self.mirror_joints))
+
+    def swap(self, block: slice, order: np.ndarray) -> None:
+        """Mirror a block of equally long parts by changing their order.
+
+        Part i of the mirrored block is part order[i] of the block.
+        """
+        columns = np.arange(block.start, block.stop).reshape(len(order), -1)
+        self.source[block] = columns[order].ravel()
+
+    def mirror(self) -> ColumnMirror:
+        """The mirror of all columns. Call it after the blocks are mirrored."""
+        return ColumnMirror(self.source, self.sign, np.zeros(len(self.source)))

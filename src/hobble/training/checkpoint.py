@@ -1,20 +1,82 @@
-"""Checkpoints. Each is one file with the complete state of a training."""
+"""The state of a training: its history, its checkpoints, and how a training begins or resumes."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import hashlib
+import json
+import logging
+from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
 
+import numba
 import numpy as np
 import torch
 
-from hobble.core.errors import InputError
-from hobble.core.files import save_npz
-from hobble.models.trainable import Trainable
-from hobble.training.history import COLUMNS
+from hobble.core.errors import HobbleError, InputError
+from hobble.core.files import Arrays, load_npz, save_npz, write_text
+from hobble.core.processors import count_cores, multiplies_bfloat16
+from hobble.core.skeleton import Skeleton
+from hobble.database.chunks import FILE
+from hobble.database.reader import Database
+from hobble.models import model_of_kind
+from hobble.models.model import TrainedModel
+from hobble.models.options import Options
+from hobble.models.thread_trial import threads_for
+from hobble.models.trainable import Trainable, TrainingStep
 from hobble.training.optimiser import Adam
+from hobble.training.options import Machines, Training
+from hobble.training.processes import ALONE, Processes
+from hobble.training.schedule import depends_on_passes
+
+# The columns of history.csv before the held-out errors of the blocks of Y; `columns` explains them.
+COLUMNS = ("pass", "section", "samples", "seconds", "train_mse", "held_out_mse")
+
+
+def columns(blocks: Iterable[str]) -> list[str]:
+    """The names of all columns of history.csv. blocks: names of the blocks of Y.
+
+    Samples and seconds are totals from the start; passes and sections begin at 1. train_mse is the mean over
+    the section's batches, with dropout. The held-out errors are measured at the end of the section, without
+    dropout. All errors are mean squared errors of the standardised output.
+    """
+    return [*COLUMNS, *(f"held_out_{name}" for name in blocks)]
+
+
+def write_history(path: Path, blocks: Iterable[str], rows: Sequence[Sequence[float]]) -> None:
+    """Write history.csv. blocks: names of the blocks of Y. rows: the values of `columns` for each section.
+
+    A value that is nan (a held-out error without held-out clips) is left empty.
+    """
+    lines = [",".join(columns(blocks))]
+    lines += [",".join(_cell(i, value) for i, value in enumerate(row)) for row in rows]
+    write_text(path, "\n".join(lines) + "\n")
+
+
+def _cell(column: int, value: float) -> str:
+    """A value as text: counts in columns 0 to 2, seconds in column 3, then errors."""
+    if value != value:  # nan
+        return ""
+    return str(round(value)) if column < 3 else f"{value:.3f}" if column == 3 else f"{value:.8g}"
+
+
+def duration(seconds: float) -> str:
+    """A duration as text.
+
+    >>> duration(42.4), duration(754), duration(7512)
+    ('42 s', '12 min 34 s', '2 h 05 min')
+    """
+    seconds = round(seconds)
+    if seconds < 60:
+        return f"{seconds} s"
+    if seconds < 3600:
+        return f"{seconds // 60} min {seconds % 60:02d} s"
+    return f"{seconds // 3600} h {seconds % 3600 // 60:02d} min"
+
+
+# Checkpoints. Each is one file with the complete state of a training.
+
 
 HELD_OUT_COLUMN = COLUMNS.index("held_out_mse")  # the place of the held-out error in a row of the history
 
@@ -25,8 +87,8 @@ class State:
 
     adam: the optimiser. samples, seconds: training samples and training time so far. best_mse, best: the
     lowest held-out error so far, and the weights with this error, laid out like `network.flat`. history: one
-    row of numbers per section, with the COLUMNS of `hobble.training.history`, then the held-out error of each
-    block of Y. recipe: hash of everything that determines the result (`hobble.training.start.run_name`).
+    row of numbers per section, with the COLUMNS, then the held-out error of each
+    block of Y. recipe: hash of everything that determines the result (`run_name`).
     There is no state of random generators: pass and section seed the order of the rows and dropout.
     """
 
@@ -133,3 +195,219 @@ class Saver:
         if self._pending is not None:
             self._pending.result()
             self._pending = None
+
+
+# Prepares a training: sets threads and device, names the run, and reads the checkpoint to resume from.
+#
+# A run is a training that has a folder of checkpoints of its own.
+
+
+log = logging.getLogger("hobble.training")
+
+# Keys of the section `training` that the recipe hash leaves out; see `recipe_hash`.
+NOT_IN_RECIPE_HASH = ("continues", "device", "keep", "patience", *Machines.model_fields)
+# Keys of the section `training` that are arguments of `Adam`.
+ADAM_KEYS = ("learning_rate", "beta1", "beta2", "l1")
+# The arrays of a checkpoint that determine how a training goes on. `run_name` includes them in the run's
+# name: weights, first and second (moments of the optimiser), and the numbers of steps and sections so far.
+START_ARRAYS = (
+    "weights",
+    "first",
+    "second",
+    "steps",
+    "sections",
+)
+# `precision: auto` uses bfloat16 for batches of this many rows or more, in which matrix products take most of
+# the time.
+BFLOAT16_FROM_BATCH = 256
+
+
+def use_threads(threads: int, batch: int | None = None) -> None:
+    """Set the number of threads of PyTorch and numba, and make PyTorch deterministic.
+
+    threads: the wanted number; it is lowered to the number of cores. batch: rows of a batch. If `batch` is
+    given, a short trial decides whether one thread is faster than `threads`.
+    """
+    threads = max(1, min(threads, count_cores(), numba.config.NUMBA_NUM_THREADS))  # type: ignore[attr-defined]
+    if batch is not None:
+        threads = threads_for(batch, threads)
+    torch.set_num_threads(threads)
+    numba.set_num_threads(threads)
+    torch.use_deterministic_algorithms(True)
+    # With deterministic algorithms, PyTorch fills new memory. This costs time and is not needed, because no
+    # memory is read before it is written.
+    torch.utils.deterministic.fill_uninitialized_memory = False  # type: ignore[attr-defined]
+
+
+def recipe_hash(network: Options, training: Training, database: Database, code: str | None) -> str:
+    """A hash of everything that determines the state of a training after each section.
+
+    These are the options, the data and the code. The number of passes is included only if the learning rate
+    depends on it. Machines and processes are not included, because a training can resume with others. code: a
+    fingerprint of the source code of the training, or None.
+    """
+    settings = training.model_dump(mode="json", exclude=set(NOT_IN_RECIPE_HASH))
+    if not depends_on_passes(training):
+        del settings["passes"]
+    if training.stretches is None:
+        del settings["stretches"]
+    data = hashlib.sha256((database.path / FILE).read_bytes()).hexdigest()
+    text = json.dumps([network.model_dump(mode="json"), settings, data, code], sort_keys=True)
+    return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+
+def run_name(recipe: str, start: Arrays | None) -> str:
+    """The name of a run, and of its folder of checkpoints.
+
+    recipe: the recipe hash. start: arrays of the checkpoint to start from, or None. If it has another recipe,
+    the name is a hash of the recipe and of these arrays. Otherwise the name is the recipe hash, because the
+    run would reach the same state without this checkpoint.
+    """
+    if start is None or str(start.get("recipe")) == recipe:
+        return recipe
+    digest = hashlib.sha256(recipe.encode())
+    for name in START_ARRAYS:
+        digest.update(start[name].tobytes())
+    return digest.hexdigest()[:16]
+
+
+def begin_or_resume(
+    database: Database,
+    network: Options,
+    training: Training,
+    recipe: str,
+    checkpoints: Path,
+    start: Path | None,
+    processes: Processes = ALONE,
+) -> tuple[State, Path]:
+    """The state to begin with, and the path of the run's own checkpoint.
+
+    recipe: the recipe hash. checkpoints: a folder with a subfolder for each run, called as `run_name` says.
+    start: path of another checkpoint to start from, or None.
+
+    The state comes from the run's own checkpoint. If there is none, or if it has more passes than
+    `training.passes`, the state comes from `start`. Without `start`, it is new. Raises InputError for a
+    checkpoint that is damaged or has a network of another shape, and for a `start` that has more passes than
+    `training.passes` or another number of sections in a pass. If there are several processes, the first one
+    reads the checkpoint and sends the state to the other processes. These get `checkpoints` as the path,
+    which they do not use.
+    """
+    start_arrays = load_npz(start) if start is not None and processes.is_first else None
+    state = new_state(database, network, training, processes)
+    if not processes.is_first:
+        return _send_state(state, processes), checkpoints
+    state, own_path = _restore(state, training, recipe, checkpoints, start, start_arrays)
+    return _send_state(state, processes), own_path
+
+
+def _send_state(state: State, processes: Processes) -> State:
+    """Copy the first process's state to all processes."""
+    processes.take_from_first(state.network.flat, state.adam.first_moment, state.adam.second_moment)
+    numbers = processes.numbers_of_first(state.adam.steps, state.sections_done, state.samples)
+    state.adam.steps, state.sections_done, state.samples = numbers
+    return state
+
+
+def _restore(
+    state: State,
+    training: Training,
+    recipe: str,
+    checkpoints: Path,
+    start: Path | None,
+    start_arrays: Arrays | None,
+) -> tuple[State, Path]:
+    """Fill `state` from the run's own checkpoint or from `start`. Without both, leave it new.
+
+    For the arguments see `begin_or_resume`. start_arrays: what the file `start` holds. Returns the state and
+    the path of the run's own checkpoint.
+    """
+    state.recipe = run_name(recipe, start_arrays)
+    own_path = checkpoints / state.recipe / "checkpoint.npz"
+    last_section = training.all_sections
+    if own_path.exists():
+        data = load_npz(own_path)
+        if int(data.get("sections", 0)) <= last_section:
+            unpack(data, state, own_path)
+            log.info("resuming from %s, after section %d of %d", own_path, state.sections_done, last_section)
+            return state, own_path
+        log.warning(
+            "%s has more than %g passes, so it is not used and the training starts again",
+            own_path,
+            training.passes,
+        )
+    if start is not None and start_arrays is not None:
+        unpack(start_arrays, state, start)
+        _check_start(state, training, start)
+        if state.recipe != recipe:
+            log.warning(
+                "%s was made with other settings, data or code; the training resumes from it all the same",
+                start,
+            )
+        log.info("resuming from %s, after section %d of %d", start, state.sections_done, last_section)
+    return state, own_path
+
+
+def _check_start(state: State, training: Training, path: Path) -> None:
+    """Raise InputError if the start checkpoint does not fit the training.
+
+    It must have the same number of sections in a pass, and must not have more passes than the training.
+    """
+    # row[1] is the number of a section in its pass, from 1. So the largest is the number of sections a pass.
+    sections = int(max(row[1] for row in state.history)) if state.history else training.sections
+    if sections != training.sections:
+        raise InputError(
+            path,
+            f"was trained with {sections} sections a pass, but training.sections is {training.sections}",
+            fix=f"Set training.sections to {sections}, or remove training.continues.",
+        )
+    if state.sections_done > training.all_sections:
+        passes = f"{state.sections_done / sections:g}"
+        raise InputError(
+            path,
+            f"has {passes} passes, but training.passes is {training.passes:g}",
+            fix=f"Set training.passes to more than {passes}, or remove training.continues.",
+        )
+
+
+def new_state(
+    database: Database, network: Options, training: Training, processes: Processes = ALONE
+) -> State:
+    """The state before the first section: a new network for the database's rows, and a new optimiser."""
+    skeleton = Skeleton.from_dict(database.skeleton)
+    kind = model_of_kind(network.kind)
+    assert isinstance(kind, TrainedModel), "networks of this kind are built from rows without a training"
+    new_network = kind.untrained_network(network, database.layout, skeleton, training.seed)
+    new_network = new_network.to(choose_device(training.device, processes))
+    return State(new_network, Adam(new_network, **training.model_dump(include=set(ADAM_KEYS))))
+
+
+def choose_device(wanted: str, processes: Processes = ALONE) -> torch.device:
+    """The device to train on. wanted: "auto", "cpu" or "cuda"; "auto" is CUDA if there is a GPU.
+
+    If there are several processes, each one has its own GPU. Raises HobbleError if "cuda" is wanted but not
+    available.
+    """
+    has_cuda = torch.cuda.is_available()
+    if wanted == "cuda" and not has_cuda:
+        raise HobbleError(
+            "training.device is cuda, but PyTorch finds no CUDA device here. Set it to auto or cpu"
+        )
+    if not has_cuda or wanted == "cpu":
+        return torch.device("cpu")
+    return torch.device("cuda") if processes.is_alone else torch.device("cuda", processes.local_rank)
+
+
+def step_for(network: Trainable, training: Training) -> TrainingStep:
+    """The `TrainingStep` for the network's device and for the precision and batch size of the training.
+
+    The precision is that of the factors in matrix products; their sums are always float32. TF32 rounds the
+    factors to 11 bits. PyTorch switches it on or off for the whole process.
+    """
+    on_cpu = network.flat.device.type == "cpu"
+    precision = training.precision
+    half = precision == "bfloat16"
+    if precision == "auto" and training.batch >= BFLOAT16_FROM_BATCH:
+        half = multiplies_bfloat16() if on_cpu else torch.cuda.is_bf16_supported(including_emulation=False)
+    torch.backends.cuda.matmul.allow_tf32 = precision in ("auto", "tf32")
+    torch.backends.cuda.matmul.allow_bf16_reduced_precision_reduction = False
+    return network.step(training.dropout, half)

@@ -9,11 +9,10 @@ import torch
 from torch import Tensor
 
 from hobble.database import order
-from hobble.database.chunk_window import empty_buffers
-from hobble.database.manifest import Manifest
-from hobble.database.reader import Database
-from hobble.database.sharing import SampleRange, SectionSharing
-from hobble.rows.compose import column_count_without_terrain, compose, fit_column_count
+from hobble.database.chunks import Manifest
+from hobble.database.order import SampleRange, SectionSharing
+from hobble.database.reader import Database, empty_buffers
+from hobble.rows.layout import column_count_without_terrain, compose, fit_column_count
 from hobble.training.batches import TRAIN, HostRows, SampleBatch, TrainingRows
 from hobble.training.processes import ALONE, Processes
 

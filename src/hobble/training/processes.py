@@ -20,7 +20,7 @@ import torch.distributed
 from torch import Tensor
 
 from hobble.core.errors import HobbleError
-from hobble.database.sharing import SectionSharing, own_places
+from hobble.database.order import SectionSharing, own_places
 
 LONGEST_WAIT = timedelta(minutes=30)  # for the slowest process; a dead process is noticed at once
 

@@ -18,21 +18,23 @@ from tqdm import tqdm
 from hobble.core.errors import HobbleError
 from hobble.database.reader import Database
 from hobble.models.options import Options
-from hobble.training.batches import TRAIN, LossWatch
-from hobble.training.checkpoint import Saver, State, pack
+from hobble.training.augment import OtherPaces, OtherPoses, RollOut, VersionPoses
+from hobble.training.batches import SPLIT, TRAIN, HeldOutErrors, LossWatch
+from hobble.training.checkpoint import (
+    Saver,
+    State,
+    begin_or_resume,
+    duration,
+    pack,
+    recipe_hash,
+    step_for,
+    use_threads,
+)
 from hobble.training.device_rows import rows_on_device_or_host
-from hobble.training.held_out import SPLIT, HeldOutErrors
-from hobble.training.history import duration
+from hobble.training.optimiser import Symmetry, update_for
 from hobble.training.options import Training
-from hobble.training.other_paces import OtherPaces
-from hobble.training.other_poses import OtherPoses
 from hobble.training.processes import ALONE, Processes
-from hobble.training.rollout import RollOut
 from hobble.training.schedule import learning_rate_share
-from hobble.training.start import begin_or_resume, recipe_hash, step_for, use_threads
-from hobble.training.symmetric import Symmetry
-from hobble.training.update import update_for
-from hobble.training.version_poses import VersionPoses
 
 log = logging.getLogger("hobble.training")
 

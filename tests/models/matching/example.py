@@ -13,8 +13,7 @@ from hobble.models import model_of_kind
 from hobble.models.load import network_from_arrays
 from hobble.models.matching.network import Matching
 from hobble.rows.clip_rows import ClipRows, save_clip_rows
-from hobble.rows.compose import body_column_count
-from hobble.rows.layout import RowLayout
+from hobble.rows.layout import RowLayout, body_column_count
 
 FRAMES = (70, 90)  # of each clip
 CUT = 40  # the first clip's second cycle begins in the frame with which its first ends

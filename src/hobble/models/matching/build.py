@@ -21,8 +21,7 @@ from hobble.core.skeleton import Skeleton
 from hobble.models.matching.options import MatchingOptions
 from hobble.models.matching.search_features import columns_and_weights
 from hobble.rows.clip_rows import ClipRows, load_clip_rows
-from hobble.rows.compose import compose, frame_inputs
-from hobble.rows.layout import RowLayout
+from hobble.rows.layout import RowLayout, compose, frame_inputs
 
 
 @dataclass(frozen=True)

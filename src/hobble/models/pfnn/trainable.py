@@ -14,7 +14,7 @@ from hobble.models.layer_mirror import LayerMirror, layer_mirrors
 from hobble.models.pfnn.network import formula
 from hobble.models.products import product
 from hobble.models.trainable import Trainable, TrainingStep, uniform_start
-from hobble.rows.mirror_columns import ColumnMirror
+from hobble.rows.layout import ColumnMirror
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ from hobble.models.pfnn.step import PfnnStep
 from hobble.models.plain.network import PHASE_COLUMNS
 from hobble.models.products import product
 from hobble.models.trainable import ALL_ROWS, Trainable, TrainingStep, uniform_start
-from hobble.rows.mirror_columns import ColumnMirror
+from hobble.rows.layout import ColumnMirror
 
 
 @dataclass(frozen=True)

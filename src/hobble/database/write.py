@@ -1,0 +1,678 @@
+"""Writes a database: plans it, shuffles the rows of all clips in bounded memory, and merges shards.
+
+A row is a frame of a clip as a network gets it, with one or more terrain fits (ground heights that suit the
+motion). A shard is a part of a database, with the rows of some clips in files called chunks. Buckets are
+temporary files in which the rows are sorted before chunks are written.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import json
+import os
+import shutil
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from functools import reduce
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hobble.channels.speed_limits import LimitLearner
+from hobble.core.errors import HobbleError, InputError
+from hobble.core.files import failed_write_error, load_npz, read_json, save_npz, sync_folder, write_json
+from hobble.core.quat import Array
+from hobble.database.chunks import (
+    FILE,
+    HINT,
+    INDEX_BYTES,
+    SCALES,
+    SPLITS,
+    STATISTICS,
+    STORED,
+    Chunk,
+    Manifest,
+    ShardCounts,
+    to_stored_type,
+    write_chunk,
+)
+from hobble.database.learn_limits import add_rows, make_limit_learners
+from hobble.database.statistics import (
+    Moments,
+    Statistics,
+    clip_moments,
+    standardise_rows,
+    statistics_of_moments,
+    unseen_joints,
+)
+from hobble.rows.clip_rows import ClipRows, Outline, load_clip_rows, read_outline
+from hobble.rows.layout import RowLayout, column_count_without_terrain, fit_column_count, frame_inputs
+
+# Size of a bucket (`hobble.database.write`). Sorting a bucket needs a few times as much memory.
+BUCKET_BYTES = 64 << 20
+
+# The rows of a clip, or the path of the file with them.
+RowSource = ClipRows | str | Path
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What a shard will contain.
+
+    layout: the columns of its rows. skeleton: see `Skeleton.to_dict`. visits: how often a pass over the data
+    uses each row. clips: one entry for each clip: `clip` (its name), `split`, number of used `rows` and of
+    `pairs` (of a used row and one of its terrain fits), and for a hurt version `source`, the name of the
+    healthy clip from which it was computed. If an entry has `every` and `first_row`, only each `every`-th row
+    from row `first_row` on is used. chunk_rows, bucket_rows: number of rows of a chunk and of a bucket.
+    """
+
+    layout: RowLayout
+    skeleton: Mapping[str, Any]
+    visits: int
+    clips: list[dict[str, Any]]
+    chunk_rows: int
+    bucket_rows: int
+
+    def row_count(self, split: str) -> int:
+        """Number of used rows in a split ("train" or "held_out")."""
+        return sum(clip["rows"] for clip in self.clips if clip["split"] == split)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data for a file."""
+        # The skeleton is stored as text, because write_json sorts keys, but joints have to keep their order.
+        skeleton = json.dumps(self.skeleton)
+        return {**vars(self), "layout": self.layout.to_dict(), "skeleton": skeleton}
+
+    @classmethod
+    def from_dict(cls, values: Mapping[str, Any]) -> Plan:
+        """The inverse of `to_dict`."""
+        layout, skeleton = RowLayout.from_dict(values["layout"]), json.loads(values["skeleton"])
+        return cls(**{**values, "layout": layout, "skeleton": skeleton})
+
+
+def make_plan(
+    clips: Mapping[str, RowSource],
+    splits: Mapping[str, str],
+    channels: Sequence[str],
+    number_bytes: int,
+    chunk_bytes: int,
+    sources: Mapping[str, str],
+    every: int = 1,
+) -> Plan | None:
+    """The plan of a shard with the rows of `clips`; None if there are no clips.
+
+    number_bytes: bytes of a number on disk. For the other arguments see
+    `hobble.database.write.write_database`. Raises InputError if the rows of a clip have other columns or
+    joints than those of the first clip.
+    """
+    entries: list[dict[str, Any]] = []
+    first: Outline | None = None
+    visits, pairs, rows = 1, 0, 0
+    # Healthy clip -> number of its hurt versions so far. Each version begins at another row, so that the
+    # versions of a clip use different frames.
+    versions: Counter[str] = Counter()
+    for name in sorted(clips):
+        current = read_outline(clips[name])
+        first = first or current
+        if not have_same_columns(current, first):
+            source = clips[name]
+            where = name if isinstance(source, ClipRows) else source
+            raise InputError(where, f"the layout of its rows differs from that of {min(clips)}")
+        entry: dict[str, Any] = {"clip": name, "split": splits[name]}
+        if name in sources:
+            entry["source"] = sources[name]
+            if every > 1 and splits[name] == "train":
+                entry |= {"every": every, "first_row": versions[sources[name]] % every}
+                versions[sources[name]] += 1
+        fits = current.fits[used_rows(entry)]
+        entries.append(entry | {"rows": len(fits), "pairs": int(fits.sum())})
+        visits = max(visits, current.visits, int(fits.max(initial=1)))
+        rows, pairs = rows + len(fits), pairs + int(fits.sum())
+    if first is None:
+        return None
+    layout = first.layout.with_channels(channels)
+    # How many numbers a row has on average, with its fits.
+    row_numbers = (
+        column_count_without_terrain(layout) + layout.y_size + fit_column_count(layout) * pairs / max(rows, 1)
+    )
+    chunk_rows = max(1, int(chunk_bytes / (number_bytes * row_numbers + INDEX_BYTES)))
+    bucket_chunks = max(1, int(BUCKET_BYTES / (chunk_rows * 4 * row_numbers)))
+    return Plan(layout, first.skeleton, visits, entries, chunk_rows, chunk_rows * bucket_chunks)
+
+
+def used_rows(entry: Mapping[str, Any]) -> slice:
+    """The rows of a clip that are used, as a slice. entry: the clip's entry in `Plan.clips`."""
+    return slice(entry.get("first_row", 0), None, entry.get("every", 1))
+
+
+def have_same_columns(one: Outline | Plan, other: Outline | Plan) -> bool:
+    """Whether the rows of `one` and `other` have the same columns and joints."""
+    return one.layout == other.layout and list(one.skeleton["joints"]) == list(other.skeleton["joints"])
+
+
+# Buckets: files that help to shuffle the rows of a database, which may be more than fit in memory.
+#
+# A row is a frame of a clip as a network gets it, with one or more terrain fits (ground heights that suit the
+# motion). The random order in which the rows are stored, the final order, is cut into stretches. Each bucket
+# collects the rows of one stretch, and later these few rows are sorted in memory.
+
+
+# For each row: its place in the final order, its number of terrain fits, the number of its clip, its frame in
+# this clip, and its phase.
+ROW_INDEX = np.dtype(
+    [("place", "<i8"), ("count", "<i4"), ("clip", "<i4"), ("frame", "<i4"), ("phase", "<f4")]
+)
+
+
+def gather_fits(fits: Array, count: np.ndarray, order: np.ndarray) -> Array:
+    """The terrain fits (n, columns) of the rows with the indices `order`, in the order of these rows.
+
+    fits: (S, columns) fits of R rows, row after row. count: (R,) number of fits of each row.
+    """
+    first = np.cumsum(count) - count  # index in `fits` of each row's first fit
+    chosen = count[order]
+    first_in_result = np.cumsum(chosen) - chosen
+    return fits[np.repeat(first[order] - first_in_result, chosen) + np.arange(chosen.sum())]
+
+
+class Buckets:
+    """The buckets in a folder, each with the rows of `rows_per_bucket` consecutive places in the final order.
+
+    Rows can be added in any order. rows: number of all rows. columns, fit_columns: number of columns of a row
+    and of a terrain fit. A bucket has three files, called tables here: "frames" (the rows), "fits" and
+    "index". count: number of buckets.
+    """
+
+    def __init__(self, folder: Path, rows: int, rows_per_bucket: int, columns: int, fit_columns: int) -> None:
+        self.folder, self.rows_per_bucket = folder, rows_per_bucket
+        self.columns, self.fit_columns = columns, fit_columns
+        self.count = -(-rows // rows_per_bucket)  # rounded up
+        folder.mkdir(parents=True)
+
+    def add(self, frames: Array, fits: Array, index: np.ndarray) -> None:
+        """Add R rows, with S terrain fits together, to their buckets.
+
+        frames: (R, columns) the rows. fits: (S, fit_columns) their fits, row after row. index: (R,) of type
+        ROW_INDEX.
+        """
+        of_rows = index["place"] // self.rows_per_bucket
+        order = np.argsort(of_rows, kind="stable")
+        edges = np.searchsorted(of_rows[order], np.arange(self.count + 1))
+        for bucket in np.unique(of_rows):
+            rows = order[edges[bucket] : edges[bucket + 1]]
+            self._append(bucket, "frames", np.asarray(frames[rows], "<f4"))
+            self._append(bucket, "fits", np.asarray(gather_fits(fits, index["count"], rows), "<f4"))
+            self._append(bucket, "index", index[rows])
+
+    def _append(self, bucket: int, table: str, values: np.ndarray) -> None:
+        with open(self._file(bucket, table), "ab") as file:
+            file.write(values.tobytes())
+
+    def _file(self, bucket: int, table: str) -> Path:
+        return self.folder / f"{bucket:05d}.{table}"
+
+    def read(self, bucket: int) -> tuple[Array, Array, np.ndarray]:
+        """The tables frames, fits and index of a bucket, in the order in which rows were added.
+
+        They are empty if the bucket has no rows. Raises InputError if the lengths of the files do not match.
+        """
+        if not self._file(bucket, "index").exists():
+            return self._reshape(np.empty(0, "<f4"), np.empty(0, "<f4"), np.empty(0, ROW_INDEX))
+        frames, fits = (np.fromfile(self._file(bucket, table), "<f4") for table in ("frames", "fits"))
+        index = np.fromfile(self._file(bucket, "index"), ROW_INDEX)
+        for table, values, size in (
+            ("frames", frames, len(index) * self.columns),
+            ("fits", fits, int(index["count"].sum()) * self.fit_columns),
+        ):
+            if len(values) != size:
+                raise InputError(self._file(bucket, table), "truncated or overwritten", fix=HINT)
+        return self._reshape(frames, fits, index)
+
+    def _reshape(self, frames: Array, fits: Array, index: np.ndarray) -> tuple[Array, Array, np.ndarray]:
+        return frames.reshape(-1, self.columns), fits.reshape(-1, self.fit_columns), index
+
+    def drain(self) -> Iterator[tuple[Array, Array, np.ndarray]]:
+        """Yield the frames, fits and index of each bucket in the final order. Removes the files once read."""
+        for bucket in range(self.count):
+            frames, fits, index = self.read(bucket)
+            for table in ("index", "frames", "fits"):
+                self._file(bucket, table).unlink()
+            order = np.argsort(index["place"])
+            yield frames[order], gather_fits(fits, index["count"], order), index[order]
+
+
+# First step of the shuffle: scatter the rows of clips over buckets.
+#
+# Each row has a random place in the final order of its split. A bucket collects, on disk, the rows of one
+# stretch of this order. The second step (`hobble.database.write`) sorts one bucket at a time, because
+# all rows together may not fit in memory.
+
+
+PART_ROWS = 8192  # rows of a clip are scattered so many at a time, to use little memory
+
+
+def make_buckets(folder: Path, plan: Plan) -> dict[str, Buckets]:
+    """Empty buckets for each split, in subfolders of `folder`."""
+    columns, fit_size = (
+        column_count_without_terrain(plan.layout) + plan.layout.y_size,
+        fit_column_count(plan.layout),
+    )
+    return {
+        split: Buckets(
+            folder / f"buckets-{split}", plan.row_count(split), plan.bucket_rows, columns, fit_size
+        )
+        for split in SPLITS
+    }
+
+
+def scatter(
+    buckets: Mapping[str, Buckets], clips: Mapping[str, RowSource], plan: Plan, seed: int
+) -> Iterator[tuple[dict[str, Any], ClipRows, ClipRows]]:
+    """Put the rows of each clip that the plan uses into the buckets of the clip's split.
+
+    clips: name -> rows or their file. seed: of the random places. Yields (the clip's entry in `Plan.clips`,
+    all its rows, its used rows) for each clip.
+    """
+    places = {
+        split: np.random.default_rng([seed, number]).permutation(plan.row_count(split))
+        for number, split in enumerate(SPLITS)
+    }
+    done = dict.fromkeys(SPLITS, 0)  # rows of each split that already have a place
+    for number, entry in enumerate(plan.clips):
+        split, start = entry["split"], done[entry["split"]]
+        done[split] += entry["rows"]
+        source = clips[entry["clip"]]
+        whole = source if isinstance(source, ClipRows) else load_clip_rows(source)
+        used = used_rows(entry)
+        rows = whole if used.step == 1 else whole.every(used.step, used.start)
+        index = np.zeros(len(rows), ROW_INDEX)
+        index["place"] = places[split][start : done[split]]
+        index["count"], index["clip"] = rows.fits, number
+        index["frame"], index["phase"] = rows.frame, rows.p
+        for first in range(0, len(rows), PART_ROWS):
+            part = slice(first, first + PART_ROWS)
+            buckets[split].add(*_frames_and_fits(rows, part, plan.layout), index[part])
+        yield entry, whole, rows
+
+
+def _frames_and_fits(clip: ClipRows, part: slice, layout: RowLayout) -> tuple[Array, Array]:
+    """Some rows of a clip, not standardised, as two arrays for `Buckets.add`: frames and fits.
+
+    part: which n rows. Frames (n, columns): the columns of X without terrain, then those of Y. Fits (m,
+    columns): a line for each terrain fit of these rows, with the ground heights, then their mean on the path.
+    """
+    values = {name: clip.channels[name][part] for name, _ in layout.channels}
+    frames = np.concatenate([frame_inputs(layout, clip.x[part], values), clip.y[part]], axis=1)
+    first = clip.first_fit[part]
+    ground = slice(int(first[0]), int(first[-1] + clip.fits[part][-1]))
+    return frames, np.concatenate([clip.heights[ground], clip.mean[ground, None]], axis=1)
+
+
+# Second step of the shuffle: sort the rows of each bucket, standardise them and write them as chunks.
+#
+# The rows of a bucket are sorted by their places in the final order, which the first step
+# (`hobble.database.write`) has drawn at random.
+
+
+def write_chunks(
+    folder: Path, split: str, buckets: Buckets, plan: Plan, statistics: Statistics, dtype: str
+) -> Iterator[Chunk]:
+    """Write the rows of one split, standardised, to chunk files in the subfolder `split` of `folder`.
+
+    A chunk has up to `plan.chunk_rows` rows of one bucket. split: "train" or "held_out". buckets: the rows.
+    They are deleted. dtype: type of the stored numbers. Yields a description of each chunk.
+    """
+    columns, number = column_count_without_terrain(plan.layout), 0
+    for frames, fits, index in buckets.drain():  # one bucket at a time, sorted
+        ends = np.cumsum(index["count"])
+        for start in range(0, len(index), plan.chunk_rows):
+            part = slice(start, min(start + plan.chunk_rows, len(index)))
+            count = index["count"][part]
+            fit_part = slice(int(ends[start] - count[0]), int(ends[part.stop - 1]))
+            raw = frames[part, :columns], frames[part, columns:], fits[fit_part]
+            x, y, ground = standardise_rows(plan.layout, statistics, *raw, count)
+            arrays = {
+                "x": to_stored_type(x, dtype),
+                "y": to_stored_type(y, dtype),
+                "fits": to_stored_type(ground, dtype),
+                "count": count,
+                "clip": index["clip"][part],
+                "frame": index["frame"][part],
+                "phase": index["phase"][part],
+            }
+            yield write_chunk(folder, f"{split}/{number:05d}.safetensors", arrays)
+            number += 1
+
+
+# A shard: the shuffled rows of some clips of a database, in files of a few MB, the chunks.
+#
+# Rows are standardised by the statistics of the shard; the reader converts them to those of the database.
+
+
+# Bytes of a chunk. A chunk is read in one go, so it is large enough for slow disks and small for any memory.
+CHUNK_BYTES = 4 << 20
+INDEX, MOMENTS, SCALE = "shard.json", "moments.npz", "scale.npz"  # names of a shard's files
+MomentsXY = tuple[Moments, Moments]  # moments of the columns of X, and of the columns of Y
+
+
+def write_shard(
+    folder: Path,
+    clips: Mapping[str, RowSource],
+    splits: Mapping[str, str],
+    *,
+    channels: Sequence[str],
+    sources: Mapping[str, str] | None = None,
+    every: int = 1,
+    joint_weight: float,
+    dtype: str = "float32",
+    seed: int = 1,
+    chunk_bytes: int = CHUNK_BYTES,
+) -> None:
+    """Write the shard of `clips` to `folder`. Arguments as in `hobble.database.write.write_database`.
+
+    `clips` may be empty, and clips may have no rows. Raises InputError if the rows of the clips differ in
+    columns or joints, HobbleError if the disk is full.
+    """
+    plan = make_plan(clips, splits, channels, STORED[dtype].itemsize, chunk_bytes, sources or {}, every)
+    try:
+        for split in SPLITS:  # delete chunks, do not overwrite them: a database may have hard links to them
+            shutil.rmtree(folder / split, ignore_errors=True)
+        folder.mkdir(parents=True, exist_ok=True)
+        if plan is None:
+            write_json(folder / INDEX, {"plan": None, "chunks": {}})
+            return
+        buckets = make_buckets(folder, plan)
+        no_rows = Moments.of_no_rows(plan.layout.x_size), Moments.of_no_rows(plan.layout.y_size)
+        moments: dict[str, MomentsXY] = dict.fromkeys(SPLITS, no_rows)
+        learners = make_limit_learners(plan.layout, plan.skeleton)
+        for entry, rows, used in scatter(buckets, clips, plan, seed):
+            moments[entry["split"]] = add_moments(moments[entry["split"]], clip_moments(used, plan.layout))
+            if entry["split"] == "train":
+                # Also rows left out of training, because a speed is the mean over all rows of a gait cycle.
+                add_rows(learners, rows, (sources or {}).get(entry["clip"]))
+        # The training rows define the statistics. A shard without training rows uses its held-out rows.
+        of_rows = moments["train"] if moments["train"][0].weight else moments["held_out"]
+        statistics = row_statistics(plan, of_rows, joint_weight)
+        chunks = {
+            split: list(write_chunks(folder, split, buckets[split], plan, statistics, dtype))
+            for split in SPLITS
+        }
+        for split in SPLITS:
+            buckets[split].folder.rmdir()
+        _save(folder, plan, moments["train"], statistics, learners)
+        chunk_entries = {split: [asdict(chunk) for chunk in chunks[split]] for split in SPLITS}
+        write_json(folder / INDEX, {"plan": plan.to_dict(), "chunks": chunk_entries})
+    except OSError as error:
+        raise failed_write_error(error, folder) from error
+
+
+def add_moments(one: MomentsXY, other: MomentsXY) -> MomentsXY:
+    """The moments of two sets of rows together."""
+    return one[0] + other[0], one[1] + other[1]
+
+
+def row_statistics(plan: Plan, moments: MomentsXY, joint_weight: float) -> Statistics:
+    """The statistics by which rows with these moments are standardised.
+
+    joint_weight: weight of the joints in the network's input.
+    """
+    return statistics_of_moments(plan.layout, *moments, joint_weight, unseen_joints(plan.skeleton))
+
+
+def _save(
+    folder: Path,
+    plan: Plan,
+    moments: MomentsXY,
+    statistics: Statistics,
+    learners: Mapping[str, LimitLearner],
+) -> None:
+    """Save the moments of the training rows, the shard's statistics, and the speeds of the training clips.
+
+    The file of moments has the arrays weight (2,), of X and of Y, and x (2, X) and y (2, Y), with the mean in
+    the first row and the sum of squared differences from the mean in the second. learners: by channel.
+    """
+    x, y = ((block.mean, block.squares) for block in moments)
+    weight = np.array([block.weight for block in moments])
+    save_npz(folder / MOMENTS, weight=weight, x=np.array(x), y=np.array(y))
+    save_npz(folder / SCALE, **vars(statistics))
+    for channel, learner in learners.items():
+        cycles = {
+            f"{number}.{key}": values
+            for number, entry in enumerate(plan.clips)
+            for key, values in learner.to_arrays(entry["clip"]).items()
+        }
+        save_npz(folder / f"pace-{channel}.npz", **cycles)
+
+
+@dataclass(frozen=True)
+class Shard:
+    """A finished shard. folder: its folder. plan: what it contains. chunks: split -> its chunks."""
+
+    folder: Path
+    plan: Plan
+    chunks: Mapping[str, list[Chunk]]
+
+    @classmethod
+    def load(cls, folder: Path) -> Shard | None:
+        """Read the shard in `folder`; None if it has no clips. Raises InputError if it is incomplete."""
+        values = read_json(folder / INDEX)
+        try:
+            if values["plan"] is None:
+                return None
+            chunks = {split: [Chunk(**chunk) for chunk in values["chunks"][split]] for split in SPLITS}
+            return cls(folder, Plan.from_dict(values["plan"]), chunks)
+        except (KeyError, TypeError, ValueError) as error:
+            raise InputError(folder / INDEX, f"not a shard of a database ({error})", fix=HINT) from error
+
+    def moments(self) -> MomentsXY:
+        """The moments of the shard's training rows."""
+        data = load_npz(self.folder / MOMENTS)
+        x, y = (Moments(float(w), *data[name]) for w, name in zip(data["weight"], "xy", strict=True))
+        return x, y
+
+    def statistics(self) -> Statistics:
+        """The statistics by which the shard's rows are standardised."""
+        return Statistics(**load_npz(self.folder / SCALE))
+
+    def add_speeds(self, learners: Mapping[str, LimitLearner]) -> None:
+        """Add the speeds of the shard's training clips to the learners. learners: channel -> its learner."""
+        for channel, learner in learners.items():
+            data = load_npz(self.folder / f"pace-{channel}.npz")
+            cycles: dict[int, dict[str, np.ndarray]] = {}  # index of a clip -> name of an array -> values
+            for key, values in data.items():
+                number, _, name = key.partition(".")
+                cycles.setdefault(int(number), {})[name] = values
+            for clip_index, arrays in sorted(cycles.items()):
+                learner.add_arrays(self.plan.clips[clip_index]["clip"], arrays)
+
+
+# Merges shards into a database, without reading their rows.
+# The manifest is written last, completely or not at all.
+
+
+def write_database(
+    path: str | Path,
+    clips: Mapping[str, RowSource],
+    splits: Mapping[str, str],
+    *,
+    channels: Sequence[str],
+    sources: Mapping[str, str] | None = None,
+    every: int = 1,
+    joint_weight: float,
+    dtype: str = "float32",
+    seed: int = 1,
+    chunk_bytes: int = CHUNK_BYTES,
+) -> Manifest:
+    """Build a database with one shard in the folder `path`. Returns its manifest.
+
+    clips: clip name -> its rows, or the file with them. splits: clip name -> "train" or "held_out". channels:
+    the network's input channels, in the order of their columns. sources: name of a hurt version -> name of
+    the healthy clip from which it was computed. every: a hurt version in training uses only each `every`-th
+    of its rows. joint_weight: factor by which the standardised joints in the network's input are multiplied.
+    dtype: type of the numbers on disk. seed: seed of the order of the rows. chunk_bytes: rough size of a
+    chunk. The statistics are those of the training clips. The same rows and options give the same bytes.
+    Raises HobbleError if no training clip has rows, InputError if the rows of the clips differ in columns or
+    joints.
+    """
+    with _work_folder(Path(path)) as work:
+        shard = work / "0"
+        write_shard(
+            shard,
+            clips,
+            splits,
+            channels=channels,
+            sources=sources,
+            every=every,
+            joint_weight=joint_weight,
+            dtype=dtype,
+            seed=seed,
+            chunk_bytes=chunk_bytes,
+        )
+        return _merge(Path(path), work, [shard], joint_weight, dtype)
+
+
+def merge_shards(
+    path: str | Path, shards: Sequence[Path], *, joint_weight: float, dtype: str = "float32"
+) -> Manifest:
+    """Build the database folder `path` from the folders `shards`, in their order. Returns its manifest.
+
+    joint_weight, dtype: as in `write_database`. Raises HobbleError if no training clip has rows,
+    InputError if the rows of the shards differ in columns or joints.
+    """
+    with _work_folder(Path(path)) as work:
+        return _merge(Path(path), work, shards, joint_weight, dtype)
+
+
+@contextlib.contextmanager
+def _work_folder(path: Path) -> Iterator[Path]:
+    """Make a folder for unfinished files in the database's folder `path`, and remove it at the end.
+
+    Folders left by killed builds are removed first. Raises HobbleError for a file that cannot be written.
+    """
+    path.mkdir(parents=True, exist_ok=True)
+    _remove_unused(path, keep=None)
+    work = path / f"part-{os.getpid()}"
+    work.mkdir()
+    try:
+        yield work
+    except OSError as error:
+        raise failed_write_error(error, path) from error
+    finally:
+        shutil.rmtree(work, ignore_errors=True)
+
+
+def _merge(path: Path, work: Path, folders: Sequence[Path], joint_weight: float, dtype: str) -> Manifest:
+    """Merge the shards in `folders` inside the folder `work`, then move the result to the folder `path`."""
+    shards = [shard for folder in folders if (shard := Shard.load(folder)) is not None]
+    _check_shards(shards)
+    plan, clips = shards[0].plan, [entry for shard in shards for entry in shard.plan.clips]
+    statistics = row_statistics(
+        plan, reduce(add_moments, (shard.moments() for shard in shards)), joint_weight
+    )
+    build = work / "rows"
+    chunks = _link_chunks(shards, build)
+    save_npz(build / STATISTICS, **vars(statistics))
+    scales = [shard.statistics() for shard in shards]
+    save_npz(
+        build / SCALES,
+        **{name: np.stack([vars(scale)[name] for scale in scales]) for name in vars(statistics)},
+    )
+    learners = make_limit_learners(plan.layout, plan.skeleton)
+    for shard in shards:
+        shard.add_speeds(learners)
+    visits = max(shard.plan.visits for shard in shards)
+    row_numbers = plan.layout.x_size + plan.layout.y_size + 1  # numbers in a row: X, Y and the phase
+    manifest = Manifest(
+        folder=_folder_name(build, chunks),
+        layout=plan.layout,
+        skeleton=plan.skeleton,
+        visits=visits,
+        dtype=dtype,
+        joint_weight=joint_weight,
+        clips=clips,
+        shards=[ShardCounts(len(s.plan.clips), *(len(s.chunks[split]) for split in SPLITS)) for s in shards],
+        chunks=chunks,
+        original_bytes=4 * row_numbers * visits * sum(entry["rows"] for entry in clips),
+        bytes=sum(chunk.bytes for split in SPLITS for chunk in chunks[split]),
+        limits={name: learnt.to_dict() for name, learner in learners.items() if (learnt := learner.learn())},
+    )
+    _put_in_place(path, build, manifest)
+    return manifest
+
+
+def _check_shards(shards: Sequence[Shard]) -> None:
+    """Check that there are training rows, and that the rows of all shards have the same columns and joints.
+
+    Raises HobbleError or InputError.
+    """
+    trained = (entry["rows"] for s in shards for entry in s.plan.clips if entry["split"] == "train")
+    if not any(trained):
+        raise HobbleError(
+            "There is nothing to train on: no training clip has a whole locomotion cycle. Add clips, or list "
+            "fewer under held_out."
+        )
+    first = shards[0].plan
+    for shard in shards:
+        if not have_same_columns(shard.plan, first):
+            clip, other = shard.plan.clips[0]["clip"], first.clips[0]["clip"]
+            raise InputError(clip, f"the layout of its rows differs from that of {other}")
+
+
+def _link_chunks(shards: Sequence[Shard], build: Path) -> dict[str, list[Chunk]]:
+    """Give the chunks of all shards a second name in the folder `build`, or copy them if hard links fail.
+
+    Returns split -> chunks with their paths in `build`.
+    """
+    linked: dict[str, list[Chunk]] = {split: [] for split in SPLITS}
+    for shard in shards:
+        for split, chunks in shard.chunks.items():
+            for chunk in chunks:
+                named = replace(chunk, file=f"{shard.folder.name}/{chunk.file}")
+                target = build / named.file
+                target.parent.mkdir(parents=True, exist_ok=True)
+                try:
+                    os.link(shard.folder / chunk.file, target)
+                except FileNotFoundError:
+                    raise
+                except OSError:
+                    shutil.copyfile(shard.folder / chunk.file, target)
+                linked[split].append(named)
+    return linked
+
+
+def _remove_unused(path: Path, keep: str | None) -> None:
+    """Remove the files that killed builds left in the database folder `path`.
+
+    keep: name of the folder of a finished build, to remove the folders of all others; None to keep all.
+    """
+    for entry in path.iterdir():
+        if entry.is_dir() and (entry.name.startswith("part-") or (keep is not None and entry.name != keep)):
+            shutil.rmtree(entry, ignore_errors=True)
+    for entry in path.glob(f".{FILE}.*.part"):
+        entry.unlink()
+
+
+def _folder_name(build: Path, chunks: Mapping[str, list[Chunk]]) -> str:
+    """The final name of the folder `build`, from a hash of its content."""
+    digest = hashlib.sha256((build / STATISTICS).read_bytes() + (build / SCALES).read_bytes())
+    digest.update(repr(chunks).encode())
+    return f"rows-{digest.hexdigest()[:12]}"
+
+
+def _put_in_place(path: Path, build: Path, manifest: Manifest) -> None:
+    """Move the folder `build` to its final name, write the manifest, then remove the previous build."""
+    final = path / manifest.folder
+    if final.exists():  # the same rows were built before: replace every file, since some may be damaged
+        for file in sorted(p for p in build.rglob("*") if p.is_file()):
+            target = final / file.relative_to(build)
+            # A subfolder is missing if a process was killed while it removed this build.
+            target.parent.mkdir(parents=True, exist_ok=True)
+            os.replace(file, target)
+        sync_folder(final)
+    else:
+        os.rename(build, final)
+    manifest.save(path)
+    _remove_unused(path, keep=manifest.folder)
