@@ -13,11 +13,9 @@ import numpy as np
 
 from hobble.core import quat
 from hobble.core.clip import Clip
-from hobble.core.skeleton import Skeleton, local_rotations
-from tests.motion.rewrite import Rig, Scramble, as_clip
-from tests.motion.rig_names import SYLLABLES
+from hobble.core.skeleton import Skeleton
+from tests.motion.scramble import SYLLABLES, Rig, Scramble, X, as_clip, from_world
 
-X = np.array([1.0, 0.0, 0.0])
 LEG, ARM = ("UpLeg", "Leg", "Foot", "ToeBase"), ("Shoulder", "Arm", "ForeArm", "Hand")
 SIDES = {"L": "Left", "R": "Right"}
 
@@ -163,11 +161,7 @@ def rezeroed(clip: Clip, joints: tuple[str, ...], turn: np.ndarray) -> Clip:
     for j, name in enumerate(clip.skeleton.joints):
         if name.startswith(joints):
             turned[:, j] = quat.mul(turned[:, j], turn)
-    parents = [max(p, 0) for p in clip.skeleton.parents]
-    arms = quat.rotate(quat.inv(turned[:, parents]), places - places[:, parents])
-    skeleton = replace(clip.skeleton, offsets=np.median(arms, axis=0))
-    rotations = quat.continuous(local_rotations(skeleton, turned))
-    return Clip(clip.name, skeleton, clip.fps, rotations, places[:, 0])
+    return from_world(clip.skeleton, clip.fps, places, turned)
 
 
 def dog() -> Clip:

@@ -1,9 +1,8 @@
-"""Real rigs without a skeleton file, and one whose zero pose nobody could stand in."""
+"""Real rigs without a skeleton file, and rigs whose zero pose nobody could stand in."""
 
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,28 +11,24 @@ from hobble.core import quat
 from hobble.core.bvh import write_bvh
 from hobble.core.clip import Clip
 from hobble.core.errors import InputError
-from hobble.core.skeleton import Skeleton, forward_kinematics, rest_positions
-from hobble.motion.make import load_source
+from hobble.core.skeleton import rest_positions
+from hobble.motion.make import load_source, raw_clip
 from hobble.motion.options import ClipMotion
-from hobble.motion.read import decode_channels, read_bvh
+from hobble.motion.read import read_bvh
 from hobble.motion.skeleton_file import load_skeleton
 from tests.motion.other_rigs import PLAIN, rigged
-from tests.motion.scramble import compare, outcome
+from tests.motion.scramble import SKELETONS, X, compare, outcome, source_of
 
-SKELETONS = Path(__file__).parents[2] / "config/skeletons"
-STYLES = ("walk_normal_001", "walk_old_001", "dash_angry_001", "walk-back_tired_001", "walk-left_happy_001")
-PATIENTS = ("A1_Cycle1", "A11_Cycle2", "B1_Cycle1", "D4_Cycle2")
-X = np.array([1.0, 0.0, 0.0])
 LIMBS = {"arm": ("shoulder", "elbow", "wrist"), "leg": ("hip", "knee", "heel")}
+SIDES = ("left", "right")
 
 
-def seen(path) -> dict[str, np.ndarray]:
-    """Positions of the file's own joints at its own rate, computed without our reader."""
+def of_file(path, clip: Clip, names: dict[str, str], role: str):
+    """(F, 3) positions of a joint in the file, at the clip's frames, in the file's unit; and in the clip."""
     file = read_bvh(path)
-    decoded = decode_channels(file, 1e-3)
-    skeleton = Skeleton("seen", file.names, file.parents, decoded.offsets)
-    _, places = forward_kinematics(skeleton, decoded.rotations, decoded.root, decoded.translations)
-    return {name: places[:, j] for j, name in enumerate(file.names)}
+    raw = raw_clip(file)
+    at = np.minimum(np.round(np.arange(len(clip)) / 60 / file.frame_time).astype(int), len(raw) - 1)
+    return raw.positions[at, raw.skeleton.index(names[role])], clip.positions[:, clip.skeleton.role(role)]
 
 
 def bend(a, b, c):
@@ -44,13 +39,10 @@ def bend(a, b, c):
 
 def same_bends(path, clip: Clip, names: dict[str, str]) -> None:
     """Whether knees and elbows bend as in the file: the middle of their range, and its size."""
-    places, fps = seen(path), 1 / read_bvh(path).frame_time
-    at = np.minimum(np.round(np.arange(len(clip)) / 60 * fps).astype(int), len(places[names["hips"]]) - 1)
-    for side in ("left", "right"):
+    for side in SIDES:
         for kind, limb in LIMBS.items():
-            roles = [f"{side}_{part}" for part in limb]
-            before = bend(*(places[names[role]][at] for role in roles))
-            after = bend(*(clip.positions[:, clip.skeleton.role(role)] for role in roles))
+            joints = [of_file(path, clip, names, f"{side}_{part}") for part in limb]
+            before, after = (bend(*places) for places in zip(*joints, strict=True))
             assert np.abs(after - before).mean() < (12 if kind == "leg" else 4), (path.name, side, kind)
 
 
@@ -61,18 +53,18 @@ def test_feet_on_uneven_ground_cast_no_doubt_on_the_zero_pose(shared, make):
 
 
 @pytest.mark.shared
-@pytest.mark.parametrize("name", STYLES)
+@pytest.mark.parametrize("name", ["walk_old_001", "walk-back_tired_001", "dash_angry_001"])
 def test_a_rig_whose_zero_pose_is_a_line_comes_out_upright(shared, make, name):
     path = shared / f"mocap/styles/dataset-1_{name}.bvh"
     clip, report = make(path)
     assert report["stance"].startswith("its motion, because in its zero pose")
     same_bends(path, clip, report["roles"])
-    left, right = (clip.positions[:, clip.skeleton.role(f"{side}_hip"), 1] for side in ("left", "right"))
+    left, right = (clip.positions[:, clip.skeleton.role(f"{side}_hip"), 1] for side in SIDES)
     assert np.ptp(left - right) < 8
 
 
 @pytest.mark.shared
-@pytest.mark.parametrize("name", PATIENTS)
+@pytest.mark.parametrize("name", ["A11_Cycle2", "D4_Cycle2"])
 def test_a_rig_without_a_file_is_found(shared, make, name):
     path = shared / f"mocap/patients/Subject{name}.bvh"
     clip, report = make(path)
@@ -84,21 +76,15 @@ def test_a_rig_without_a_file_is_found(shared, make, name):
 
 
 @pytest.mark.shared
-@pytest.mark.parametrize("name", ["03_04", "07_04", "105_16"])
+@pytest.mark.parametrize("name", ["03_04", "105_16"])
 def test_hips_and_shoulders_are_as_level_as_in_the_file(shared, make, name):
     """The spines of captured rigs are bent sideways in the zero pose; hips and shoulders are not."""
     path = shared / f"mocap/cmu/{name}.bvh"
     clip, report = make(path)
-    places, fps = seen(path), 1 / read_bvh(path).frame_time
-    at = np.minimum(np.round(np.arange(len(clip)) / 60 * fps).astype(int), len(places["Hips"]) - 1)
-
-    def tilt(left, right):
-        way = left - right
-        return np.degrees(np.arctan2(way[:, 1], np.hypot(way[:, 0], way[:, 2])))
-
     for part in ("hip", "shoulder"):
-        before = tilt(*(places[report["roles"][f"{side}_{part}"]][at] for side in ("left", "right")))
-        after = tilt(*(clip.positions[:, clip.skeleton.role(f"{side}_{part}")] for side in ("left", "right")))
+        left, right = (of_file(path, clip, report["roles"], f"{side}_{part}") for side in SIDES)
+        ways = [a - b for a, b in zip(left, right, strict=True)]
+        before, after = (np.degrees(np.arctan2(w[:, 1], np.hypot(w[:, 0], w[:, 2]))) for w in ways)
         assert abs((after - before).mean()) < 1
 
 
@@ -113,9 +99,7 @@ def test_feet_that_stand_at_different_angles_get_a_note(shared, tmp_path):
 @pytest.mark.shared
 def test_a_clip_too_short_to_show_its_feet_is_refused_or_accepted(shared, tmp_path, make):
     """A third of a second of a walk on a rig whose zero pose is a heap."""
-    maps, path = SKELETONS, shared / "mocap/cmu/07_01.bvh"
-    clip = load_source(read_bvh(path), load_skeleton(maps / "holden31.yaml"), maps, ClipMotion()).clip
-    clip = replace(clip, rotations=clip.rotations[:40], root=clip.root[:40])
+    clip = source_of(shared / "mocap/cmu/07_01.bvh", 40)
     write_bvh(tmp_path / "short.bvh", rigged(clip, PLAIN, rest="heap")[0], decimals=8)
     with pytest.raises(InputError, match=r"short.bvh: The height .*0.33 s are too short.*accept_doubt"):
         make(tmp_path / "short.bvh")
@@ -135,16 +119,13 @@ def test_one_foot_that_agrees_with_the_rest_pose_decides(shared, tmp_path):
 
 @pytest.mark.shared
 def test_feet_that_were_animated_are_as_steep_in_a_run_as_in_a_walk(shared, make):
-    """They always stand at exactly one angle, 39.6 degrees, so the run needs no correction for raised
-    heels.
-    """
-    for name in ("walk_angry_001", "run_angry_001", "dash_happy_001"):
+    """They always stand at exactly one angle, 39.6 degrees, so no correction for raised heels is needed."""
+    for name in ("walk_angry_001", "run_angry_001"):
         path = shared / f"mocap/styles/dataset-1_{name}.bvh"
-        source = load_source(
-            read_bvh(path), load_skeleton(SKELETONS / "holden31.yaml"), SKELETONS, ClipMotion()
-        )
+        target = load_skeleton(SKELETONS / "holden31.yaml")
+        source = load_source(read_bvh(path), target, SKELETONS, ClipMotion())
         rest, role = rest_positions(source.clip.skeleton), source.clip.skeleton.role
-        for side in ("left", "right"):
+        for side in SIDES:
             x, y, z = rest[role(f"{side}_toe")] - rest[role(f"{side}_heel")]
             assert np.degrees(np.arctan2(-y, np.hypot(x, z))) == pytest.approx(39.6, abs=0.5), (name, side)
         assert source.unsure == []
@@ -175,7 +156,7 @@ def rewritten(clip: Clip, rest: str, tmp_path, make) -> tuple[Clip, Clip, dict[s
     return make(tmp_path / "plain.bvh")[0], made, names, report
 
 
-@pytest.mark.parametrize("rest", ["own", "a pose", "one axis", "twisted"])
+@pytest.mark.parametrize("rest", ["own", "one axis", "twisted"])
 def test_a_bow_does_not_tilt_the_pelvis(standing, tmp_path, make, rest):
     bow = bent(standing, ("LowerBack", "Spine"), 0.7 * (1 - np.cos(np.arange(300) / 30)) / 2)
     first, second, names, _ = rewritten(bow, rest, tmp_path, make)

@@ -24,9 +24,7 @@ def swapped(first: str, second: str):
 
     def edit(text: str) -> str:
         for side in ("left", "right"):
-            a, b = (
-                re.search(rf"^  {side}_{part}: (\w+)$", text, re.MULTILINE)[1] for part in (first, second)
-            )
+            a, b = (re.search(rf"^  {side}_{part}: (\w+)$", text, re.M)[1] for part in (first, second))
             text = role(f"{side}_{second}", a)(role(f"{side}_{first}", b)(text))
         return text
 

@@ -1,4 +1,4 @@
-"""Left and right are found from joint names; if names do not say, the user has to."""
+"""What names and offsets of joints tell: sides (if they do not, the user has to), fingers, the spine."""
 
 from __future__ import annotations
 
@@ -9,6 +9,9 @@ import numpy as np
 import pytest
 
 from hobble.core.errors import InputError
+from hobble.core.skeleton import Skeleton
+from hobble.motion.body import pointing_fingers
+from hobble.motion.body_sample import Target, spine_shares
 from hobble.motion.names import side_of_pair
 
 FLIP = np.array([-1.0, 1.0, 1.0])
@@ -88,3 +91,60 @@ def test_lower_case_side_letters_are_recognised(original, tmp_path, make):
 )
 def test_a_pair_of_names_that_differ_in_one_letter_has_sides(name, other, side):
     assert side_of_pair(name, other) == side
+
+
+def hand(wrist: str, *fingers: tuple[str, float]) -> Skeleton:
+    """An elbow, a wrist 25 cm from it, and joints that are all children of the wrist."""
+    joints = ("Elbow", wrist, *(name for name, _ in fingers))
+    offsets = np.array([[0, 0, 0], [25, 0, 0], *([length, 0, 0] for _, length in fingers)], float)
+    return Skeleton("hand", joints, (-1, 0, *(1 for _ in fingers)), offsets)
+
+
+@pytest.mark.parametrize(
+    ("wrist", "fingers", "chosen"),
+    [
+        ("Hand", [("Thumb1", 9.0), ("Pinky1", 8.0), ("Index1", 7.0)], "Index1"),
+        ("Bip01 L Hand", [("Bip01 L Finger0", 9.0), ("Bip01 L Finger1", 7.0)], "Bip01 L Finger1"),
+        ("LeftHand", [("LeftFinger1Metacarpal", 8.0), ("LeftFinger2Proximal", 6.0)], "LeftFinger2Proximal"),
+        ("Bip01 L Hand", [("Bip01 L Finger0", 7.0)], "Bip01 L Finger0"),
+        ("L_Wrist", [("grip", 12.0), ("L_Hand", 7.0)], "L_Hand"),
+        ("kalo", [("mi", 6.0), ("ru", 8.0), ("sword", 90.0)], "ru"),
+        ("Hand", [("Thumb1", 9.0), ("Sword", 90.0)], None),
+    ],
+)
+def test_the_pointing_finger_is_chosen(wrist, fingers, chosen):
+    skeleton = hand(wrist, *fingers)
+    found = pointing_fingers(skeleton, {"left": 1})
+    assert ({"left": chosen} if chosen else {}) == {s: skeleton.joints[j] for s, j in found.items()}
+
+
+POINTS = np.array([[0.0, 0, 0], [0, 10, -2], [0, 20, -2], [0, 30, 0], [0, 40, 4]])
+SPINE = Target(np.array([0.0, 0.5, 1.0, 1.5, 2.0]), POINTS)
+
+
+def between(a: int, b: int) -> np.ndarray:
+    way = POINTS[b] - POINTS[a]
+    return way / np.linalg.norm(way)
+
+
+@pytest.mark.parametrize(
+    ("start", "end", "points"),
+    [
+        (0.0, 0.5, (0, 1)),
+        (0.5, 1.0, (1, 2)),
+        (1.0, 1.5, (2, 3)),
+        (1.5, 2.0, (3, 4)),
+        (0.0, 1.0, (0, 2)),  # no joint between hips and chest
+        (1.0, 2.0, (2, 4)),  # no neck
+        (0.4, 0.9, (1, 2)),  # the same number of joints at other heights
+        (0.0, 2.0, (0, 4)),  # hips that carry the arms
+        (0.85, 1.0, (1, 2)),  # a joint just below the chest is not the chest
+    ],
+)
+def test_a_bone_turns_as_the_target_bones_that_it_replaces(start, end, points):
+    assert SPINE.direction(start, end) == pytest.approx(between(*points))
+
+
+def test_spine_shares_are_1_at_the_chest_and_2_at_the_head():
+    assert spine_shares(np.array([10.0, 30.0, 5.0, 5.0]), 2) == pytest.approx([0, 0.25, 1, 1.5, 2])
+    assert spine_shares(np.array([6.0, 6.0]), 0) == pytest.approx([0, 1.5, 2])
