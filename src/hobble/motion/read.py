@@ -1,18 +1,19 @@
 """Reads BVH files from any program. Errors name the line.
 
 The reader accepts any order of rotations, any channels on any joint, tabs, CRLF, scientific notation, several
-end sites on a joint, joint names with spaces or prefixes, and braces anywhere.
+end sites on a joint, joint names with spaces or prefixes, and braces anywhere. `read_bvh` returns the numbers
+as they are written; `decode_channels` computes rotations and positions, in the file's own unit and axes.
 """
 
 from __future__ import annotations
 
 import hashlib
 import io
-import itertools
 import re
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import NoReturn
+from typing import Any
 
 import numpy as np
 
@@ -21,169 +22,24 @@ from hobble.core.errors import InputError
 from hobble.core.quat import Array
 from hobble.core.untrusted import read_bytes
 
-MOST_JOINTS = 4096  # the largest known rig has 191
-LONGEST_NAME = 200  # characters
-CHANNELS = tuple(f"{axis}{kind}" for kind in ("position", "rotation") for axis in "XYZ")
-EXPORT = "Export the clip again."  # advice in most errors
-
-
-@dataclass
-class Header:
-    """The joints of a file. `hobble.motion.read.Bvh` explains the fields."""
-
-    names: list[str] = field(default_factory=list)
-    parents: list[int] = field(default_factory=list)
-    offsets: list[tuple[float, float, float]] = field(default_factory=list)
-    channels: list[tuple[str, ...]] = field(default_factory=list)
-    end_sites: dict[str, list[tuple[float, float, float]]] = field(default_factory=dict)
-
-
-class _HeaderParser:
-    """Reads the header statement by statement. It needs no recursion, so that hierarchies may be deep.
-
-    line: number of the current line. open: stack of the joints whose braces are open, -1 for an end site.
-    pending: the joint (or -1 for an end site) that still needs its opening brace, or None. end_placed:
-    whether the last end site has its OFFSET. seen: name of each joint -> number of its line.
-    """
-
-    def __init__(self, path: Path) -> None:
-        self.path = path
-        self.line = 0
-        self.header = Header()
-        self.open: list[int] = []
-        self.pending: int | None = None
-        self.end_placed = True
-        self.seen: dict[str, int] = {}
-
-    def fail(self, problem: str) -> NoReturn:
-        """Raise InputError for the current line."""
-        raise InputError(self.path, problem, line=self.line, fix=EXPORT)
-
-    def read_statement(self, text: str) -> None:
-        """Read one statement: a keyword and what follows it, or a brace alone."""
-        word, _, rest = text.partition(" ")
-        handler = {
-            "HIERARCHY": self._read_first_line,
-            "ROOT": self._read_joint,
-            "JOINT": self._read_joint,
-            "END": self._read_end_site,
-            "{": self._read_opening_brace,
-            "}": self._read_closing_brace,
-            "OFFSET": self._read_offset,
-            "CHANNELS": self._read_channels,
-        }.get(word.upper())
-        if handler is None:
-            self.fail(f"{word[:40]!r} is not known here; expected is a joint, OFFSET, CHANNELS or a brace")
-        if self.pending is not None and word != "{":
-            self.fail("an opening brace is missing")
-        handler(rest.strip())
-
-    def _read_first_line(self, rest: str) -> None:
-        if rest:  # the root may follow HIERARCHY on the same line
-            self.read_statement(rest)
-
-    def _read_joint(self, name: str) -> None:
-        names = self.header.names
-        if not name:
-            self.fail("a joint without a name")
-        if len(name) > LONGEST_NAME:
-            self.fail(f"a joint's name has {len(name)} characters, more than {LONGEST_NAME}")
-        if name in self.seen:
-            self.fail(f"joint {name!r} occurs twice (first in line {self.seen[name]})")
-        if names and not self.open:
-            self.fail(f"a second root, {name!r}, although a file may have only one figure")
-        if len(names) >= MOST_JOINTS:
-            self.fail(f"more than {MOST_JOINTS} joints")
-        self.seen[name] = self.line
-        self.header.parents.append(self.open[-1] if self.open else -1)
-        self.pending = len(names)
-        names.append(name)
-        self.header.offsets.append((np.nan,) * 3)  # until its OFFSET is read
-        self.header.channels.append(())
-
-    def _read_end_site(self, rest: str) -> None:
-        if not self.open:
-            self.fail("an end site outside of any joint")
-        self.pending = -1
-        self.end_placed = False
-
-    def _read_opening_brace(self, rest: str) -> None:
-        if self.pending is None:
-            self.fail("an opening brace without a joint")
-        self.open.append(self.pending)
-        self.pending = None
-
-    def _read_closing_brace(self, rest: str) -> None:
-        if not self.open:
-            self.fail("a closing brace too many")
-        joint = self.open.pop()
-        if joint < 0 and not self.end_placed:
-            self.fail("an end site has no OFFSET")
-        if joint >= 0 and np.isnan(self.header.offsets[joint][0]):
-            self.fail(f"joint {self.header.names[joint]!r} has no OFFSET")
-
-    def _read_offset(self, rest: str) -> None:
-        if not self.open:
-            self.fail("OFFSET outside of any joint")
-        try:
-            x, y, z = (float(v) for v in rest.replace("_", "?").split())  # Python would accept 1_000
-        except ValueError:
-            self.fail(f"OFFSET needs three numbers, not {rest[:60]!r}")
-        if not np.all(np.isfinite((x, y, z))):
-            self.fail(f"OFFSET is not finite: {rest[:60]!r}")
-        joint = self.open[-1]
-        if joint >= 0:
-            self.header.offsets[joint] = (x, y, z)
-        else:
-            self.end_placed = True
-            name = self.header.names[self.open[-2]]
-            self.header.end_sites.setdefault(name, []).append((x, y, z))
-
-    def _read_channels(self, rest: str) -> None:
-        if not self.open or self.open[-1] < 0:
-            self.fail("CHANNELS outside of any joint")
-        # Only the beginnings of very long texts are read, because a damaged file may hold anything.
-        count, *words = rest.split()[:100] or [""]
-        if not count.isdecimal() or int(count[:9]) != len(words):
-            self.fail(f"CHANNELS declares {count[:12] or 'no number'} and names {len(words)}")
-        known = {name.lower(): name for name in CHANNELS}
-        for word in words:
-            if word.lower() not in known:
-                self.fail(f"unknown channel {word[:40]!r}; known are {', '.join(CHANNELS)}")
-        names = tuple(known[word.lower()] for word in words)
-        if len(set(names)) < len(names):
-            self.fail(f"a channel is named twice: {rest[:100]}")
-        self.header.channels[self.open[-1]] = names
-
-
-def read_header(path: Path, data: bytes) -> Header:
-    """The joints of a file. data: the bytes before MOTION. Raises InputError that names the line."""
-    try:
-        text = data.decode("utf-8")
-    except UnicodeDecodeError:
-        text = data.decode("latin-1")
-    parser = _HeaderParser(path)
-    for parser.line, raw in enumerate(text.split("\n"), 1):  # the loop sets `parser.line`
-        # A brace is a statement of its own, wherever it is in the line.
-        for part in raw.replace("{", "\n{\n").replace("}", "\n}\n").split("\n"):
-            words = " ".join(part.split())
-            if words:
-                parser.read_statement(words)
-    if parser.open or parser.pending is not None:
-        parser.fail("truncated: a joint is still open where MOTION begins")
-    if not parser.header.names:
-        parser.fail("no joints before MOTION")
-    return parser.header
-
-
 # Limits. One hour at 60 Hz on the largest known rig (191 joints) has 41 million joint poses (frames times
 # joints). Their rotations take 1.3 GB of memory.
 MOST_BYTES = 1 << 30
 MOST_HEADER = 1 << 24  # bytes before the word MOTION
+MOST_JOINTS = 4096
+LONGEST_NAME = 200  # characters
 MOST_LINES = 50_000_000  # lines after the word MOTION
 LONGEST_LINE = 1 << 22  # bytes; a frame of 4096 joints with six values of 25 characters has 614,400
 MOST_JOINT_POSES = 50_000_000  # frames times joints
+CHANNELS = tuple(f"{axis}{kind}" for kind in ("position", "rotation") for axis in "XYZ")
+EXPORT = "Export the clip again."  # advice in most errors
 CUT = "Cut the file into shorter clips."
+# Frames a second. Of two rates that fit a file equally well, the one that is listed first is taken.
+STANDARD_RATES = (120, 60, 30, 24, 25, 50, 100, 90, 48, 72, 144, 180, 200, 240, 250, 300, 15, 20, 12, 10)
+# If all angles of a file are below 2 pi and one of them changes by more than this, they are in radians: as
+# degrees they would be too small for a body that moves.
+RADIANS = 0.5
+BLOCK = 4096  # frames that are converted at a time, to keep intermediate arrays small
 
 
 @dataclass(frozen=True)
@@ -229,10 +85,29 @@ def read_bvh(path: str | Path) -> Bvh:
     path = Path(path)
     raw = read_bytes(path, MOST_BYTES)
     data = _clean_text(path, raw)
-    split = _find_motion(path, data)
-    header = read_header(path, data[:split])
-    bvh = _read_motion(path, data, split, header)
-    return replace(bvh, sha256=hashlib.sha256(raw).hexdigest(), bytes=len(raw))
+    at = _find_motion(path, data)
+    joints = _Joints(path, data[:at])
+    declared, _, frames_line, frames_end = _declaration(path, data, at, "Frames", int)
+    frame_time, time_text, time_line, time_end = _declaration(path, data, at, "Frame Time", float)
+    if not 1e-4 <= frame_time <= 10:
+        problem = f"Frame Time is {time_text[:40]} s; it must be .0001 to 10 s"
+        raise InputError(path, problem, line=time_line, fix=EXPORT)
+    at, width = max(frames_end, time_end), sum(map(len, joints.channels))
+    _check_size(path, declared, width, len(joints.names), len(data) - at, frames_line)
+    return Bvh(
+        path,
+        tuple(joints.names),
+        tuple(joints.parents),
+        np.array(joints.offsets, float),
+        tuple(joints.channels),
+        _read_values(path, data, at, width, declared, max(frames_line, time_line) + 1),
+        frame_time,
+        time_text,
+        joints.end_sites,
+        declared,
+        hashlib.sha256(raw).hexdigest(),
+        len(raw),
+    )
 
 
 def _clean_text(path: Path, data: bytes) -> bytes:
@@ -249,25 +124,15 @@ def _clean_text(path: Path, data: bytes) -> bytes:
     data = data.removeprefix(b"\xef\xbb\xbf")
     if b"\n" not in data:
         data = data.replace(b"\r", b"\n")  # line ends of old Macintosh files
-    if not data[:4096].lstrip()[:9].upper() == b"HIERARCHY":
-        raise InputError(
-            path,
-            "this is not a BVH file, because it does not begin with HIERARCHY",
-            line=1,
-            fix="Export the clip as BVH.",
-        )
+    if data[:4096].lstrip()[:9].upper() != b"HIERARCHY":
+        problem = "this is not a BVH file, because it does not begin with HIERARCHY"
+        raise InputError(path, problem, line=1, fix="Export the clip as BVH.")
     return data
 
 
-_MOTION = re.compile(rb"^[ \t\r}]*MOTION(?![^\s])", re.MULTILINE | re.IGNORECASE)
-
-
 def _find_motion(path: Path, data: bytes) -> int:
-    """The index in `data` of the first word MOTION that begins a line.
-
-    Blanks or closing braces may precede the word.
-    """
-    found = _MOTION.search(data)
+    """The index of the first word MOTION that begins a line, perhaps after blanks or closing braces."""
+    found = re.search(rb"^[ \t\r}]*MOTION(?![^\s])", data, re.MULTILINE | re.IGNORECASE)
     if not found:
         lines = data.count(b"\n") + 1
         raise InputError(path, "truncated: there is no MOTION section", line=lines, fix=EXPORT)
@@ -276,78 +141,172 @@ def _find_motion(path: Path, data: bytes) -> int:
     return found.end() - len(b"MOTION")
 
 
-def _read_motion(path: Path, data: bytes, at: int, header: Header) -> Bvh:
-    """The file with its table of values. at: index of the word MOTION in `data`."""
-    line = data.count(b"\n", 0, at) + 1
-    after = at + len(b"MOTION")
-    head = data[after : at + 4096].split(b"\n")
-    frames_text, frames_line, frames_end = _declaration(path, head, b"FRAMES:", line)
-    time_text, time_line, time_end = _declaration(path, head, b"FRAME TIME:", line)
-    body = after + max(frames_end, time_end)
-    width = sum(len(c) for c in header.channels)
+class _Joints:
+    """The joints of a file, read statement by statement: without recursion, so that hierarchies may be deep.
+
+    names, parents, offsets, channels, end_sites: as in `Bvh`. line: number of the current line. open: stack
+    of the joints whose braces are open, -1 for an end site. pending: the joint, or -1 for an end site, that
+    still needs its opening brace. end_placed: whether the last end site has its OFFSET. seen: name of each
+    joint -> number of its line.
+    """
+
+    def __init__(self, path: Path, data: bytes) -> None:
+        """data: the bytes before MOTION. Raises InputError that names the line."""
+        self.path, self.line = path, 0
+        self.names: list[str] = []
+        self.parents: list[int] = []
+        self.offsets: list[tuple[float, ...]] = []
+        self.channels: list[tuple[str, ...]] = []
+        self.end_sites: dict[str, list[tuple[float, float, float]]] = {}
+        self.open: list[int] = []
+        self.pending: list[int] = []  # none or one
+        self.end_placed = True
+        self.seen: dict[str, int] = {}
+        start = data.upper().index(b"HIERARCHY")  # the root may follow on the same line
+        data = data[:start] + data[start + len(b"HIERARCHY") :]
+        try:
+            text = data.decode("utf-8")
+        except UnicodeDecodeError:
+            text = data.decode("latin-1")
+        for self.line, raw in enumerate(text.split("\n"), 1):
+            # A brace is a statement of its own, wherever it is in the line.
+            for part in raw.replace("{", "\n{\n").replace("}", "\n}\n").split("\n"):
+                if words := " ".join(part.split()):
+                    self.read_statement(*words.partition(" ")[::2])
+        self.need(not self.open and not self.pending, "truncated: a joint is still open where MOTION begins")
+        self.need(bool(self.names), "no joints before MOTION")
+
+    def need(self, right: bool, problem: str) -> None:
+        """Raise InputError for the current line if something is not right."""
+        if not right:
+            raise InputError(self.path, problem, line=self.line, fix=EXPORT)
+
+    def read_statement(self, word: str, rest: str) -> None:
+        """Read a keyword and what follows it, or a brace alone."""
+        keyword = word.upper()
+        self.need(not self.pending or word == "{", "an opening brace is missing")
+        if keyword in ("ROOT", "JOINT"):
+            self.read_joint(rest)
+        elif keyword == "END":
+            self.need(bool(self.open), "an end site outside of any joint")
+            self.pending, self.end_placed = [-1], False
+        elif word == "{":
+            self.need(bool(self.pending), "an opening brace without a joint")
+            self.open.append(self.pending.pop())
+        elif word == "}":
+            self.close_brace()
+        elif keyword == "OFFSET":
+            self.read_offset(rest)
+        elif keyword == "CHANNELS":
+            self.read_channels(rest)
+        else:
+            expected = "expected is a joint, OFFSET, CHANNELS or a brace"
+            self.need(False, f"{word[:40]!r} is not known here; {expected}")
+
+    def read_joint(self, name: str) -> None:
+        """Begin a joint. Its OFFSET is NaN until it is read."""
+        self.need(bool(name), "a joint without a name")
+        too_long = f"a joint's name has {len(name)} characters, more than {LONGEST_NAME}"
+        self.need(len(name) <= LONGEST_NAME, too_long)
+        twice = f"joint {name!r} occurs twice (first in line {self.seen.get(name)})"
+        self.need(name not in self.seen, twice)
+        second_root = f"a second root, {name!r}, although a file may have only one figure"
+        self.need(bool(self.open) or not self.names, second_root)
+        self.need(len(self.names) < MOST_JOINTS, f"more than {MOST_JOINTS} joints")
+        self.seen[name] = self.line
+        self.pending = [len(self.names)]
+        self.names.append(name)
+        self.parents.append(self.open[-1] if self.open else -1)
+        self.offsets.append((np.nan,) * 3)
+        self.channels.append(())
+
+    def close_brace(self) -> None:
+        """End a joint or an end site, which must have its OFFSET."""
+        self.need(bool(self.open), "a closing brace too many")
+        joint = self.open.pop()
+        if joint < 0:
+            self.need(self.end_placed, "an end site has no OFFSET")
+        else:
+            placed = not np.isnan(self.offsets[joint][0])
+            self.need(placed, f"joint {self.names[joint]!r} has no OFFSET")
+
+    def read_offset(self, text: str) -> None:
+        """Read the OFFSET of a joint or of an end site."""
+        self.need(bool(self.open), "OFFSET outside of any joint")
+        words = text.split()
+        numbers = len(words) == 3 and all(map(_is_number, words))
+        self.need(numbers, f"OFFSET needs three numbers, not {text[:60]!r}")
+        x, y, z = map(float, words)
+        self.need(bool(np.isfinite((x, y, z)).all()), f"OFFSET is not finite: {text[:60]!r}")
+        if self.open[-1] >= 0:
+            self.offsets[self.open[-1]] = (x, y, z)
+        else:
+            self.end_placed = True
+            self.end_sites.setdefault(self.names[self.open[-2]], []).append((x, y, z))
+
+    def read_channels(self, text: str) -> None:
+        """Read the names of a joint's channels."""
+        self.need(bool(self.open) and self.open[-1] >= 0, "CHANNELS outside of any joint")
+        # Only the beginnings of very long texts are read, because a damaged file may hold anything.
+        count, *words = text.split()[:100] or [""]
+        counted = count.isdecimal() and int(count[:9]) == len(words)
+        self.need(counted, f"CHANNELS declares {count[:12] or 'no number'} and names {len(words)}")
+        names = tuple(word[:40].capitalize() for word in words)
+        for name, word in zip(names, words, strict=True):
+            known = f"unknown channel {word[:40]!r}; known are {', '.join(CHANNELS)}"
+            self.need(name in CHANNELS, known)
+        self.need(len(set(names)) == len(names), f"a channel is named twice: {text[:100]}")
+        self.channels[self.open[-1]] = names
+
+
+def _is_number(word: str | bytes) -> bool:
+    """Whether `float` reads a word. Python would also accept 1_000, which other programs do not write."""
     try:
-        declared = int(frames_text.replace("_", "?"))  # Python would accept 1_000
+        float(word)
     except ValueError:
-        problem = f"Frames: {frames_text[:40]!r} is not a whole number"
-        raise InputError(path, problem, line=frames_line, fix=EXPORT) from None
+        return False
+    return ("_" if isinstance(word, str) else b"_") not in word  # type: ignore[operator]
+
+
+def _declaration(
+    path: Path, data: bytes, at: int, key: str, number: Callable[[str], Any]
+) -> tuple[Any, str, int, int]:
+    """The value after a key, such as "Frame Time", in one of the lines after MOTION.
+
+    Returns the number, its text, its line, and the index of the next line. at: index of the word MOTION.
+    """
+    head, line = data[at : at + 4096], data.count(b"\n", 0, at) + 1
+    pattern = rf"^[^\S\n]*(?:MOTION\s+)?{key}:([^\n]*)".replace(" ", r"[^\S\n]+")
+    found = re.search(pattern.encode(), head, re.IGNORECASE | re.MULTILINE)
+    if not found:
+        raise InputError(path, f"truncated: no {key!r} after MOTION", line=line + 1, fix=EXPORT)
+    line += head.count(b"\n", 0, found.start(1))
+    text = found[1].strip().decode("latin-1")
     try:
-        frame_time = float(time_text.replace("_", "?"))
+        return number(text.replace("_", "?")), text, line, at + found.end() + 1
     except ValueError:
-        problem = f"Frame Time: {time_text[:40]!r} is not a number"
-        raise InputError(path, problem, line=time_line, fix=EXPORT) from None
-    if not 1e-4 <= frame_time <= 10:
-        problem = f"Frame Time is {time_text[:40]} s; it must be .0001 to 10 s"
-        raise InputError(path, problem, line=time_line, fix=EXPORT)
+        what = "a whole number" if number is int else "a number"
+        raise InputError(path, f"{key}: {text[:40]!r} is not {what}", line=line, fix=EXPORT) from None
+
+
+def _check_size(path: Path, declared: int, width: int, joints: int, left: int, line: int) -> None:
+    """Raise InputError if a file declares too many frames, or none.
+
+    declared: frames. width: values in a frame. left: bytes after the declarations. line: of the declaration.
+    """
+    problem, fix = "", EXPORT
     if declared < 1:
-        raise InputError(path, f"declares {declared} frames, but needs one", line=frames_line, fix=EXPORT)
-    if not width:
+        problem = f"declares {declared} frames, but needs one"
+    elif not width:
         raise InputError(path, "no joint has a channel", fix=EXPORT)
     # Each value takes at least two bytes: a digit and a blank. One frame may be missing.
-    if (declared - 1) * width * 2 > len(data) - body + 2:
-        raise InputError(
-            path,
-            f"truncated: declares {declared} frames of {width} values, more than the file can hold",
-            line=frames_line,
-            fix=EXPORT,
-        )
-    if declared * len(header.names) > MOST_JOINT_POSES:
-        raise InputError(
-            path,
-            f"declares {declared} frames of {len(header.names)} joints: more than {MOST_JOINT_POSES} joint "
-            "poses (frames times joints)",
-            line=frames_line,
-            fix=CUT,
-        )
-    first_line = max(frames_line, time_line) + 1
-    values = _read_values(path, data, body, width, declared, first_line)
-    return Bvh(
-        path,
-        tuple(header.names),
-        tuple(header.parents),
-        np.array(header.offsets, float),
-        tuple(header.channels),
-        values,
-        frame_time,
-        time_text,
-        header.end_sites,
-        declared,
-    )
-
-
-def _declaration(path: Path, head: list[bytes], key: bytes, line: int) -> tuple[str, int, int]:
-    """Find the line of `head` that begins with `key`.
-
-    Returns the text after `key`, the number of the line in the file, and how many bytes `head` has up to the
-    end of this line. head: the lines after the word MOTION. line: number of the first of them in the file.
-    """
-    end = 0
-    for i, raw in enumerate(head[:8]):
-        end += len(raw) + 1
-        words = b" ".join(raw.split())
-        if words.upper().startswith(key):
-            return words[len(key) :].strip().decode("latin-1"), line + i, end
-    name = "Frames" if key == b"FRAMES:" else "Frame Time"
-    raise InputError(path, f"truncated: no {name!r} after MOTION", line=line + 1, fix=EXPORT)
+    elif (declared - 1) * width * 2 > left + 2:
+        problem = f"truncated: declares {declared} frames of {width} values, more than the file can hold"
+    elif declared * joints > MOST_JOINT_POSES:
+        most = f"more than {MOST_JOINT_POSES} joint poses (frames times joints)"
+        problem, fix = f"declares {declared} frames of {joints} joints: {most}", CUT
+    if problem:
+        raise InputError(path, problem, line=line, fix=fix)
 
 
 def _read_values(path: Path, data: bytes, at: int, width: int, declared: int, first_line: int) -> Array:
@@ -357,21 +316,22 @@ def _read_values(path: Path, data: bytes, at: int, width: int, declared: int, fi
     finds the error. declared: the number of frames that the file declares. first_line: number of the line
     that begins at `at`.
     """
-    text = io.BytesIO(data)  # shares the memory of `data`; a slice would be a copy
-    text.seek(at)
     if not re.compile(rb"\S").search(data, at):
         raise InputError(path, f"truncated: declares {declared} frames and has none", line=first_line)
     _check_lines(path, data, at, first_line)
+    text = io.BytesIO(data)  # shares the memory of `data`; a slice would be a copy
+    text.seek(at)
     try:
         table = np.loadtxt(text, dtype=float, comments=None, ndmin=2)
     except ValueError:
-        table = _read_or_explain(path, data[at:], width, first_line)
+        table = np.empty((0, 0))
     if table.shape[1] != width:
         table = _read_or_explain(path, data[at:], width, first_line)
     bad = ~np.isfinite(table).all(axis=1)
     if bad.any():
         frame = int(np.argmax(bad))
-        line = _line_of(data[at:], frame, first_line)
+        filled = np.flatnonzero(_words_in_lines(data[at:]))
+        line = first_line + int(filled[frame]) if len(filled) == len(table) else None
         raise InputError(path, "a value is NaN or infinite", line=line, frame=frame + 1, fix=EXPORT)
     if abs(len(table) - declared) > 1:
         declares = "truncated: declares" if len(table) < declared else "declares"
@@ -393,13 +353,18 @@ def _check_lines(path: Path, data: bytes, at: int, first_line: int) -> None:
         raise InputError(path, f"more than {MOST_LINES} lines after MOTION", fix=CUT)
 
 
+def _words_in_lines(body: bytes) -> Array:
+    """The number of words in each line of a text."""
+    return np.fromiter((len(raw.split()) for raw in io.BytesIO(body)), np.int32)
+
+
 def _read_or_explain(path: Path, body: bytes, width: int, first_line: int) -> Array:
     """The table (F, width) of a text in which each frame is split over several lines.
 
     Raises InputError with the line for any other text. body: the text of the table. first_line: the number of
     its first line in the file.
     """
-    counts = np.fromiter((len(raw.split()) for raw in io.BytesIO(body)), np.int32)  # values on each line
+    counts = _words_in_lines(body)
     filled, total = np.flatnonzero(counts), int(counts.sum(dtype=np.int64))
     # A line with `width` values or more shows that each line should hold one frame.
     if total % width or not total or not (counts[filled] < width).all():
@@ -412,42 +377,11 @@ def _read_or_explain(path: Path, body: bytes, width: int, first_line: int) -> Ar
     for i, raw in enumerate(io.BytesIO(body)):
         for word in raw.split():
             if not _is_number(word):
-                shown = word[:40].decode("latin-1")
                 comma = " (a decimal comma?)" if b"," in word else ""
-                problem = f"{shown!r} is not a number{comma}"
+                problem = f"{word[:40].decode('latin-1')!r} is not a number{comma}"
                 raise InputError(path, problem, line=first_line + i, fix=EXPORT)
     words = (float(word) for raw in io.BytesIO(body) for word in raw.split())
     return np.fromiter(words, float, total).reshape(-1, width)
-
-
-def _is_number(word: bytes) -> bool:
-    try:
-        float(word)
-    except ValueError:
-        return False
-    return b"_" not in word  # Python would accept 1_000
-
-
-def _line_of(body: bytes, frame: int, first_line: int) -> int | None:
-    """The number of the line with frame `frame` (from 0), if each line that is not blank holds one frame.
-
-    None if there are fewer such lines. body, first_line: as for `_read_or_explain`.
-    """
-    filled = (i for i, raw in enumerate(io.BytesIO(body)) if raw.strip())
-    index = next(itertools.islice(filled, frame, None), None)
-    return None if index is None else first_line + index
-
-
-# Converts a BVH file's channels to rotations and positions, in the file's own unit and axes.
-
-
-# Frames a second. Of two rates that fit a file equally well, the one that is listed first is taken.
-STANDARD_RATES = (120, 60, 30, 24, 25, 50, 100, 90, 48, 72, 144, 180, 200, 240, 250, 300, 15, 20, 12, 10)
-
-# If all angles of a file are below 2 pi and one of them changes by more than this, they are in radians: as
-# degrees they would be too small for a body that moves.
-RADIANS = 0.5
-BLOCK = 4096  # frames that are converted at a time, to keep intermediate arrays small
 
 
 @dataclass(frozen=True)
@@ -482,9 +416,8 @@ def frame_rate(frame_time: float, text: str) -> float:
     >>> round(frame_rate(0.0417083, "0.0417083"), 3)
     23.976
     """
-    mantissa = text.lower().split("e")[0]
-    if "e" not in text.lower() and "." in mantissa:
-        last_digit = 10.0 ** -len(mantissa.split(".")[1])  # one unit of the last decimal place
+    if "e" not in text.lower() and "." in text:
+        last_digit = 10.0 ** -len(text.split(".")[1])  # one unit of the last decimal place
         # Some programs cut digits off instead of rounding. They write .016 for 1/60, which is 4% less.
         rates = [rate for rate in STANDARD_RATES if abs(1 / rate - frame_time) < last_digit * 1.01]
         rates = [rate for rate in rates if abs(rate * frame_time - 1) < 0.045]
@@ -496,18 +429,19 @@ def frame_rate(frame_time: float, text: str) -> float:
 
 def check_angles(bvh: Bvh) -> None:
     """Raise InputError if the angles seem to be in radians, or if no joint has rotation channels."""
-    is_rotation = [name.endswith("rotation") for channels in bvh.channels for name in channels]
-    if not any(is_rotation):
+    angles = bvh.values[:, [kind == "rotation" for _, _, kind in _columns(bvh)]]
+    if not angles.shape[1]:
         fix = "Export the clip with rotations, as nearly all programs do."
         raise InputError(bvh.path, "no joint has rotations, only positions", fix=fix)
-    angles = bvh.values[:, is_rotation]
     most = float(np.abs(angles).max())
     if most <= 2 * np.pi and np.ptp(angles, axis=0).max() > RADIANS:
-        raise InputError(
-            bvh.path,
-            f"no angle is larger than {most:.2f}, so they seem to be in radians",
-            fix="Export the clip again with angles in degrees.",
-        )
+        problem = f"no angle is larger than {most:.2f}, so they seem to be in radians"
+        raise InputError(bvh.path, problem, fix="Export the clip again with angles in degrees.")
+
+
+def _columns(bvh: Bvh) -> list[tuple[int, int, str]]:
+    """For each column of `values`: its joint, its axis (0 to 2), and "rotation" or "position"."""
+    return [(j, "XYZ".index(name[0]), name[1:]) for j, names in enumerate(bvh.channels) for name in names]
 
 
 def decode_channels(bvh: Bvh, still: float) -> Decoded:
@@ -518,68 +452,58 @@ def decode_channels(bvh: Bvh, still: float) -> Decoded:
     added to the OFFSET instead. still: a joint whose position stays this close to its offset (in the file's
     unit) does not move relative to its parent.
     """
-    frames, joints = len(bvh), len(bvh.names)
-    rotations = np.broadcast_to(quat.IDENTITY, (frames, joints, 4)).copy()
-    starts = np.cumsum([0, *(len(c) for c in bvh.channels)])  # the first column of each joint's channels
-    # Joints with the same channels are converted together, which is faster.
-    groups: dict[tuple[str, ...], list[int]] = {}
-    for j, channels in enumerate(bvh.channels):
-        groups.setdefault(channels, []).append(j)
-    for channels, members in groups.items():
-        rotation_channels = [i for i, name in enumerate(channels) if name.endswith("rotation")]
-        columns = starts[members][:, None] + np.array(rotation_channels, int)
-        order = "".join(channels[i][0] for i in rotation_channels)
-        for first in range(0, frames if rotation_channels else 0, BLOCK):
-            angles = np.radians(bvh.values[first : first + BLOCK, columns])
+    rotations = np.broadcast_to(quat.IDENTITY, (len(bvh), len(bvh.names), 4)).copy()
+    columns: list[list[int]] = [[] for _ in bvh.names]  # the rotation columns of each joint
+    for column, (j, _, kind) in enumerate(_columns(bvh)):
+        if kind == "rotation":
+            columns[j].append(column)
+    # Joints with the same order of rotations are converted together, which is faster.
+    groups: dict[str, list[int]] = {}
+    for j, names in enumerate(bvh.channels):
+        groups.setdefault("".join(name[0] for name in names if "rot" in name), []).append(j)
+    for order, members in groups.items():
+        own = np.array([columns[j] for j in members], int)
+        for first in range(0, len(bvh) if order else 0, BLOCK):
+            angles = np.radians(bvh.values[first : first + BLOCK, own])
             rotations[first : first + BLOCK, members] = quat.from_euler(angles, order)
-    root, offsets, translations, repairs = _decode_positions(bvh, starts, still)
-    notes = _notes_on_wraps(bvh, starts)
-    return Decoded(quat.continuous(rotations), root, offsets, translations, repairs, notes)
+    return Decoded(quat.continuous(rotations), *_decode_positions(bvh, still), _notes_on_wraps(bvh))
 
 
-def _notes_on_wraps(bvh: Bvh, starts: Array) -> list[str]:
+def _notes_on_wraps(bvh: Bvh) -> list[str]:
     """A sentence on angles that jump by more than half a turn, as they do when they wrap at 360 degrees.
 
-    starts: the first column of each joint's channels. The list is empty if no angle jumps.
+    The list is empty if no angle jumps.
     """
-    channels = enumerate(bvh.channels)
-    rotation_columns = [
-        starts[j] + i for j, names in channels for i, name in enumerate(names) if "rot" in name
-    ]
-    jumps = np.abs(np.diff(bvh.values[:, rotation_columns], axis=0)) > 180.0
+    joints = [j for j, _, kind in _columns(bvh) if kind == "rotation"]
+    angles = bvh.values[:, [kind == "rotation" for _, _, kind in _columns(bvh)]]
+    jumps = np.abs(np.diff(angles, axis=0)) > 180.0
     if not jumps.any():
         return []
     frame, column = (int(x) for x in np.argwhere(jumps)[0])
-    joint = bvh.names[int(np.searchsorted(starts, rotation_columns[column], side="right")) - 1]
     times = int(jumps.any(axis=1).sum())
     return [
-        f"Angles jump by up to a whole turn from one frame to the next, {times} times (first {joint} between "
-        f"frames {frame + 1} and {frame + 2}). The rotations themselves are smooth."
+        f"Angles jump by up to a whole turn from one frame to the next, {times} times (first "
+        f"{bvh.names[joints[column]]} between frames {frame + 1} and {frame + 2}). The rotations themselves "
+        "are smooth."
     ]
 
 
-def _decode_positions(bvh: Bvh, starts: Array, still: float) -> tuple[Array, Array, Array | None, list[str]]:
-    """The fields `root`, `offsets`, `translations` and `repairs` of `Decoded`.
-
-    starts: the first column of each joint's channels. still: as in `decode_channels`.
-    """
+def _decode_positions(bvh: Bvh, still: float) -> tuple[Array, Array, Array | None, list[str]]:
+    """The fields `root`, `offsets`, `translations`, `repairs` of `Decoded`. still: see `decode_channels`."""
     root = np.broadcast_to(bvh.offsets[0], (len(bvh), 3)).copy()
     below_root = []
-    for j, channels in enumerate(bvh.channels):
-        columns = {name[0]: starts[j] + i for i, name in enumerate(channels) if name.endswith("position")}
-        if j == 0:
-            for axis, column in columns.items():
-                root[:, "XYZ".index(axis)] = bvh.values[:, column]
-        elif columns:
-            below_root.append((j, columns))
+    for column, (j, axis, kind) in enumerate(_columns(bvh)):
+        if kind == "position" and j == 0:
+            root[:, axis] = bvh.values[:, column]
+        elif kind == "position":
+            below_root.append((j, axis, column))
     if not below_root:
         return root, bvh.offsets, None, []
     local = np.broadcast_to(bvh.offsets, (len(bvh), *bvh.offsets.shape)).copy()
     has_channel = np.zeros(bvh.offsets.shape, bool)
-    for j, columns in below_root:
-        for axis, column in columns.items():
-            local[:, j, "XYZ".index(axis)] = bvh.values[:, column]
-            has_channel[j, "XYZ".index(axis)] = True
+    for j, axis, column in below_root:
+        local[:, j, axis] = bvh.values[:, column]
+        has_channel[j, axis] = True
     return root, *_judge_channels(bvh, local, has_channel, still)
 
 
@@ -615,18 +539,13 @@ def _judge_channels(
             f"The OFFSET of {_list_names(bvh, wrong)} contradicts its position channels, which never change. "
             "The values of the channels were used."
         )
+    have = f"{len(joints)} joints below the root"
     if moving:
         others = "" if len(moving) == len(joints) else ", those of the others do not"
-        repairs.append(
-            f"{len(joints)} joints below the root have position channels. "
-            f"Those of {_list_names(bvh, moving)} change{others}."
-        )
-    else:
-        repairs.append(
-            f"The position channels of {len(joints)} joints below the root only repeat their offsets and "
-            "were dropped."
-        )
-    return offsets, (local if moving else None), repairs
+        change = f"Those of {_list_names(bvh, moving)} change{others}."
+        return offsets, local, [*repairs, f"{have} have position channels. {change}"]
+    same = f"The position channels of {have} only repeat their offsets and were dropped."
+    return offsets, None, [*repairs, same]
 
 
 def _joints_to_add(offsets: Array, median: Array, has_channel: Array, still: float) -> list[int]:
