@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 
@@ -47,6 +47,15 @@ class Clip:
     def positions(self) -> Array:
         """(F, J, 3) world positions in centimetres."""
         return self._world[1]
+
+    def at_roles(self) -> dict[str, Array]:
+        """Role, such as "left_knee" -> (F, 3) world positions of its joint."""
+        return {role: self.positions[:, self.skeleton.role(role)] for role in self.skeleton.roles}
+
+    def part(self, frames: slice | Array) -> Clip:
+        """The clip with only some of its frames. frames: a slice or indices."""
+        moved = None if self.translations is None else self.translations[frames]
+        return replace(self, rotations=self.rotations[frames], root=self.root[frames], translations=moved)
 
 
 def save_clip(path: str | Path, clip: Clip) -> None:

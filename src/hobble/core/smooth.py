@@ -61,6 +61,11 @@ def _windows(values: Array, width: int) -> Array:
     return np.lib.stride_tricks.sliding_window_view(np.pad(values, padding, mode="edge"), width, axis=0)
 
 
+def smoothstep(x: Array) -> Array:
+    """Numbers from 0 to 1, changed so that they start and end gradually."""
+    return x * x * (3 - 2 * x)
+
+
 # The value of a curve between its frames.
 
 
