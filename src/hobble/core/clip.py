@@ -52,7 +52,7 @@ class Clip:
         """Role, such as "left_knee" -> (F, 3) world positions of its joint."""
         return {role: self.positions[:, self.skeleton.role(role)] for role in self.skeleton.roles}
 
-    def part(self, frames: slice | Array) -> Clip:
+    def part(self, frames: slice | np.ndarray) -> Clip:
         """The clip with only some of its frames. frames: a slice or indices."""
         moved = None if self.translations is None else self.translations[frames]
         return replace(self, rotations=self.rotations[frames], root=self.root[frames], translations=moved)
