@@ -11,14 +11,12 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from hobble.channels.injury.crowd_severities import injury_links
-from hobble.channels.injury.limp.captured_limps import CapturedWalk
-from hobble.channels.injury.limp.run import compare_held_out
 from hobble.channels.injury.status import read_status
 from hobble.core.errors import InputError
 from hobble.gait.__main__ import read_clip
 from hobble.gait.cycles import measure_cycles
 from hobble.gait.profile import NO_CYCLE
+from hobble.measures.limp_run import INJURY, CapturedWalk, compare_held_out
 from hobble.models.load import load_network
 from hobble.models.network import Network
 from hobble.runtime.options import Runtime
@@ -26,13 +24,13 @@ from hobble.runtime.options import Runtime
 
 def captured_limp(path: Path, network: Network) -> CapturedWalk:
     clip = read_clip(path)
-    spells = read_status(path.with_name(f"{path.stem}_injuries.txt"), injury_links(network)).spells
+    spells = read_status(path.with_name(f"{path.stem}_injuries.txt"), network.channels[INJURY]).spells
     if len({spell.links for spell in spells}) != 1:
         raise InputError(path, "its severities change, so no single limp can be compared")
     walk = measure_cycles(clip.skeleton, clip.positions, clip.fps)
     if not len(walk):
         raise InputError(path, NO_CYCLE)
-    return CapturedWalk(path.stem, dict(spells[0].links), walk, 0.0)
+    return CapturedWalk(path.stem, dict(spells[0].links), walk)
 
 
 def main() -> None:

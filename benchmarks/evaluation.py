@@ -15,10 +15,9 @@ from time import process_time
 import numpy as np
 from runtime import SKELETON, load_skeleton, random_network
 
-from hobble.channels.injury.crowd_severities import severity_inputs
 from hobble.core.processors import processor_name
 from hobble.measures.rollouts_run import RollOutCrowd, RollOutInputs
-from hobble.measures.walks import CrowdTarget, generate_walks
+from hobble.measures.walks import CrowdTarget, channel_values, generate_walks
 from hobble.models.load import load_network
 from hobble.models.network import Network
 from hobble.models.pfnn.predictor import PfnnPredictor
@@ -39,7 +38,7 @@ def seconds(work: Callable[[], object]) -> float:
 def sweep(network: Network) -> tuple[float, float]:
     """CPU microseconds for a frame of one figure: a figure for each link at once, and one after another."""
     links = network.channels.get("injury") or ("",) * 30
-    hurt = severity_inputs(network, [{link: 5.0} if link else {} for link in links])
+    hurt = channel_values(network, "injury", [{link: 5.0} if link else {} for link in links])
 
     def walk(which: slice) -> None:
         channels = {name: rows[which] for name, rows in hurt.items()}

@@ -17,7 +17,6 @@ import numpy as np
 import yaml
 from derive_gait import REFERENCE, healthy_windows
 
-from hobble.channels.injury.limp.run import limp_distance
 from hobble.channels.injury.status import parse_links
 from hobble.core.clip import Clip
 from hobble.core.errors import HobbleError
@@ -50,6 +49,7 @@ from hobble.hurt.hurt_clip import hurt_clip
 from hobble.labels.clip_labels import Labels
 from hobble.labels.label import label_clip
 from hobble.labels.options import LabelOptions
+from hobble.measures.limp_run import limp_distance
 from hobble.motion.make import make_clip
 from hobble.motion.options import ClipMotion
 

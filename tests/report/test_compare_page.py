@@ -11,11 +11,11 @@ from typing import Any
 import pytest
 import yaml
 
-from hobble.channels.injury.response.comparison_page import injury_table
 from hobble.core.skeleton import Skeleton
 from hobble.measures import accuracy as of_accuracy
 from hobble.measures import responsivity as of_responsivity
 from hobble.measures.compare import ConfigurationResults, compare_configurations
+from hobble.measures.injury import injury_table
 from hobble.measures.measure import all_measures
 from hobble.models.load import load_network
 from hobble.report import compare_page

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import pytest
 
-from hobble.channels.injury.recognition.page import recognition_chart
-from hobble.channels.injury.response import page as injury_page
-from hobble.channels.injury.response import page_cases
+from hobble.measures import injury as injury_page
 from hobble.measures import responsivity as lap_charts
 from hobble.measures import responsivity as responsivity_page
 from hobble.measures.accuracy import caveat
+from hobble.measures.recognition import recognition_chart
 from hobble.report.gather import ReportMaterial
 from hobble.report.parts import ChartGroup, ChartPair, KeyFigure
 
@@ -99,12 +98,12 @@ def test_every_pair_of_injuries_is_drawn_as_it_is_measured() -> None:
         {"first": "a-b", "second": "c-d", "from_first_cm": 2.0, "share": 0.5, "from_second_cm": 1.0},
         {"first": "c-d", "second": "a-b", "from_first_cm": 0.0, "share": None, "from_second_cm": 0.0},
     ]
-    chart = page_cases.second_chart(rows)
+    chart = injury_page.second_chart(rows)
     assert chart is not None
     far, share = (traces[0] for traces in chart.options.values())
     assert (far["y"], far["x"], far["z"]) == (["a-b", "c-d"], ["c-d", "a-b"], [[2.0, None], [None, 0.0]])
     assert share["z"] == [[0.5, None], [None, None]]
-    assert page_cases.second_chart([]) is None
+    assert injury_page.second_chart([]) is None
 
 
 def test_runs_are_drawn_over_the_track_in_red_where_they_left_it() -> None:

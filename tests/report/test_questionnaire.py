@@ -12,12 +12,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from hobble.channels.injury.study import films
-from hobble.channels.injury.study.answers import read_answers, read_study
-from hobble.channels.injury.study.films import FILMS, PARTS, part_links
-from hobble.channels.injury.study.questionnaire import list_doubts, write_questionnaire
 from hobble.core.errors import HobbleError
 from hobble.core.skeleton import Skeleton
+from hobble.measures import films
+from hobble.measures.films import FILMS, PARTS, list_doubts, part_links, write_questionnaire
+from hobble.measures.study import read_answers, read_study
 from hobble.models.load import load_network
 from hobble.models.network import Network
 

@@ -1,6 +1,6 @@
 """Creates results/<configuration>/limp.webp: a loop of the healthy and the hurt walk side by side."""
 
-from hobble.channels.injury.limp_picture import write_limp_picture
+from hobble.measures.films import write_limp_picture
 from hobble.models.load import load_network
 from hobble.runtime.options import Runtime
 from hobble.workflow.job import job

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from hobble.channels.injury.study.questionnaire import list_doubts, write_questionnaire
+from hobble.measures.films import list_doubts, write_questionnaire
 from hobble.models.load import load_network
 from hobble.runtime.options import Runtime
 from hobble.workflow.job import job

@@ -6,11 +6,11 @@ import argparse
 import sys
 from collections.abc import Callable, Sequence
 
-from hobble.channels.commands import channel_commands
-from hobble.cli import labels, motion, play
+from hobble.cli import injury, labels, motion, play
 from hobble.core.errors import HobbleError
+from hobble.measures import study
 
-COMMANDS = {"motion": motion, "labels": labels, **channel_commands(), "play": play}
+COMMANDS = {"motion": motion, "labels": labels, "injury": injury, "study": study, "play": play}
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

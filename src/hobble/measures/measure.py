@@ -24,7 +24,6 @@ from __future__ import annotations
 
 import functools
 import importlib
-import importlib.util
 import pkgutil
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -35,7 +34,6 @@ from typing import Any, Literal, Protocol
 import yaml
 from pydantic import Field, create_model
 
-from hobble import channels
 from hobble.core.errors import HobbleError
 from hobble.core.files import Json, read_json
 from hobble.core.section import Section
@@ -48,17 +46,6 @@ Row = Mapping[str, object]  # a row of a CSV table: column -> number, text or No
 # results. A measurement may also read the JSON of another measurement. This input has the name of the other.
 INPUTS = ("weights", "clips", "summaries", "skeleton", "published")
 SPLITS = ("train", "held_out")
-# The functions of old packages of measurements -> the module of the package in which they are.
-OLD_PARTS = {
-    "section": "page",
-    "figures": "page",
-    "hints": "page",
-    "compared": "comparison",
-    "tables": "comparison",
-    "compared_section": "comparison_page",
-    "compared_columns": "comparison_page",
-    "compared_verdicts": "comparison_page",
-}
 
 
 class SampleOptions(Section):
@@ -134,22 +121,9 @@ class Measure:
     cost: Cost = Cost()
 
     @property
-    def is_package(self) -> bool:
-        """Whether it still has the old form, a package in a channel's folder."""
-        return self.module.startswith("hobble.channels.")
-
-    @property
     def run_module(self) -> str:
         """Full name of the module that measures."""
-        return f"{self.module}.run" if self.is_package else f"{self.module}_run"
-
-    @property
-    def shown_modules(self) -> list[str]:
-        """Full names of the modules that show it and compare it."""
-        if not self.is_package:
-            return [self.module]
-        parts = [f"{self.module}.{part}" for part in dict.fromkeys(OLD_PARTS.values())]
-        return [part for part in parts if importlib.util.find_spec(part) is not None]
+        return f"{self.module}_run"
 
     def runner(self) -> ModuleType:
         """The module with `run` and, if there are pieces, `run_piece`."""
@@ -157,11 +131,7 @@ class Measure:
 
     def function(self, name: str) -> Callable[..., Any] | None:
         """One of the optional functions (see the top of this file); None if it does not have it."""
-        if not self.is_package:
-            return getattr(importlib.import_module(self.module), name, None)
-        part = f"{self.module}.{OLD_PARTS[name]}"
-        found = importlib.import_module(part) if part in self.shown_modules else None
-        return getattr(found, name.removeprefix("compared_"), None)
+        return getattr(importlib.import_module(self.module), name, None)
 
 
 @functools.cache
@@ -173,12 +143,7 @@ def all_measures() -> tuple[Measure, ...]:
     package = __name__.rpartition(".")[0]
     here = {module.name for module in pkgutil.iter_modules(importlib.import_module(package).__path__)}
     names = sorted(name for name in here if f"{name}_run" in here)
-    found = [importlib.import_module(f"{package}.{name}").MEASURE for name in names]
-    for name in channels.CHANNEL_NAMES:
-        module = f"hobble.channels.{name}.measures"
-        if importlib.util.find_spec(module) is not None:
-            found += importlib.import_module(module).MEASURES
-    return tuple(found)
+    return tuple(importlib.import_module(f"{package}.{name}").MEASURE for name in names)
 
 
 def measure_named(name: str) -> Measure:

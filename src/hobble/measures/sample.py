@@ -18,6 +18,7 @@ mean over all rows of these clips. It does not say how much other clips would di
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -41,6 +42,8 @@ from hobble.rows.clip_rows import (
 
 LEAST_EXCERPTS = 2  # drawn from a stratum, because its variance needs two
 SPEED_RANGES = 3  # ranges of speed into which the excerpts of each gait are divided
+# A hurt version is a copy of a healthy clip that `hobble.hurt` made limp. Its name ends like this:
+HURT_VERSION = re.compile(r"_hurt[1-9](_mirror)?$")
 STANDARD_ERRORS = 1.96  # half the width of a 95 % confidence interval, in standard errors
 
 

@@ -43,7 +43,7 @@ class Measurements:
 
     def shown_modules(self) -> list[str]:
         """Full names of the modules that show and compare measurements."""
-        return [module for one in all_measures() for module in one.shown_modules]
+        return [one.module for one in all_measures()]
 
     def inputs(self, configuration: str, name: str) -> dict[str, str | list[str]]:
         """Name of each input of the measurement -> its file; `batches` -> the folders with rows of clips."""

@@ -11,9 +11,9 @@ from typing import Any
 
 import pytest
 
-from hobble.channels.injury.study.answer_tables import NUMERALS, answer_rows_by_numeral
-from hobble.channels.injury.study.answers import FilmAnswer, Study, read_answers, read_study
-from hobble.channels.injury.study.films import (
+from hobble.cli.__main__ import main
+from hobble.core.errors import InputError
+from hobble.measures.films import (
     CHANGE_OF_GAIT,
     FILMS,
     FPS,
@@ -22,8 +22,14 @@ from hobble.channels.injury.study.films import (
     SEVERAL_PARTS,
     hurts_and_gait,
 )
-from hobble.cli.__main__ import main
-from hobble.core.errors import InputError
+from hobble.measures.study import (
+    NUMERALS,
+    FilmAnswer,
+    Study,
+    answer_rows_by_numeral,
+    read_answers,
+    read_study,
+)
 
 
 @pytest.fixture
@@ -158,7 +164,7 @@ def test_the_command_writes_fourteen_tables(folder: Path, capsys: pytest.Capture
         (lambda d: d | {"answers": [d["answers"][0] | {"film": 14}]}, "there is no film 14"),
         (lambda d: d | {"answers": ["\x1b[31m"]}, r"answer 1 is no answer: \?\[31m"),
         (lambda d: d | {"answers": 3}, "has no list `answers`"),
-        (lambda d: [d], "is not an object of keys"),
+        (lambda d: [d], "answers another questionnaire"),
     ],
 )
 def test_a_malformed_file_of_answers_is_refused_with_its_place(

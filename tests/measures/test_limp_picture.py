@@ -5,8 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hobble.channels.injury import limp_picture
-from hobble.channels.injury.limp_picture import put_side_by_side
+from hobble.core.errors import HobbleError
+from hobble.measures import films
+from hobble.measures.films import put_side_by_side
+from hobble.runtime.options import Runtime
 
 
 def loop(length: int, shade: int) -> list[np.ndarray]:
@@ -30,7 +32,10 @@ def test_two_loops_of_different_length_end_together(healthy, hurt):
     assert steps.max() - steps.min() <= 1
 
 
-def test_a_picture_that_stays_too_large_is_refused(tmp_path, monkeypatch):
-    monkeypatch.setattr(limp_picture, "MOST_BYTES", 10)
-    with pytest.raises(limp_picture.HobbleError, match="at the lowest quality"):
-        limp_picture._save_webp(tmp_path / "x.webp", put_side_by_side(loop(3, 200), loop(3, 100)))
+def test_a_picture_that_stays_too_large_is_refused(tmp_path, hurtable, monkeypatch):
+    pictures = iter([loop(3, 200), loop(3, 100)])
+    monkeypatch.setattr(films, "MOST_BYTES", 10)
+    monkeypatch.setattr(films, "make_loop", lambda *_: None)
+    monkeypatch.setattr(films, "draw_frames", lambda *_: next(pictures))
+    with pytest.raises(HobbleError, match="at the lowest quality"):
+        films.write_limp_picture(hurtable, tmp_path / "x.webp", Runtime())

@@ -12,11 +12,28 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import spearmanr
 
-from hobble.channels.injury.crowd_severities import severity_inputs
-from hobble.channels.injury.response.cases import divided_severities, into_a_jog, second_injuries
-from hobble.channels.injury.response.run import GAITS, injury_response, largest_accelerations
-from hobble.channels.injury.response.sweep import SEVERITIES, sweeps
-from hobble.measures.walks import SPEEDS, CrowdTarget, generate_walks, mean_cycle, settling_seconds, spearman
+from hobble.measures.injury_run import (
+    GAITS,
+    SEVERITIES,
+    STEPS,
+    divided_severities,
+    injury_response,
+    into_a_jog,
+    largest_accelerations,
+    respond,
+    second_injuries,
+    sweep_rows,
+    walk_crowd,
+)
+from hobble.measures.walks import (
+    SPEEDS,
+    CrowdTarget,
+    channel_values,
+    generate_walks,
+    mean_cycle,
+    settling_seconds,
+    spearman,
+)
 from hobble.rows.captured import Captured
 from hobble.runtime.options import Runtime
 
@@ -50,15 +67,6 @@ def slowing(hurtable, links: tuple[str, ...] = (KNEE,)):
 def response(network, **options: Any) -> dict[str, Any]:
     options = {"configuration": "x", "runtime": RUNTIME, "seconds": 4.0, "links": [KNEE]} | options
     return injury_response(network, **options)
-
-
-def test_a_network_without_the_injury_channel_has_no_response(network) -> None:
-    result = response(network)
-    assert result == {
-        "configuration": "x",
-        "applies": False,
-        "reason": "this network has no severity inputs",
-    }
 
 
 def test_the_response_of_a_network_with_a_known_slowdown_is_exact(hurtable) -> None:
@@ -161,13 +169,13 @@ def test_each_gait_is_compared_with_the_healthy_figure_of_the_same_gait(hurtable
 
 def test_falling_severity_is_measured_on_its_own(hurtable) -> None:
     """The rows of rising and falling severity differ."""
-    (sweep,) = sweeps(hurtable, [KNEE], ["walk"], 0.2, RUNTIME)
-    rows = sweep.rows(0)
+    stretches = [(1, [{}]), *((1, [{KNEE: severity}]) for severity in STEPS)]
+    rows = sweep_rows(walk_crowd(hurtable, ["walk"], stretches, 0.2, RUNTIME), 0, "walk", KNEE)
     rng = np.random.default_rng(2)
     for row in rows:
         row["speed"], row["from_rising"] = float(rng.integers(9)), 0.0
     rows[15]["from_rising"] = 4.0
-    found = sweep.response(0, rows)
+    found = respond(rows, 1.0, {})
     up, back = ([row["speed"] for row in some] for some in (rows[:11], rows[10:]))
     assert found["spearman"]["speed"] == pytest.approx(spearmanr(SEVERITIES, up).statistic, abs=1e-5)
     assert found["spearman_falling"]["speed"] == pytest.approx(
@@ -188,7 +196,7 @@ def test_a_divided_severity_has_the_effect_of_the_quotient(hurtable) -> None:
 
 def test_a_figure_of_a_crowd_walks_as_it_does_alone(hurtable) -> None:
     """A character walks in a crowd as it does alone."""
-    hurt = severity_inputs(hurtable, [{}, {KNEE: 4.0}, {KNEE: 10.0}])
+    hurt = channel_values(hurtable, "injury", [{}, {KNEE: 4.0}, {KNEE: 10.0}])
     together = generate_walks(hurtable, [CrowdTarget(30, ["walk", "jog", "walk"], hurt)], RUNTIME)
     for figure, gait in enumerate(("walk", "jog", "walk")):
         own = {name: each[figure : figure + 1] for name, each in hurt.items()}
@@ -199,7 +207,7 @@ def test_a_figure_of_a_crowd_walks_as_it_does_alone(hurtable) -> None:
 
 
 def test_whole_cycles_are_measured(hurtable) -> None:
-    unhurt = severity_inputs(hurtable, [{}])
+    unhurt = channel_values(hurtable, "injury", [{}])
     walks = generate_walks(hurtable, [CrowdTarget(n, ["walk"], unhurt) for n in (20, 400, 10)], RUNTIME)
     phase = np.zeros((430, 1))
     phase[:, 0] = np.mod(0.013 * np.arange(430), 1)
@@ -262,28 +270,6 @@ def test_a_mean_cycle_fills_phases_without_frames() -> None:
     assert cycle[12] == cycle[10] == 1
     assert cycle[23] == cycle[20] == 2
     assert cycle[1] == 0
-
-
-def test_gaits_measured_together_give_the_rows_of_each_alone(hurtable) -> None:
-    links = [KNEE, "Neck1-Head"]
-    together = list(sweeps(hurtable, links, GAITS, 0.2, RUNTIME))
-    assert [sweep.gait for sweep in together] == list(GAITS)
-    for sweep in together:
-        (alone,) = sweeps(hurtable, links, [sweep.gait], 0.2, RUNTIME)
-        for figure in range(len(links)):
-            rows = sweep.rows(figure)
-            assert rows == alone.rows(figure)
-            assert sweep.response(figure, rows) == alone.response(figure, rows)
-
-
-def test_no_figure_is_hurt_before_the_onset(hurtable) -> None:
-    links = [KNEE, "Neck1-Head", "LowerBack-Spine"]
-    (sweep,) = sweeps(hurtable, links, ["walk"], 0.5, RUNTIME)
-    for walks in (sweep.walks, sweep.at_once):
-        same = walks.local[: walks.starts[2]]
-        np.testing.assert_allclose(same, same[:, :1].repeat(3, axis=1), atol=1e-3)
-    worst = sweep.at_once.local[sweep.at_once.starts[3] - 1]
-    assert np.abs(worst - worst[:1]).max() > 1e-3
 
 
 @given(st.lists(st.one_of(st.none(), st.integers(-3, 3).map(float)), min_size=11, max_size=11))

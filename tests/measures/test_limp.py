@@ -10,18 +10,20 @@ import numpy as np
 import pytest
 
 from hobble.channels import channel
-from hobble.channels.injury.limp import page, with_other_channel
-from hobble.channels.injury.limp import run as module
-from hobble.channels.injury.limp.captured_limps import (
-    HURT_VERSION,
-    CapturedWalk,
-    HurtSeconds,
-    healthy_reference,
-)
-from hobble.channels.injury.limp.crowd_walks import FigureWalk
-from hobble.channels.injury.limp.run import SEVERITIES, hurt_side, limp_distance, measure_limps
 from hobble.gait.cycles import CURVES, SCALARS, SIGN_CHANGES, Cycle, WalkCycles
 from hobble.gait.profile import NORMAL, profile_of_walk, read_people
+from hobble.measures import limp_run as module
+from hobble.measures.limp import other_channel_table
+from hobble.measures.limp_run import (
+    SEVERITIES,
+    CapturedWalk,
+    FigureWalk,
+    healthy_reference,
+    hurt_side,
+    limp_distance,
+    measure_limps,
+)
+from hobble.measures.sample import HURT_VERSION
 from hobble.runtime.options import Runtime
 
 LEFT_KNEE, RIGHT_KNEE = "LeftUpLeg-LeftLeg", "RightUpLeg-RightLeg"
@@ -72,7 +74,7 @@ def measure(hurtable, holden31, monkeypatch):
     def run(
         effect, other_side: bool = False, every: tuple[CapturedWalk, ...] = (), splits=None
     ) -> dict[str, Any]:
-        def walk_figures(network, each, speeds, gait, seconds, runtime):
+        def walk_figures(network, each, speeds, gait, seconds, runtime, others=None):
             out = []
             for hurt in each:
                 amount = {hurt_side(holden31, link): effect(s) for link, s in hurt.items()}
@@ -89,7 +91,7 @@ def measure(hurtable, holden31, monkeypatch):
             "seconds": 8.0,
             "links": [LEFT_KNEE, RIGHT_KNEE],
         }
-        return measure_limps(hurtable, list(every), HurtSeconds(), splits or {}, **options)
+        return measure_limps(hurtable, list(every), {"captured": {}, "made": {}}, splits or {}, **options)
 
     return run
 
@@ -157,14 +159,11 @@ def test_a_limp_is_compared_with_the_healthy_walk_of_the_same_mood(
             out.append(replace(figure, profile=None) if "tired" in felt else figure)
         return out
 
-    def row(link: str, figure: FigureWalk, healthy: FigureWalk) -> dict[str, Any]:
-        return module._row_of_walk(network, "walk", link, 10.0, figure, healthy)
-
-    monkeypatch.setattr(with_other_channel, "walk_figures", walk_figures)
-    rows = with_other_channel.limps_together(network, [LEFT_KNEE, RIGHT_KNEE], 2.0, 8.0, Runtime(), row)
+    monkeypatch.setattr(module, "walk_figures", walk_figures)
+    rows = module.limps_together(network, [LEFT_KNEE, RIGHT_KNEE, "Neck1-Head"], 8.0, Runtime())
     assert [r["column"] for r in rows] == [m for m in moods if m != "tired" for _ in range(2)]
     assert {r["speed_share"] for r in rows} == {0.6}
-    found = {r["column"]: r for r in with_other_channel.named_together(rows)}
+    found = {r["column"]: r for r in module._recognition_by_column(rows)}
     assert {name: r["named"] for name, r in found.items()} == {
         "old": 0.0,
         "happy": 1.0,
@@ -172,13 +171,13 @@ def test_a_limp_is_compared_with_the_healthy_walk_of_the_same_mood(
         "angry": 1.0,
     }
     assert [r["wrong_side"] for r in found.values()] == [0.0] * 4
-    table = page.other_channel_table("x", list(found.values()))
+    table = other_channel_table("x", list(found.values()))
     assert [line[0] for line in table.rows] == list(found)
-    assert with_other_channel.limps_together(hurtable, [LEFT_KNEE], 2.0, 8.0, Runtime(), row) == []
+    assert module.limps_together(hurtable, [LEFT_KNEE], 8.0, Runtime()) == []
 
 
 def clip(name: str, hurt: dict[str, float], limp: dict[str, float]) -> CapturedWalk:
-    return CapturedWalk(name, hurt, walking(limp, 2.0).walk, 2.0)
+    return CapturedWalk(name, hurt, walking(limp, 2.0).walk)
 
 
 def test_a_held_out_limp_is_nearer_only_if_the_same_leg_is_hurt(measure) -> None:

@@ -1,5 +1,0 @@
-"""Subcommands of `hobble` for injuries."""
-
-from hobble.channels.injury.commands import injury, study
-
-COMMANDS = {"injury": injury, "study": study}

@@ -1,0 +1,347 @@
+"""The questionnaire: thirteen films of a character that begins to hurt, and an HTML page that asks where.
+
+In each film, a healthy character walks or jogs. Then one or more parts of its body begin to hurt. In some
+films the gait changes afterwards. People watch each film and say which parts hurt.
+
+Quentin Ferre (2019) showed thirteen films, each with the transition from healthy to hurt: four with one hurt
+part, five with several and four with a change of gait. We do not know which parts hurt in each of his films.
+In his injured clips, thigh, shank and forearm hurt, so these parts hurt in our films.
+
+The looping picture at the top of the README is drawn here, too: a healthy and a hurt character side by side.
+"""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import io
+import json
+from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image, ImageDraw, ImageFont
+
+from hobble.channels.injury.shown import PARTS_WITH_SLIDER, PARTS_WITHOUT_SLIDER, links_between
+from hobble.core.errors import HobbleError
+from hobble.core.files import atomic_path, write_json, write_text
+from hobble.core.quat import Array
+from hobble.core.skeleton import Skeleton
+from hobble.core.smooth import gaussian
+from hobble.figure.mesh import body_mesh
+from hobble.figure.pack import links_of_bones
+from hobble.models.network import Network
+from hobble.report.parts import embedded
+from hobble.report.raster import BodyRenderer, Camera
+from hobble.report.stimuli import FRAME_STEP, VISIBLE, draw_frames, make_loop
+from hobble.report.templates import load_template, page_style, questionnaire_script
+from hobble.runtime.animation import ProceduralAnimation
+from hobble.runtime.export import restore_bone_lengths
+from hobble.runtime.options import Runtime
+
+INJURY = "injury"  # the channel
+FPS = 60  # frames a second of the motion; every FRAME_STEP-th frame is shown
+SEVERITY = 10.0  # the highest severity, as in the films of Quentin Ferre (2019)
+SPEEDS = {"walk": 2.5, "jog": 6.0}  # gait -> target speed, cm a frame
+WARM_UP_SECONDS = 4.0  # of walking before a film begins
+HEALTHY_SECONDS, HURT_SECONDS = 3.0, 7.0  # of a film, before and after the injury begins
+# A film with a change of gait is this many seconds longer. The gait changes in the middle of the film.
+EXTRA_SECONDS_FOR_CHANGE = 5.0
+# The three kinds of films.
+ONE_PART, SEVERAL_PARTS, CHANGE_OF_GAIT = "one part", "several parts", "change of gait"
+# Parts that people can tick in the questionnaire. They include parts that hurt in no film, such as the neck.
+SIDED = ("thigh", "shank", "foot", "upper arm", "forearm")
+PARTS = (*(f"{side} {part}" for part in SIDED for side in ("left", "right")), "lower back", "neck")
+SIZE = 360  # default width and height of the films, and of each half of the looping picture, pixels
+QUALITY = 45  # of the WebP images, 0 to 100
+EFFORT = 2  # of the WebP encoder, 0 to 6; with 3 it needs twice the time, and files are only 6 % smaller
+CAMERA_SMOOTHING = 25.0  # frames: sigma of the Gaussian that smooths the camera's path
+LOOK_AT = 82.0  # cm: height of the point that the camera looks at
+DISTANCE = 400.0  # cm: from the camera to this point
+# Of the looping picture.
+HURT_PARTS = {"left thigh": 8.0, "left shank": 8.0}  # part of the hurt character's body -> severity
+CAPTIONS = ("healthy", "left knee hurts: 8 of 10")  # of the left and the right half
+MOST_BYTES = 1_000_000  # largest allowed size of the file
+QUALITIES = (80, 65, 50, 35, 20)  # of the WebP encoder; the first that gives at most MOST_BYTES is used
+Picture = NDArray[np.uint8]
+
+
+@dataclass(frozen=True)
+class Film:
+    """One film.
+
+    number: counted from 1; the tables of answers have this order. kind: ONE_PART, SEVERAL_PARTS or
+    CHANGE_OF_GAIT. parts: the parts that hurt. gaits: target gaits at the beginning and at the end.
+    """
+
+    number: int
+    kind: str
+    parts: tuple[str, ...]
+    gaits: tuple[str, str] = ("walk", "walk")
+
+    @property
+    def seconds(self) -> float:
+        """Length of the film, in seconds."""
+        extra = EXTRA_SECONDS_FOR_CHANGE if self.gaits[0] != self.gaits[1] else 0.0
+        return HEALTHY_SECONDS + HURT_SECONDS + extra
+
+
+FILMS = (
+    Film(1, ONE_PART, ("left thigh",)),
+    Film(2, ONE_PART, ("right thigh",)),
+    Film(3, ONE_PART, ("left shank",)),
+    Film(4, ONE_PART, ("left forearm",)),
+    Film(5, SEVERAL_PARTS, ("left thigh", "left shank")),
+    Film(6, SEVERAL_PARTS, ("right thigh", "left shank")),
+    Film(7, SEVERAL_PARTS, ("left shank", "left forearm")),
+    Film(8, SEVERAL_PARTS, ("right thigh", "right forearm")),
+    Film(9, SEVERAL_PARTS, ("right thigh", "left shank", "left forearm")),
+    Film(10, CHANGE_OF_GAIT, ("left shank",), ("walk", "jog")),
+    Film(11, CHANGE_OF_GAIT, ("right thigh",), ("walk", "jog")),
+    Film(12, CHANGE_OF_GAIT, ("left forearm",), ("walk", "jog")),
+    Film(13, CHANGE_OF_GAIT, ("left shank", "left forearm"), ("jog", "walk")),
+)
+
+
+@dataclass(frozen=True)
+class FilmMotion:
+    """The motion of a film: F frames at 60 Hz of a character with J joints, in world coordinates.
+
+    positions: (F, J, 3) cm. rotations: (F, J, 4) quaternions. cm_from_healthy: distance between the joints
+    and the same joints of a character that stays healthy; the mean over all joints and over all frames after
+    the injury begins.
+    """
+
+    positions: Array
+    rotations: Array
+    cm_from_healthy: float
+
+
+def part_links(network: Network, parts: Sequence[str]) -> list[str]:
+    """For each part, the name of the link whose severity is set to make the part hurt.
+
+    A link is the piece of the body between two neighbouring joints. A part may have several links. The
+    uppermost link that was hurt in training is taken. If no link of the part was hurt in training, its
+    uppermost link is taken. Raises HobbleError if the network has no injury channel, or if the skeleton has
+    no such part.
+    """
+    links, trained = network.channels.get(INJURY, ()), network.trained_labels(INJURY)
+    if network.skeleton is None or not links:
+        raise HobbleError("this network has no injury channel. Use a configuration with `channels: [injury]`")
+    # Part -> roles of the joints at its two ends.
+    ends = {label: roles for label, *roles in (*PARTS_WITH_SLIDER, *PARTS_WITHOUT_SLIDER)}
+    chosen = []
+    for part in parts:
+        of_part = [link for link in links_between(network.skeleton, *ends[part]) if link in links]
+        if not of_part:
+            raise HobbleError(
+                f"the skeleton of this network has no {part} that can hurt, but a film needs it"
+            )
+        chosen.append(next((link for link in of_part if link in trained), of_part[0]))
+    return chosen
+
+
+def film_motion(network: Network, film: Film, runtime: Runtime) -> FilmMotion:
+    """Generate the motion of a film. The character goes straight ahead."""
+    severities = dict.fromkeys(part_links(network, film.parts), SEVERITY)
+    positions, rotations = _walk(network, film, severities, runtime)
+    healthy, _ = _walk(network, film, {}, runtime)
+    # Positions relative to the ground below the first joint, the root.
+    own, others = (p - p[:, :1] * [1.0, 0.0, 1.0] for p in (positions, healthy))
+    distances = np.linalg.norm(own - others, axis=-1)
+    return FilmMotion(positions, rotations, float(distances[round(HEALTHY_SECONDS * FPS) :].mean()))
+
+
+def hurts_and_gait(film: Film, frame: int) -> tuple[bool, str]:
+    """Whether the parts of a film hurt at a frame, and the target gait at this frame.
+
+    frame: 0 is the first frame of the film; frames of the warm-up are negative.
+    """
+    hurts = frame >= HEALTHY_SECONDS * FPS
+    changed = frame >= (HEALTHY_SECONDS + HURT_SECONDS) * FPS - EXTRA_SECONDS_FOR_CHANGE * FPS / 2
+    return hurts, film.gaits[1] if changed else film.gaits[0]
+
+
+def _walk(
+    network: Network, film: Film, severities: Mapping[str, float], runtime: Runtime
+) -> tuple[Array, Array]:
+    """Positions and rotations, as in `FilmMotion`, of a character that does what a film shows.
+
+    severities: link -> its severity after the injury has begun.
+    """
+    animation = ProceduralAnimation(network, **dict(runtime))
+    positions, rotations = [], []
+    for frame in range(-round(WARM_UP_SECONDS * FPS), round(film.seconds * FPS)):
+        hurts, gait = hurts_and_gait(film, frame)
+        injury = {INJURY: severities if hurts else {}}
+        pose = animation.next_pose(np.array([0.0, SPEEDS[gait]]), None, gait, **injury)
+        if frame >= 0:
+            positions.append(pose.positions)
+            rotations.append(pose.rotations)
+    return np.array(positions), np.array(rotations)
+
+
+def write_questionnaire(
+    network: Network,
+    folder: str | Path,
+    runtime: Runtime,
+    configuration: str,
+    films: Sequence[Film] = FILMS,
+    size: int = SIZE,
+    threads: int = 1,
+) -> dict[str, Any]:
+    """Write questionnaire.html (the page) and films.json (the right answers) into a folder.
+
+    Nothing on the page says what hurts in a film. configuration: its name, for films.json. size: width and
+    height of the films, pixels. threads: how many films are drawn at once; the files are the same for any
+    number. Returns the content of films.json. Raises HobbleError if the network has no injury channel, or if
+    the skeleton lacks a part that hurts in a film.
+    """
+    folder = Path(folder)
+    for film in films:
+        part_links(network, film.parts)  # raises an error before anything is drawn or written
+    assert network.skeleton is not None
+    folder.mkdir(parents=True, exist_ok=True)
+    renderer, skeleton = BodyRenderer(body_mesh(network.skeleton)), network.skeleton
+
+    def draw_film(film: Film) -> tuple[dict[str, Any], dict[str, Any]]:
+        """The film's entry in films.json, and its entry in the data of the page."""
+        motion = film_motion(network, film, runtime)
+        data = encode_webp(draw_pictures(renderer, skeleton, motion, size))
+        on_page = {"film": film.number, "webp": base64.b64encode(data).decode("ascii")}
+        return _solution_of(network, film, motion), on_page
+
+    with ThreadPoolExecutor(threads) as pool:
+        solutions, films_on_page = map(list, zip(*pool.map(draw_film, films), strict=True))
+    # Answers are saved with this id, which shows to which version of the films they belong.
+    study = hashlib.sha256(json.dumps([solutions, films_on_page]).encode()).hexdigest()[:12]
+    solution = {
+        "study": study,
+        "configuration": configuration,
+        "severity": SEVERITY,
+        "parts": PARTS,
+        "films": solutions,
+    }
+    page = load_template("questionnaire.html.j2").render(
+        style=page_style(),
+        script=questionnaire_script(),
+        embedded=embedded({"study": study, "parts": PARTS, "films": films_on_page, "size": size}),
+        count=len(films),
+    )
+    write_text(folder / "questionnaire.html", page)
+    write_json(folder / "films.json", solution)
+    return solution
+
+
+def _solution_of(network: Network, film: Film, motion: FilmMotion) -> dict[str, Any]:
+    """The entry of a film in films.json. untrained: links of the film never hurt in training."""
+    links = part_links(network, film.parts)
+    return {
+        "film": film.number,
+        "kind": film.kind,
+        "parts": list(film.parts),
+        "gaits": list(dict.fromkeys(film.gaits)),
+        "links": links,
+        "untrained": [link for link in links if link not in network.trained_labels(INJURY)],
+        "seconds": film.seconds,
+        "from_healthy_cm": round(motion.cm_from_healthy, 2),
+    }
+
+
+def list_doubts(solution: Mapping[str, Any]) -> list[str]:
+    """Warnings: films in which nobody can see the injury, and hurt links that were never hurt in training.
+
+    solution: the content of films.json.
+    """
+    same = [str(row["film"]) for row in solution["films"] if row["from_healthy_cm"] < VISIBLE]
+    never = sorted({link for row in solution["films"] for link in row["untrained"]})
+    out = [f"film {', '.join(same)}: nobody can see the injury (less than {VISIBLE} cm)."] if same else []
+    return out + ([f"Never hurt in training: {', '.join(never)}."] if never else [])
+
+
+def draw_pictures(renderer: BodyRenderer, skeleton: Skeleton, motion: FilmMotion, size: int) -> list[Picture]:
+    """The pictures of a film, each (size, size, 3). The camera follows the character smoothly.
+
+    The character has one colour, so that people have to judge by its motion what hurts.
+    """
+    bones = body_mesh(skeleton).bones  # indices of the joints that move the body's mesh
+    rotations, positions = restore_bone_lengths(skeleton, motion.positions, motion.rotations)
+    path = gaussian(motion.positions[:, 0], CAMERA_SMOOTHING)  # the points that the camera looks at
+    path[:, 1] = LOOK_AT
+    return [
+        renderer.draw(positions[f, bones], rotations[f, bones], Camera(path[f], distance=DISTANCE, size=size))
+        for f in range(0, len(positions), FRAME_STEP)
+    ]
+
+
+def encode_webp(pictures: Sequence[Picture]) -> bytes:
+    """The bytes of an animated WebP that plays the pictures once."""
+    out = io.BytesIO()
+    _save_webp(out, [Image.fromarray(picture) for picture in pictures], 1, QUALITY, EFFORT)
+    return out.getvalue()
+
+
+def _save_webp(file: Any, images: Sequence[Image.Image], loop: int, quality: int, method: int) -> None:
+    """Write an animated WebP. loop: how often it plays; 0: endlessly. method: effort of the encoder."""
+    duration = round(1000 * FRAME_STEP / FPS)  # milliseconds a picture
+    images[0].save(
+        file,
+        "WEBP",
+        save_all=True,
+        append_images=images[1:],
+        loop=loop,
+        quality=quality,
+        method=method,
+        duration=duration,
+    )
+
+
+def write_limp_picture(network: Network, path: str | Path, runtime: Runtime) -> int:
+    """Write the looping picture as a WebP of at most MOST_BYTES. Returns its size in bytes.
+
+    The healthy and the hurt character have the same target speed. Raises HobbleError if the network has no
+    injury channel, or if the picture is too large even at the lowest quality.
+    """
+    hurt = dict(zip(part_links(network, list(HURT_PARTS)), HURT_PARTS.values(), strict=True))
+    assert network.skeleton is not None
+    links = network.channels[INJURY]
+    renderer = BodyRenderer(body_mesh(network.skeleton), links_of_bones(network.skeleton, links))
+    halves = []
+    for injury in ({}, hurt):
+        # A link is drawn in a colour from 0 (healthy) to 1 (severity 10).
+        colours = np.array([injury.get(link, 0.0) for link in links]) / 10
+        loop = make_loop(network, {INJURY: injury}, runtime)
+        halves.append(draw_frames(renderer, network.skeleton, loop, colours, SIZE))
+    path, images = Path(path), put_side_by_side(*halves)
+    for quality in QUALITIES:
+        with atomic_path(path) as temporary:
+            _save_webp(temporary, images, 0, quality, 4)
+        if (size := path.stat().st_size) <= MOST_BYTES:
+            return size
+    raise HobbleError(
+        f"{path}: the picture has {size} bytes at the lowest quality. At most {MOST_BYTES} are allowed. "
+        "Make SIZE in films.py smaller"
+    )
+
+
+def put_side_by_side(healthy: Sequence[Picture], hurt: Sequence[Picture]) -> list[Image.Image]:
+    """One loop of pictures, each with a picture of `healthy` on the left and one of `hurt` on the right.
+
+    The loop is as long as `hurt`. While `hurt` plays once, `healthy` plays a whole number of times, faster or
+    slower if need be. So the loop repeats without a jump.
+    """
+    repeats = max(1, round(len(hurt) / len(healthy)))
+    out = []
+    for index, right in enumerate(hurt):
+        left = healthy[index * repeats * len(healthy) // len(hurt) % len(healthy)]
+        both = Image.fromarray(np.concatenate([left, right], axis=1)[..., :3])
+        draw, font = ImageDraw.Draw(both), ImageFont.load_default(size=18)
+        for half, text in enumerate(CAPTIONS):
+            middle = (half + 0.5) * both.width / 2
+            draw.text((middle, 18), text, fill=(90, 90, 90), font=font, anchor="mm")
+        out.append(both)
+    return out

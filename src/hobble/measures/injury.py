@@ -1,0 +1,583 @@
+"""How the gait changes as the severity of each link rises from 0 to 10 and falls again.
+
+A link is the piece of the body between two neighbouring joints. Its label in files is a pair of joints, such
+as "LeftUpLeg-LeftLeg". Readers of the page see a name such as "left thigh". `found` is the content of
+injury.json.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from pydantic import Field
+
+from hobble.channels.shown import shown_names
+from hobble.core.files import Json
+from hobble.core.section import PositiveFloat
+from hobble.measures.compare import ComparisonAddition, ConfigurationResults
+from hobble.measures.measure import Cost, Measure, SampleOptions
+from hobble.measures.recognition import NAMED_AXES, heatmap
+from hobble.report.parts import (
+    Chart,
+    ChartGroup,
+    ChartPair,
+    Column,
+    Compared,
+    Hint,
+    PageSection,
+    Paragraph,
+    SectionPart,
+    Table,
+    Trace,
+    axis,
+    format_number,
+    line_trace,
+    with_order,
+)
+from hobble.runtime.options import Runtime
+
+if TYPE_CHECKING:
+    from hobble.report.gather import ReportMaterial
+
+
+class Options(SampleOptions):
+    """The keys of this measurement in the section `evaluation`."""
+
+    # 3 s are enough. With 4 s, the mean effects on pose and speed differ by only 1 % (configuration `limp`).
+    seconds: PositiveFloat = Field(3.0, description="seconds that a figure walks at each severity")
+
+
+MEASURE = Measure(
+    name="injury",
+    module=__name__,
+    inputs=("weights", "clips", "summaries"),
+    options=Options,
+    runtime=tuple(Runtime.model_fields),
+    channel="injury",
+    cost=Cost(mb_per_1000_frames=14, seconds_per_1000_frames=0.2, least_minutes=60),
+)
+Rows = Sequence[Mapping[str, Any]]  # rows of injury.json
+LINK_KEYS = ("link", "first", "second")  # keys whose values are labels of links
+UNTRAINED = "never hurt in training"
+GAIT_COLOURS = {"walk": "@accent", "jog": "@g2"}
+COLOURS = ("@accent", "@g2", "@g3", "@g4", "@g5", "@g0")  # of the lines in a chart
+# The marker of links that were never hurt in training.
+HOLLOW = {"symbol": "circle-open", "size": 8, "line": {"width": 1.2}}
+SIDES = (("left", "@accent"), ("right", "@g2"))  # side of the body, colour
+# A small chart: its name, title and unit; its lines as (key of a row, label, colour); the least length of the
+# vertical axis; whether this axis starts at 0.
+Panel = tuple[str, str, str, Sequence[tuple[str, str, str]], float, bool]
+
+
+def _both_sides(key: str) -> list[tuple[str, str, str]]:
+    return [(f"{key}_{side}", side, colour) for side, colour in SIDES]
+
+
+POSE = [("from_healthy", "from healthy", "@accent"), ("from_worst", "from severity 10", "@muted")]
+LEAN = [("lean_forward", "forward", "@accent"), ("lean_left", "to the left", "@g2")]
+ROUGH = [("largest_acceleration", "joint", "@accent")]
+PANELS: tuple[Panel, ...] = (
+    ("pose", "Pose", "cm", POSE, 2.0, True),
+    ("speed", "Speed", "cm/s", [("speed", "speed", "@accent")], 20.0, True),
+    ("stance", "Time on each foot", "share", _both_sides("stance"), 0.2, False),
+    ("step", "Step length", "cm", _both_sides("step"), 15.0, False),
+    ("knee", "Range of the knee", "degrees", _both_sides("knee"), 15.0, False),
+    ("arm", "Swing of the arm", "degrees", _both_sides("arm"), 15.0, False),
+    ("lean", "Lean of the trunk", "degrees", LEAN, 6.0, False),
+    ("hip", "Height of the hips", "cm", [("hip_height", "hips", "@accent")], 5.0, False),
+    ("rough", "Largest acceleration of a joint", "cm per frame²", ROUGH, 2.0, True),
+)
+# Columns of the table of responses: label, and how the value is found in a response.
+RESPONSE_COLUMNS: Mapping[str, Callable[[Mapping[str, Any]], Any]] = {
+    "change of the pose, cm": lambda r: r.get("from_healthy_cm"),
+    "share of the healthy speed": lambda r: r.get("speed_share"),
+    "time to settle, s": lambda r: r.get("settle_seconds"),
+    "time to heal, s": lambda r: r.get("heal_seconds"),
+    "change left after healing, cm": lambda r: r.get("after_healing_cm"),
+    "difference between rising and falling severity, cm": lambda r: r.get("hysteresis_cm"),
+    "largest acceleration, divided by the healthy walk's": lambda r: r.get("acceleration_share"),
+    "ρ of pose": lambda r: (r.get("spearman") or {}).get("from_healthy"),
+    "ρ of speed": lambda r: (r.get("spearman") or {}).get("speed"),
+}
+INTRODUCTION = (
+    "The character walks or jogs while the severity of one link (the piece of the body between two "
+    "neighbouring joints) rises from 0 to 10 and falls again. Each value is a mean over the links that were "
+    "hurt in training, except the share that a classifier recognises. ρ is Spearman's rank correlation: "
+    "1 means that the measure always rises with severity, −1 that it always falls, 0 that it has no trend."
+)
+# Key of a summary -> label of its row in the comparison.
+ROW_LABELS = {
+    "from_healthy_cm": "distance from the healthy walk at severity 10, cm per joint",
+    "speed_share": "share of the healthy speed at severity 10",
+    "spearman_from_healthy": "ρ of pose and severity",
+    "spearman_speed": "ρ of speed and severity",
+    "spearman_falling_from_healthy": "ρ of pose and severity, while severity falls",
+    "settle_seconds": "time to settle, s",
+    "heal_seconds": "time to heal, s",
+    "after_healing_cm": "remaining distance after healing, cm per joint",
+    "hysteresis_cm": "difference between rising and falling severity, cm per joint",
+    "acceleration_share": "largest acceleration, divided by the healthy walk's",
+    "clip_acceleration_share": "largest acceleration, divided by the captured clips'",
+}
+
+
+def section(found: Json, material: ReportMaterial) -> PageSection:
+    """The charts and tables of the response to injury. Empty for a network without severities."""
+    parts = _parts(with_spoken_links(found, material), material.name) if found.get("applies") else []
+    return PageSection("injury", parts, title="Injury response", order=20)
+
+
+def hints(found: Json, material: ReportMaterial) -> Iterator[Hint]:
+    """Sentences about the response, for the top of the report."""
+    return with_order(50, injury_hints(with_spoken_links(found, material)))
+
+
+def compared(all_measured: Sequence[ConfigurationResults], published: Json) -> ComparisonAddition:
+    """Whether the character of each configuration can be hurt, and means over the links hurt in training."""
+    entries = []
+    for results in all_measured:
+        found = results.results_of("injury")
+        kept = {key: found[key] for key in ("applies", "reason", "summary") if key in found}
+        entries.append({"configuration": results.name, **kept})
+    return ComparisonAddition(entries=entries)
+
+
+def compared_section(compared: Compared) -> PageSection:
+    """A table of means. It is empty if no configuration has a character that can be hurt."""
+    table = injury_table(compared)
+    introduction = Paragraph(INTRODUCTION) if table else None
+    parts = [SectionPart(0, introduction), SectionPart(10, table, open=True, short=True)]
+    return PageSection("injury", parts, title="Injury response", order=20)
+
+
+def injury_table(compared: Compared) -> Table | None:
+    """A row for each measure, and a column for each gait of each configuration with injuries.
+
+    None if no configuration has injuries. compared: the content of compare.json.
+    """
+    # One item for each column of numbers: configuration, gait, and the summary from injury.json.
+    summaries = [
+        (entry["configuration"], gait, summary)
+        for entry in compared["injury"]
+        if entry.get("applies")
+        for gait, summary in (entry.get("summary") or {}).items()
+    ]
+    if not summaries:
+        return None
+    found = {key for *_, summary in summaries for key in summary}
+    keys = [*(key for key in ROW_LABELS if key in found), *sorted(found - set(ROW_LABELS))]
+    columns = [Column("measure"), *(Column.number(f"{name}, {gait}") for name, gait, _ in summaries)]
+    rows: list[list[Any]] = [
+        [ROW_LABELS.get(key, key.replace("_", " ")), *(summary.get(key) for *_, summary in summaries)]
+        for key in keys
+    ]
+    # The measurement `recognition` gives one share for each configuration. It is from walks, not from jogs.
+    recognised = {
+        e["configuration"]: e["generated"]["right"] for e in compared["recognition"] if e.get("applies")
+    }
+    if recognised:
+        shares = [recognised.get(name) if gait == "walk" else None for name, gait, _ in summaries]
+        rows.append(["share of walks of 1 s in which a classifier recognises what hurts", *shares])
+    return Table("compare-injury", columns, rows, "Means over the links that were hurt in training")
+
+
+def with_spoken_links(found: Json, material: ReportMaterial) -> dict[str, Any]:
+    """`found` with names such as "left thigh" in place of the labels of links.
+
+    found: the JSON of a measurement, such as injury.json.
+    """
+    shown_name = shown_names(material.network["skeleton"])
+
+    def renamed(value: Any, key: str = "") -> Any:
+        """`value` with its links renamed. key: the key under which it stands, "" for an item of a list."""
+        if isinstance(value, Mapping):
+            return {k: renamed(v, k) for k, v in value.items()}
+        if isinstance(value, list | tuple):
+            return [renamed(item) for item in value]
+        return shown_name(value) if key in LINK_KEYS and isinstance(value, str) else value
+
+    return {key: renamed(value) for key, value in found.items()}
+
+
+def _parts(found: Json, name: str) -> list[SectionPart]:
+    """The parts of the section. found: injury.json, with links renamed. name: of the configuration."""
+    rows, responses, second = (found.get(key) or [] for key in ("rows", "responses", "second"))
+    untrained = {r["link"] for r in responses if not _trained(r)}
+    divided, jogs = (
+        divided_chart(found.get("divided") or ()),
+        jog_chart(found.get("into_a_jog") or (), untrained),
+    )
+    words = {"from_worst": "from severity 10"}
+    return [
+        SectionPart(0, ChartPair(effect_charts(responses))),
+        SectionPart(10, response_table(name, responses)),
+        SectionPart(20, sweep_charts(rows, found.get("falling") or (), untrained) if rows else None),
+        SectionPart(40, second_chart(second)),
+        SectionPart(50, table_of_rows(f"{name}-second-injury", second, "Every walk with two injuries")),
+        SectionPart(60, ChartPair([divided, jogs])),
+        SectionPart(
+            70, table_of_rows(f"{name}-injury", rows, "Every walk and jog at rising severity", words)
+        ),
+    ]
+
+
+def _trained(response: Mapping[str, Any]) -> bool:
+    """Whether the link of a response was hurt in training."""
+    return response.get("trained", True)
+
+
+def table_of_rows(
+    key: str, rows: Rows, title: str, words: Mapping[str, str] | None = None, texts: Collection[str] = ()
+) -> Table | None:
+    """A table with all values of the rows. None if there are no rows.
+
+    words: key of a row -> heading of its column, if it is not the key itself. texts: keys of texts, which may
+    be missing in the first row.
+    """
+    if not rows:
+        return None
+    columns = []
+    for name, value in rows[0].items():
+        heading = (words or {}).get(name, name.replace("_", " "))
+        is_text = isinstance(value, str) or name in texts
+        columns.append(Column(heading) if is_text else Column.number(heading))
+    return Table(key, columns, [[row.get(name) for name in rows[0]] for row in rows], title)
+
+
+def sweep_charts(rows: Rows, falling: Rows = (), untrained: Collection[str] = ()) -> ChartGroup:
+    """A small chart of each measure over severity, for a chosen gait and link.
+
+    rows, falling: the rows of injury.json with rising and with falling severity. Lines of falling severity
+    are dotted. untrained: links that were never hurt in training. They come last in the menu, with a remark.
+    """
+
+    def by_option(of_links: Rows) -> dict[str, list[Mapping[str, Any]]]:
+        """Option of the menu -> its rows."""
+        out: dict[str, list[Mapping[str, Any]]] = {}
+        for row in of_links:
+            remark = f" ({UNTRAINED})" if row["link"] in untrained else ""
+            out.setdefault(f"{row['link']}, {row['gait']}{remark}", []).append(row)
+        return out
+
+    rising_rows = by_option(sorted(rows, key=lambda row: row["link"] in untrained))
+    charts = [_panel_chart(panel, rows, rising_rows, by_option(falling)) for panel in PANELS]
+    caption = (
+        "The character moves on while the severity of one link rises from 0 to 10 and falls again. Each "
+        "point is measured over whole gait cycles at one severity. A smooth curve means that the walk "
+        "changes gradually. A gap between left and right is a limp. A jump between neighbouring points means "
+        "that the network switches between two gaits. The first chart shows how far the pose is from the "
+        "healthy walk and from the walk at severity 10: the mean distance of the joints at the same phase."
+    )
+    if falling:
+        caption += " Dotted lines show falling severity."
+    if untrained:
+        caption += " Links that were never hurt in training show how much a healthy walk varies."
+    return ChartGroup("sweeps", "One link at rising severity", caption, charts, "Link and gait")
+
+
+def _panel_chart(
+    panel: Panel, rows: Rows, rising_rows: Mapping[str, Rows], falling_rows: Mapping[str, Rows]
+) -> Chart:
+    """The small chart of an entry of PANELS.
+
+    rows: the rows of all options of the menu, for the range of the axis. rising_rows, falling_rows: option of
+    the menu -> its rows of rising and of falling severity.
+    """
+    name, title, unit, lines, least_range, from_zero = panel
+    options: dict[str, list[Trace]] = {}
+    for option, rising in rising_rows.items():
+        options[option] = [
+            _line(label, rising, key, colour, mode="lines+markers") | {"marker": {"size": 5}}
+            for key, label, colour in lines
+        ] + [
+            _line(f"{label}, healing", falling, key, colour, width=1.3, dash="dot", showlegend=False)
+            for key, label, colour in lines
+            if (falling := falling_rows.get(option, ()))
+        ]
+    layout = {
+        "xaxis": axis("severity", dtick=2, range=[-0.3, 10.3]),
+        "yaxis": axis(unit),
+        "showlegend": len(lines) > 1,
+    }
+    keys = [key for key, *_ in lines]
+    ranges = {
+        option: {"yaxis": {"range": y_range(rows, rising[0]["gait"], keys, least_range, from_zero)}}
+        for option, rising in rising_rows.items()
+    }
+    return Chart(
+        f"sweep-{name}", title, "", layout=layout, height=230, options=options, option_layouts=ranges
+    )
+
+
+def _line(label: str, rows: Rows, key: str, colour: str, **more: Any) -> Trace:
+    """A line of the values `key` over severity."""
+    x, y = [row["severity"] for row in rows], [row.get(key) for row in rows]
+    return line_trace(label, x, y, colour, **more)
+
+
+def y_range(
+    rows: Rows, gait: str, keys: Sequence[str], least_range: float, from_zero: bool
+) -> list[float] | None:
+    """[lowest, highest] value of the vertical axis. It is the same for all links of a gait, to compare them.
+
+    keys: keys of a row whose values the chart shows. least_range: the axis is at least this long, so that
+    noise looks small. from_zero: whether the axis starts at 0. None if no row has a value.
+    """
+    values = [row[k] for row in rows if row["gait"] == gait for k in keys if row.get(k) is not None]
+    if not values:
+        return None
+    low, high = (0.0 if from_zero else min(values)), max(values)
+    # The empty space: 8 % of the range of the values, or more to reach `least_range`. An axis from 0 has all
+    # of it at the top; another axis has one half at each end.
+    spare = max(least_range - (high - low), 0.08 * (high - low))
+    return [low if from_zero else low - spare / 2, high + spare / (1 if from_zero else 2)]
+
+
+def effect_charts(responses: Rows) -> list[Chart]:
+    """Two charts of each link at severity 10: the change of the pose, and the remaining speed."""
+    pose = "Distance from the healthy walk at the same phase, mean over joints."
+    speed = "Speed at severity 10, divided by the healthy speed."
+    if any(not _trained(r) for r in responses):
+        hollow = " Hollow dots are links that were never hurt in training."
+        pose += (
+            f"{hollow} They have no effect, so they show how much healthy walks differ. If a filled dot is "
+            "not to the right of the hollow dots, its link has no effect either."
+        )
+        speed += hollow
+    share = "share of the healthy speed"
+    charts = [
+        _effect_chart(
+            responses,
+            "from_healthy_cm",
+            ("injury-pose", "Change of the pose", pose),
+            "cm per joint at severity 10",
+            2.0,
+        ),
+        _effect_chart(responses, "speed_share", ("injury-speed", "Remaining speed", speed), share, 1.0),
+    ]
+    return [chart for chart in charts if chart.traces]
+
+
+def _effect_chart(
+    responses: Rows, key: str, texts: tuple[str, str, str], axis_title: str, least_range: float
+) -> Chart:
+    """A dot for each link and gait. texts: name, title and caption of the chart."""
+    traces: list[Trace] = []
+    for gait, colour in GAIT_COLOURS.items():
+        for hurt in (True, False):
+            dots = [
+                r
+                for r in responses[::-1]
+                if r["gait"] == gait and _trained(r) is hurt and r.get(key) is not None
+            ]
+            if dots:
+                trace = {
+                    "type": "scatter",
+                    "mode": "markers",
+                    "name": gait if hurt else f"{gait}, {UNTRAINED}",
+                    "y": [r["link"] for r in dots],
+                    "x": [r[key] for r in dots],
+                    "marker": {"color": colour, "size": 9} if hurt else HOLLOW | {"color": colour},
+                    "hovertemplate": "%{y}: %{x:.2f}<extra>%{fullData.name}</extra>",
+                }
+                traces.append(trace)
+    # Links that were hurt in training are at the top. Plotly counts from below, so the list is reversed.
+    from_top = sorted(responses, key=lambda r: not _trained(r))
+    links = list(dict.fromkeys(r["link"] for r in from_top))[::-1]
+    furthest = max((r[key] for r in responses if r.get(key) is not None), default=0.0)
+    layout = {
+        "xaxis": axis(axis_title, range=[0, 1.08 * max(least_range, furthest)]),
+        "yaxis": {
+            "categoryorder": "array",
+            "categoryarray": links,
+            "automargin": True,
+            "type": "category",
+        },
+    }
+    return Chart(*texts, traces, layout, 150 + 21 * len(links))
+
+
+def response_table(name: str, responses: Rows) -> Table:
+    """A row for each gait and link. name: of the configuration."""
+    columns = [
+        Column("gait"),
+        Column("link"),
+        Column("in training", lambda v: "hurt" if v else "never hurt"),
+        *map(Column.number, RESPONSE_COLUMNS),
+    ]
+    rows = [
+        [r["gait"], r["link"], _trained(r), *(value(r) for value in RESPONSE_COLUMNS.values())]
+        for r in responses
+    ]
+    title = "Every link at severity 10, and the rank correlation of its effects with severity (Spearman's ρ)"
+    return Table(f"{name}-injury-responses", columns, rows, title)
+
+
+def second_chart(rows: Rows) -> Chart | None:
+    """The effect of a second injury in addition to a first one, with a cell for each pair of links.
+
+    rows: `second` of injury.json. None if it is empty.
+    """
+    if not rows:
+        return None
+    first_links, second_links = (list(dict.fromkeys(row[key] for row in rows)) for key in ("first", "second"))
+    by_pair = {(row["first"], row["second"]): row for row in rows}
+
+    def cells(key: str, number: str) -> list[Trace]:
+        """key: of a row. number: format of its value."""
+        values = [[by_pair.get((a, b), {}).get(key) for b in second_links] for a in first_links]
+        hover = f"%{{x}} in addition to %{{y}}: %{{z:{number}}}<extra></extra>"
+        texts = {"texttemplate": f"%{{z:{number}}}", "hovertemplate": hover}
+        return [heatmap(second_links, first_links, values, **texts)]
+
+    return Chart(
+        "second-injury",
+        "A second injury in addition to a first",
+        "Each row names the part of the body that is hurt first, at severity 7; if the part has several "
+        "links, one of them is hurt. Each column is a second injury, at severity 10. The cell says how much "
+        "the second injury changes the walk, in centimetres or as a share of its effect on a healthy body. A "
+        "pale cell means that the second injury hardly shows.",
+        layout=NAMED_AXES,
+        height=max(300, 190 + 24 * len(first_links)),
+        choose="Unit",
+        options={
+            "centimetres per joint": cells("from_first_cm", ".1f"),
+            "share of its effect on a healthy body": cells("share", ".0%"),
+        },
+    )
+
+
+def divided_chart(rows: Rows) -> Chart | None:
+    """How far the walk with one link hurt is from the healthy walk, with a line for each divisor.
+
+    A menu selects the link. rows: `divided` of injury.json. None if it is empty.
+    """
+    if not rows:
+        return None
+    scales = sorted({row["scale"] for row in rows})
+
+    def line(link: str, scale: float, colour: str) -> Trace:
+        of_line = [row for row in rows if row["link"] == link and row["scale"] == scale]
+        return _line(f"divided by {scale:g}", of_line, "from_healthy_cm", colour, mode="lines+markers")
+
+    return Chart(
+        "divided",
+        "Severities divided by a number",
+        "As in an experiment of Ferre, the severities are divided by a number before the network gets them. "
+        "Each line belongs to one number. Its height is the distance of the pose from the healthy walk.",
+        layout={"xaxis": axis("severity", dtick=2), "yaxis": axis("cm per joint", rangemode="tozero")},
+        choose="Link",
+        options={
+            link: [line(link, scale, colour) for scale, colour in zip(scales, COLOURS, strict=False)]
+            for link in dict.fromkeys(row["link"] for row in rows)
+        },
+    )
+
+
+def jog_chart(rows: Rows, untrained: Collection[str] = ()) -> Chart | None:
+    """How much of an injury shows in a jog after a hurt walk, with a line for each link.
+
+    rows: `into_a_jog` of injury.json. untrained: links that were never hurt in training. They share one line.
+    None if there is nothing to show.
+    """
+    key = "jog_from_healthy_cm"
+    hurt = [link for link in dict.fromkeys(row["link"] for row in rows) if link and link not in untrained]
+    traces: list[Trace] = []
+    for i, link in enumerate(hurt):
+        of_link = [row for row in rows if row["link"] == link]
+        dash, colour = "solid" if i < len(COLOURS) else "dash", COLOURS[i % len(COLOURS)]
+        traces.append(_line(link, of_link, key, colour, dash=dash, mode="lines+markers", width=1.4))
+    jogs: dict[float, list[float]] = {}  # severity -> distance of the jog of each untrained link, cm
+    for row in rows:
+        if row["link"] in untrained and row.get(key) is not None:
+            jogs.setdefault(row["severity"], []).append(row[key])
+    if jogs:
+        means = [sum(values) / len(values) for values in jogs.values()]
+        traces.append(line_trace(UNTRAINED, list(jogs), means, "@muted", dash="dot", width=1.4))
+    if not traces:
+        return None
+    caption = (
+        "The character walks hurt, then jogs and is still hurt. The chart shows how far its jog is from the "
+        "healthy jog."
+    )
+    if jogs:
+        caption += (
+            " The dotted line is the mean of links that were never hurt in training. They have no effect, so "
+            "the line shows how much two healthy jogs differ. If the line of a link is not above it, the "
+            "injury does not show in the jog."
+        )
+    layout = {
+        "xaxis": axis("severity", dtick=1),
+        "yaxis": axis("cm per joint", rangemode="tozero"),
+        "showlegend": True,
+    }
+    return Chart("into-a-jog", "From a hurt walk into a jog", caption, traces, layout, height=420)
+
+
+def injury_hints(found: Json) -> Iterator[Hint]:
+    """Whether and how much each hurt link changes the walk, and whether the walk recovers.
+
+    Only links that were hurt in training are judged. Their changes are compared with the drift of a healthy
+    walk, which is how much it changes although nothing hurts.
+    """
+    responses = [r for r in found.get("responses") or () if r["gait"] == "walk"]
+    trained = [r for r in responses if _trained(r)]
+    if not trained:
+        return
+    drift, drift_at_end = (_drift(responses, key) for key in ("from_healthy_cm", "after_healing_cm"))
+    if drift > 2:
+        yield Hint(
+            "warn",
+            f"Even a healthy walk changes, by {format_number(drift)} cm per joint.",
+            "So the effect of severity is hard to measure. Train for longer, or measure for longer.",
+        )
+    unchanged = [r["link"] for r in trained if (r.get("from_healthy_cm") or 0) < max(0.5, 2 * drift)]
+    if unchanged:
+        yield Hint(
+            "note",
+            f"{len(unchanged)} of {_plural(len(trained), 'link')} hardly "
+            f"{'changes' if len(unchanged) == 1 else 'change'} the walk at severity 10",
+            "(by less than half a centimetre per joint, or by less than twice the change of a healthy walk): "
+            f"{_first_four(unchanged)}. Add clips in which they hurt.",
+        )
+    not_healed = [
+        r["link"]
+        for r in trained
+        if r["link"] not in unchanged and (r.get("after_healing_cm") or 0) > max(2, 2 * drift_at_end)
+    ]
+    if not_healed:
+        yield Hint(
+            "note",
+            f"The walk does not recover after these links have healed: {_first_four(not_healed)}.",
+            "The character keeps limping although nothing hurts any more.",
+        )
+    if not unchanged:
+        low, high = (format_number(f(r["from_healthy_cm"] for r in trained)) for f in (min, max))
+        yield Hint(
+            "good",
+            f"{len(trained)} of {_plural(len(responses), 'link')} {'was' if len(trained) == 1 else 'were'} "
+            "hurt in training.",
+            f"At severity 10, {'it' if len(trained) == 1 else 'each of them'} changes the walk by "
+            f"{low if low == high else f'{low} to {high}'} cm per joint. A link is the piece of the body "
+            "between two neighbouring joints.",
+        )
+
+
+def _drift(responses: Rows, key: str) -> float:
+    """The drift of a healthy walk: the mean of `key` over links that were never hurt in training, cm.
+
+    These links have no effect, so a walk that changes with their severity only drifts. 0 if there are none.
+    """
+    values = [r[key] for r in responses if not _trained(r) and r.get(key) is not None]
+    return float(np.mean(values)) if values else 0.0
+
+
+def _first_four(links: Sequence[str]) -> str:
+    return ", ".join(links[:4]) + (" …" if len(links) > 4 else "")
+
+
+def _plural(count: int, word: str) -> str:
+    """A count and its noun, in the plural unless the count is 1."""
+    return f"{count} {word}{'' if count == 1 else 's'}"

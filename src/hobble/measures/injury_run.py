@@ -1,0 +1,462 @@
+"""Measures how a walk and a jog change while the severity of one link rises from 0 to 10 and falls again.
+
+A link is the piece of the body between two neighbouring joints. All figures (copies of the character) walk
+at once, each with its own injuries, in stretches in which severities and gaits stay the same. In the sweep
+there is a figure for each gait and link. It walks healthy until it has reached its speed. Then the severity
+of its link is 0, 1, ..., 10, 9, ..., 0. A second crowd shows how fast the walk changes: each severity jumps
+from 0 to 10 and later back to 0. Three more cases are measured: a second injury, a change from walking to
+jogging, and divided severities.
+
+The distance of a walk from a reference walk is the mean distance of its joints, in cm, from the mean cycle of
+the reference walk at the same phase. The spread of a walk is its distance from its own mean cycle.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import product
+from typing import Any
+
+import numpy as np
+
+from hobble.core.quat import Array
+from hobble.core.skeleton import Skeleton
+from hobble.hurt.effects import part_of_link
+from hobble.measures.measure import MeasureInputs, Outcome
+from hobble.measures.sample import captured_motion, sample_to_measure, with_sample
+from hobble.measures.walks import (
+    FPS,
+    SPEEDS,
+    CrowdTarget,
+    Walks,
+    channel_values,
+    cycle_frames,
+    distance_to_cycle,
+    gait_measures,
+    generate_walks,
+    mean_cycle,
+    settling_seconds,
+    spearman,
+)
+from hobble.models.load import load_network
+from hobble.models.network import Network
+from hobble.rows.captured import Captured
+from hobble.runtime.options import Runtime
+
+INJURY = "injury"  # the channel
+GAITS = tuple(SPEEDS)  # "walk" and "jog"
+SEVERITIES = np.arange(11.0)
+STEPS = [*SEVERITIES, *SEVERITIES[-2::-1]]  # severity in each stretch of the sweep: 0, 1, ..., 10, 9, ..., 0
+WORST = len(SEVERITIES) - 1  # index in STEPS of the highest severity
+WALK_IN = 0.75  # time at the beginning in which figures reach their speed, as a share of a stretch's time
+# In the second crowd, a link hurts for the time of this many stretches, and then is healthy for as long.
+JUMP_STRETCHES = 2
+FIRST_SEVERITY = 7.0  # of the first of two injuries
+SECOND_SEVERITIES = (0.0, 5.0, 10.0)  # of the second of two injuries, in the order of the stretches
+SEVERITIES_TO_DIVIDE = (0.0, 2.5, 5.0, 7.5, 10.0)  # each is divided by each of DIVISORS
+DIVISORS = (1.0, 2.0, 5.0)
+JOG_SEVERITIES = (5.0, 10.0)  # of figures that change from walking to jogging
+JOG_SPEED_SHARE = 0.9  # a figure jogs once it has this share of its final speed
+LEAST_EFFECT_CM = 0.05  # no share of a smaller effect is computed
+# Keys of a response of which `summary` has the mean.
+SUMMARISED = (
+    "from_healthy_cm",
+    "after_healing_cm",
+    "hysteresis_cm",
+    "speed_share",
+    "settle_seconds",
+    "heal_seconds",
+    "acceleration_share",
+    "clip_acceleration_share",
+)
+Rows = list[dict[str, Any]]
+Injury = Mapping[str, float]  # link -> severity
+
+
+@dataclass(frozen=True)
+class Crowd:
+    """The motion of a crowd. A stretch and a figure are numbers, from 0."""
+
+    skeleton: Skeleton
+    walks: Walks
+
+    def cycle(self, stretch: int, figure: int) -> Array:
+        """The mean pose of a figure in each phase bin of its gait cycle, measured in a stretch."""
+        span = self.walks.measured_frames(stretch, figure)
+        return mean_cycle(self.walks.local[span, figure], self.walks.phase[span, figure])
+
+    def distance(self, stretch: int, figure: int, cycle: Array) -> float:
+        """Mean distance of a figure's poses in a stretch from `cycle`, cm."""
+        span = self.walks.measured_frames(stretch, figure)
+        local, phase = self.walks.local[span, figure], self.walks.phase[span, figure]
+        return float(np.mean(distance_to_cycle(local, phase, cycle)))
+
+    def measures(self, stretch: int, figure: int) -> dict[str, float | None]:
+        """The `gait_measures` of a figure in a stretch."""
+        span = self.walks.measured_frames(stretch, figure)
+        motion = (a[span, figure] for a in (self.walks.local, self.walks.contacts, self.walks.root))
+        return gait_measures(self.skeleton, *motion)
+
+    def speed(self, stretch: int, figure: int) -> float:
+        """A figure's mean speed in a stretch, cm/s."""
+        return float(self.measures(stretch, figure)["speed"] or 0.0)
+
+
+def walk_crowd(
+    network: Network,
+    gaits: Sequence[str],
+    stretches: Iterable[tuple[float, Sequence[Injury]]],
+    seconds: float,
+    runtime: Runtime,
+) -> Crowd:
+    """Let a crowd walk. gaits: of each figure.
+
+    stretches: for each stretch, its length as a share of `seconds`, and the injury of each figure.
+    """
+    assert network.skeleton is not None
+    script = [
+        CrowdTarget(_frames(share, seconds), gaits, channel_values(network, INJURY, injuries))
+        for share, injuries in stretches
+    ]
+    return Crowd(network.skeleton, generate_walks(network, script, runtime))
+
+
+def injury_response(
+    network: Network,
+    motion: Iterable[Captured] = (),
+    *,
+    configuration: str,
+    runtime: Runtime,
+    seconds: float,
+    links: Sequence[str] | None = None,
+) -> dict[str, Any]:
+    """The content of injury.json; docs/artefacts.md explains its keys.
+
+    motion: the captured clips; their largest accelerations are compared with the character's. configuration:
+    its name. seconds: time at each severity. links: the links to hurt, by default all.
+    """
+    links = list(links or network.channels[INJURY])
+    trained = [link for link in links if link in network.trained_labels(INJURY)]
+    rows, falling, responses = _sweep(network, links, trained, motion, seconds, runtime)
+    return {
+        "configuration": configuration,
+        "applies": True,
+        "mode": runtime.mode,
+        "seconds": seconds,
+        "severities": SEVERITIES.tolist(),
+        "links": links,
+        "trained": trained,
+        "rows": rows,
+        "falling": falling,
+        "responses": responses,
+        "second": second_injuries(network, trained, seconds, runtime),
+        "into_a_jog": into_a_jog(network, links, seconds, runtime),
+        "divided": divided_severities(network, trained, seconds, runtime),
+        "summary": _summary([r for r in responses if r["trained"]]),
+        "summary_untrained": _summary([r for r in responses if not r["trained"]]),
+    }
+
+
+def _sweep(
+    network: Network,
+    links: Sequence[str],
+    trained: Sequence[str],
+    motion: Iterable[Captured],
+    seconds: float,
+    runtime: Runtime,
+) -> tuple[Rows, Rows, Rows]:
+    """`rows` (rising severity), `falling` and `responses` of `injury_response`."""
+    captured = largest_accelerations(motion, network)
+    figures = [(gait, link) for gait in GAITS for link in links]
+
+    def crowd(*severities: tuple[float, float]) -> Crowd:
+        """The crowd of all figures. severities: share of the time and severity of each stretch."""
+        hurt = [(share, [{link: severity} for _, link in figures]) for share, severity in severities]
+        return walk_crowd(network, [gait for gait, _ in figures], hurt, seconds, runtime)
+
+    gradual = crowd((WALK_IN, 0), *((1, severity) for severity in STEPS))
+    at_once = crowd((WALK_IN, 0), (1, 0), (JUMP_STRETCHES, 10), (JUMP_STRETCHES, 0))
+    rising: Rows = []
+    falling: Rows = []
+    responses: Rows = []
+    for figure, (gait, link) in enumerate(figures):
+        rows = sweep_rows(gradual, figure, gait, link)
+        rising += rows[: WORST + 1]
+        falling += rows[WORST + 1 :]
+        largest = float(gradual.walks.acceleration[int(gradual.walks.starts[1]) :, figure].max())
+        response = respond(rows, largest, _settling_times(at_once, figure))
+        # If this link hurts in no captured motion, all captured motion in this gait is compared.
+        of_clips = captured.get((gait, link), captured.get((gait, None)))
+        whose = "link" if (gait, link) in captured else "gait" if of_clips else None
+        share = round(response["largest_acceleration"] / of_clips, 5) if of_clips else None
+        responses.append(
+            {"gait": gait, "link": link, "trained": link in trained, **response}
+            | {
+                "clip_acceleration": of_clips,
+                "clip_acceleration_of": whose,
+                "clip_acceleration_share": share,
+            }
+        )
+    return rising, falling, responses
+
+
+def sweep_rows(crowd: Crowd, figure: int, gait: str, link: str) -> Rows:
+    """One row for each of STEPS: labels, `gait_measures` and distances.
+
+    from_healthy, from_worst, from_rising: distance from the healthy walk, from the walk at severity 10, and
+    from the walk at the same severity while the severity rose.
+    """
+    cycles = [crowd.cycle(1 + step, figure) for step in range(len(STEPS))]
+    rows = []
+    for step, severity in enumerate(STEPS):
+        labels = {"gait": gait, "link": link, "direction": "rising" if step <= WORST else "falling"}
+        references = {"healthy": 0, "worst": WORST, "rising": min(step, 2 * WORST - step)}
+        span = crowd.walks.measured_frames(1 + step, figure)
+        row = {
+            **labels,
+            "severity": float(severity),
+            **crowd.measures(1 + step, figure),
+            **{f"from_{n}": crowd.distance(1 + step, figure, cycles[i]) for n, i in references.items()},
+            "largest_acceleration": float(crowd.walks.acceleration[span, figure].max()),
+        }
+        rows.append({k: round(v, 5) if isinstance(v, float) else v for k, v in row.items()})
+    return rows
+
+
+def respond(rows: Rows, largest: float, times: Mapping[str, float | None]) -> dict[str, Any]:
+    """How a walk responds to severity.
+
+    rows: from `sweep_rows`. largest: acceleration in the whole sweep. times: settle_seconds, heal_seconds.
+
+    spearman, spearman_falling: measure of the walk -> its rank correlation with rising and with falling
+    severity, None if the measure is constant. from_healthy_cm: distance from the healthy walk at severity 10.
+    after_healing_cm: the same distance at the end, when severity is 0 again. hysteresis_cm: largest distance
+    between two walks at the same severity, one while severity rises and one while it falls. From each of
+    these three distances, the spread of the healthy walk is subtracted. speed_share: speed at severity 10,
+    divided by the healthy speed; None if the healthy figure stands still.
+    """
+    healthy, worst, healed = rows[0], rows[WORST], rows[-1]
+    labels = ("gait", "link", "direction", "severity", "from_rising")
+    measures = {name: [row[name] for row in rows] for name in healthy if name not in labels}
+    spread = healthy["from_healthy"]
+    return {
+        "spearman": {n: spearman(SEVERITIES, values[: WORST + 1]) for n, values in measures.items()},
+        "spearman_falling": {n: spearman(SEVERITIES[::-1], values[WORST:]) for n, values in measures.items()},
+        "from_healthy_cm": round(worst["from_healthy"] - spread, 5),
+        "after_healing_cm": round(healed["from_healthy"] - spread, 5),
+        "hysteresis_cm": round(max(row["from_rising"] for row in rows[WORST + 1 :]) - spread, 5),
+        "speed_share": round(worst["speed"] / healthy["speed"], 5) if healthy["speed"] > 0 else None,
+        **times,
+        "largest_acceleration": round(largest, 5),
+        "acceleration_share": round(largest / max(healthy["largest_acceleration"], 1e-9), 5),
+    }
+
+
+def _settling_times(crowd: Crowd, figure: int) -> dict[str, float | None]:
+    """Time until the walk no longer changes, after the severity has jumped to 10 and back to 0.
+
+    None if the walk does not change.
+    """
+    walks = crowd.walks
+    local, phase = walks.local[:, figure], walks.phase[:, figure]
+    distance = distance_to_cycle(local, phase, crowd.cycle(1, figure))
+    healthy_cm = float(np.mean(distance[walks.measured_frames(1, figure)]))
+    # Stretch 2 is hurt, stretch 3 is healthy again. The second half of each shows the settled walk.
+    hurt_start, heal_start, end = walks.starts[2:5]
+    late_hurt = slice((hurt_start + heal_start) // 2, heal_start)
+    late_healed = slice((heal_start + end) // 2, end)
+    hurt_cm = float(np.mean(distance[late_hurt]))
+    settle = settling_seconds(distance[hurt_start:heal_start], healthy_cm, cycle_frames(phase[late_hurt]))
+    heal = settling_seconds(distance[heal_start:end], hurt_cm, cycle_frames(phase[late_healed]))
+    return {"settle_seconds": settle, "heal_seconds": heal}
+
+
+def largest_accelerations(
+    motion: Iterable[Captured], network: Network
+) -> dict[tuple[str, str | None], float]:
+    """(gait, link) -> largest acceleration of any joint in captured motion, cm per frame squared.
+
+    For (gait, link), only the motion in this gait in which this link hurts counts. For (gait, None), all
+    motion in this gait counts, hurt and healthy.
+    """
+    out: dict[tuple[str, str | None], float] = {}
+    for clip in motion:
+        hurts = dict(zip(network.channels[INJURY], clip.channels[INJURY].T > 0, strict=True))
+        for gait in GAITS:
+            in_gait = clip.gait[:, network.gaits.index(gait)] > 0.5
+            for link, frames in ((None, in_gait), *((k, in_gait & hurt) for k, hurt in hurts.items())):
+                if np.any(frames):
+                    highest = round(float(clip.acceleration[frames].max()), 5)
+                    out[gait, link] = max(highest, out.get((gait, link), 0.0))
+    return out
+
+
+def second_injuries(network: Network, links: Sequence[str], seconds: float, runtime: Runtime) -> Rows:
+    """Walks in which a first link hurts at severity 7 and a second link at severities 0, 5 and 10.
+
+    There is one first link for each part of the body (`first_link_of_each_part`), because all 30 links would
+    take longer than all other measurements. Each of the other links is a second link. The result has a row
+    for each pair.
+
+    from_first_cm: distance between the walk with both injuries, the second at 10, and the walk with only the
+    first. share: `from_first_cm`, divided by the distance between the walk with only the second injury and
+    the healthy walk. from_second_cm: distance between the walk with both injuries and the walk with only the
+    second. It is 0 if the first injury does not show. spearman: rank correlation between the severity of the
+    second injury and the distance from the walk with only the first.
+    """
+    assert network.skeleton is not None
+    firsts = first_link_of_each_part(network.skeleton, links)
+    # (first link, second link) of each figure. Where the first is None, the second hurts alone.
+    pairs = [(a, b) for a, b in product([None, *firsts], links) if a != b]
+
+    def with_second_at(severity: float) -> list[Injury]:
+        return [{**({a: FIRST_SEVERITY} if a else {}), b: severity} for a, b in pairs]
+
+    stretches = [(WALK_IN, [{}] * len(pairs)), *((1, with_second_at(s)) for s in SECOND_SEVERITIES)]
+    crowd = walk_crowd(network, ["walk"] * len(pairs), stretches, seconds, runtime)
+    last = len(SECOND_SEVERITIES)  # number of the last stretch, because stretch 0 is only the beginning
+    alone: dict[str, tuple[Array, float, float]] = {}  # second link -> its cycle, spread and effect alone
+    out = []
+    for i, (first, second) in enumerate(pairs):
+        if first is None:
+            healthy, cycle = crowd.cycle(1, i), crowd.cycle(last, i)
+            effect = crowd.distance(last, i, healthy) - crowd.distance(1, i, healthy)
+            alone[second] = cycle, crowd.distance(last, i, cycle), effect
+            continue
+        cycle_of_second, spread, effect_alone = alone[second]
+        cycle_of_first = crowd.cycle(1, i)
+        from_first = [crowd.distance(1 + k, i, cycle_of_first) for k in range(last)]
+        added = from_first[-1] - from_first[0]  # the second item is the spread
+        row = {
+            "first": first,
+            "second": second,
+            "from_first_cm": round(added, 5),
+            "share": round(added / effect_alone, 5) if effect_alone > LEAST_EFFECT_CM else None,
+            "from_second_cm": round(crowd.distance(last, i, cycle_of_second) - spread, 5),
+            "spearman": spearman(SECOND_SEVERITIES, from_first),
+        }
+        out.append(row)
+    return out
+
+
+def first_link_of_each_part(skeleton: Skeleton, links: Sequence[str]) -> list[str]:
+    """For each part of the body (such as the thigh), the first of `links` that belongs to it.
+
+    Left and right count as the same part.
+    """
+    pairs = dict(zip(skeleton.link_names, skeleton.links, strict=True))
+    first: dict[str, str] = {}
+    for link in links:
+        first.setdefault(part_of_link(skeleton, pairs[link]).name, link)
+    return list(first.values())
+
+
+def into_a_jog(network: Network, links: Sequence[str], seconds: float, runtime: Runtime) -> Rows:
+    """Figures that change from walking to jogging: one without injury, then each link at severities 5 and 10.
+
+    link: None for the healthy figure. walk_speed, jog_speed: cm/s. reach_seconds: time from the change until
+    the figure has nine tenths of `jog_speed`; None if it never has. walk_from_healthy_cm,
+    jog_from_healthy_cm: distance of the walk from the healthy walk, and of the jog from the healthy jog.
+    kept: the latter divided by the former. It is 0 if the injury does not show in the jog.
+    largest_acceleration: of any joint in the first `seconds` of the jog, cm per frame squared.
+    """
+    assert network.skeleton is not None
+    figures: list[tuple[str | None, float]] = [(None, 0.0), *product(links, JOG_SEVERITIES)]
+    hurt = channel_values(network, INJURY, [{link: s} if link else {} for link, s in figures])
+    frames = _frames(1, seconds)
+    # In stretch 0 the figures reach their speed.
+    lengths = ((frames, "walk"), (frames, "walk"), (2 * frames, "jog"))
+    script = [CrowdTarget(length, [gait] * len(figures), hurt) for length, gait in lengths]
+    walks = generate_walks(network, script, runtime)
+    crowd = Crowd(network.skeleton, walks)
+    healthy = {stretch: crowd.cycle(stretch, 0) for stretch in (1, 2)}
+    spread = {stretch: crowd.distance(stretch, 0, healthy[stretch]) for stretch in (1, 2)}
+    start = int(walks.starts[2])  # the first frame of the jog
+    out = []
+    for i, (link, severity) in enumerate(figures):
+        walking, jogging = (crowd.distance(s, i, healthy[s]) - spread[s] for s in (1, 2))
+        jog_speed = crowd.speed(2, i)
+        speeds = np.linalg.norm(np.diff(walks.root[start:, i, ::2], axis=0), axis=1) * FPS
+        fast = np.flatnonzero(speeds >= JOG_SPEED_SHARE * jog_speed)
+        row = {
+            "link": link,
+            "severity": severity,
+            "walk_speed": round(crowd.speed(1, i), 5),
+            "jog_speed": round(jog_speed, 5),
+            "reach_seconds": round(float(fast[0]) / FPS, 5) if len(fast) else None,
+            "walk_from_healthy_cm": round(walking, 5),
+            "jog_from_healthy_cm": round(jogging, 5),
+            "kept": round(jogging / walking, 5) if walking > LEAST_EFFECT_CM else None,
+            "largest_acceleration": round(float(walks.acceleration[start : start + frames, i].max()), 5),
+        }
+        out.append(row)
+    return out
+
+
+def divided_severities(network: Network, links: Sequence[str], seconds: float, runtime: Runtime) -> Rows:
+    """How much of each link's effect remains if the runtime divides severities by `scale`: 1, 2 or 5.
+
+    from_healthy_cm: distance from the healthy walk. speed_share: speed, divided by the healthy speed.
+    """
+    stretches = [
+        (WALK_IN, [{}] * len(links)),
+        *((1, [{link: severity} for link in links]) for severity in SEVERITIES_TO_DIVIDE),
+    ]
+    out = []
+    for divisor in DIVISORS:
+        divided = runtime.model_copy(update={"scales": {**runtime.scales, INJURY: divisor}})
+        crowd = walk_crowd(network, ["walk"] * len(links), stretches, seconds, divided)
+        for i, link in enumerate(links):
+            healthy = crowd.cycle(1, i)
+            spread, speed = crowd.distance(1, i, healthy), crowd.speed(1, i)
+            for stretch, severity in enumerate(SEVERITIES_TO_DIVIDE, 1):
+                row = {
+                    "scale": divisor,
+                    "link": link,
+                    "severity": severity,
+                    "from_healthy_cm": round(crowd.distance(stretch, i, healthy) - spread, 5),
+                    "speed_share": round(crowd.speed(stretch, i) / max(speed, 1e-9), 5),
+                }
+                out.append(row)
+    return out
+
+
+def _frames(share: float, seconds: float) -> int:
+    """Length in frames of a stretch that lasts `share` times `seconds`; at least 4."""
+    return max(4, round(share * seconds * FPS))
+
+
+def _summary(responses: Rows) -> dict[str, dict[str, float | None]]:
+    """Gait -> means over `responses`, which are of several links. Empty if there are no responses."""
+    out = {}
+    for gait in GAITS:
+        if group := [r for r in responses if r["gait"] == gait]:
+            out[gait] = {
+                "spearman_from_healthy": _mean(r["spearman"]["from_healthy"] for r in group),
+                "spearman_speed": _mean(r["spearman"]["speed"] for r in group),
+                "spearman_falling_from_healthy": _mean(r["spearman_falling"]["from_healthy"] for r in group),
+                **{key: _mean(r[key] for r in group) for key in SUMMARISED},
+            }
+    return out
+
+
+def _mean(values: Iterable[float | None]) -> float | None:
+    """The mean of the values that are not None; None if there are none."""
+    known = [v for v in values if v is not None]
+    return round(float(np.mean(known)), 5) if known else None
+
+
+def run(inputs: MeasureInputs, options: Any) -> Outcome:
+    """The content of injury.json and of the tables in injury/."""
+    sample = sample_to_measure(inputs, options)
+    result = injury_response(
+        load_network(inputs.weights),
+        captured_motion(inputs.clips, sample),
+        configuration=inputs.configuration,
+        runtime=inputs.runtime,
+        seconds=options.seconds,
+    )
+    tables = {name: result[name] for name in ("second", "into_a_jog", "divided")}
+    tables["sweep"] = [*result["rows"], *result["falling"]]
+    return Outcome(with_sample(result, sample), tables, str(result["summary"]))
