@@ -9,20 +9,38 @@ says by how much a whole training step would take longer with PyTorch's.
 from __future__ import annotations
 
 import argparse
+from collections.abc import Callable, Mapping
+from time import perf_counter, thread_time
 
 import hobble.training  # noqa: F401 - first, since it says how threads wait
 
 # isort: split
 import torch
-from products import least
+from training import fresh
 
 from hobble.core.processors import multiplies_bfloat16, processor_name
-from hobble.models.pfnn.fused import FusedPfnnStep
-from hobble.models.pfnn.trainable import untrained_network
+from hobble.models.step import FusedStep
 from hobble.training.checkpoint import use_threads
 from hobble.training.optimiser import Adam, l1_slopes
 
-POINTS, KEEP, L1, RATE, BETAS = 4, 0.97, 0.01, 1e-4, (0.9, 0.999)
+KEEP, L1, RATE, BETAS = 4, 0.97, 0.01, 1e-4, (0.9, 0.999)
+
+
+SECONDS = 1.0  # for all calls that are compared
+
+
+def least(calls: Mapping[str, Callable[[], object]]) -> dict[str, float]:
+    """Seconds of the fastest call of each; of the processor if there is one thread."""
+    clock = thread_time if torch.get_num_threads() == 1 else perf_counter
+    best = dict.fromkeys(calls, float("inf"))
+    begun, turns = perf_counter(), 0
+    while perf_counter() - begun < SECONDS or turns < 8:
+        turns += 1
+        for name, call in calls.items():
+            before = clock()
+            call()
+            best[name] = min(best[name], clock() - before)
+    return best
 
 
 class Fused:
@@ -36,16 +54,15 @@ class Fused:
     def step(self, gradients: list[torch.Tensor]) -> None:
         """Take one step. gradients: as in `hobble.training.optimiser.Adam`; the L1 term is added to them."""
         for layer, gradient, slope in zip(self.layers, gradients, self.slopes, strict=True):
-            # bfloat16 gradients have to be widened; others are used where they are, which saves a copy.
-            layer.grad = gradient.view(layer.shape).to(layer.dtype)
+            layer.grad = gradient.view(layer.shape)
             layer.grad[:, :, :-1].add_(torch.sign(layer[:, :, :-1]), alpha=slope)
         self.adam.step()
 
 
 def compare(rows: int, sizes: tuple[int, ...], half: bool) -> None:
     """Check that both move the weights alike, then print a row for each optimiser."""
-    network = untrained_network(sizes, POINTS, 1)
-    step, other = FusedPfnnStep(network, 1 - KEEP, half), Fused(network)
+    network = fresh(sizes)
+    step, other = FusedStep(network, 1 - KEEP, half), Fused(network)
     ours = Adam(network, RATE, *BETAS, L1)
     batch = torch.randn(rows, sizes[0]), torch.randn(rows, sizes[-1]), torch.rand(rows)
     masks = step.masks(rows)

@@ -206,7 +206,7 @@ def training(folder: Path, memory_mb: int, rounds: int) -> None:
     profits from what the other has read.
     """
     from hobble.config.sections import Training
-    from hobble.models.pfnn.options import PfnnOptions
+    from hobble.models.pfnn import PfnnOptions
     from hobble.training.batches import HostRows
     from hobble.training.checkpoint import new_state, step_for, use_threads
     from hobble.training.optimiser import update_for

@@ -20,7 +20,6 @@ from hobble.measures.rollouts_run import RollOutCrowd, RollOutInputs
 from hobble.measures.walks import CrowdTarget, channel_values, generate_walks
 from hobble.models.load import load_network
 from hobble.models.network import Network
-from hobble.models.pfnn.predictor import PfnnPredictor
 from hobble.runtime.options import Runtime
 
 RUNTIME = Runtime(mode="cubic")
@@ -66,7 +65,7 @@ def roll_outs(network: Network) -> tuple[float, float]:
         still + 1,
     )
     starts = np.arange(1, count - length, 6)
-    predictor = PfnnPredictor(network)
+    predictor = network.predictor()
     per = 1e6 / length / len(starts)
 
     def roll_out(chosen: np.ndarray) -> None:

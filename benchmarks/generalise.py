@@ -32,7 +32,7 @@ from hobble.database.reader import Database
 from hobble.measures.responsivity_run import measure_responsivity
 from hobble.measures.rollouts_run import measure_roll_outs
 from hobble.models.load import load_network
-from hobble.models.pfnn.options import PfnnOptions
+from hobble.models.pfnn import PfnnOptions
 from hobble.runtime.options import Runtime
 from hobble.runtime.waypoints import TRACK, Waypoint
 from hobble.training.batches import HeldOutErrors

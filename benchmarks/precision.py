@@ -20,7 +20,7 @@ from hobble.config.sections import Training
 from hobble.database.chunks import Manifest
 from hobble.database.write import write_database
 from hobble.measures.accuracy_run import measure_accuracy
-from hobble.models.pfnn.options import PfnnOptions
+from hobble.models.pfnn import PfnnOptions
 from hobble.training.run import run
 
 DTYPES = ("float32", "float16", "bfloat16")

@@ -30,9 +30,8 @@ from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton, forward_kinematics
 from hobble.models.load import load_network
 from hobble.models.network import STORAGES
-from hobble.models.pfnn.network import Pfnn
-from hobble.models.pfnn.predictor import MODES, PfnnPredictor
-from hobble.models.tiles import PANELS_FOR_3_ROWS, PANELS_FOR_6_ROWS
+from hobble.models.pfnn import STORED_AND_BLENDED, Pfnn
+from hobble.models.predict import PANELS_FOR_3_ROWS, PANELS_FOR_6_ROWS
 from hobble.rows.layout import RowLayout
 from hobble.runtime.animation import ProceduralAnimation
 
@@ -104,15 +103,14 @@ def predictions(network: Pfnn) -> None:
     rng = np.random.default_rng(2)
     x = rng.normal(0, 20, (1, network.layout.x_size)).astype(np.float32)
     z, out, phase = np.zeros_like(x), np.zeros((1, network.layout.y_size), np.float32), np.full(1, 0.3)
-    for mode in MODES:
+    for mode, (stored, looked_up) in STORED_AND_BLENDED.items():
         for storage in STORAGES:
-            predictor = PfnnPredictor(network, mode, storage)
+            predictor = network.predictor(mode, storage)
             predictor.standardise(x, z)
-            looked_up = {"constant": 1, "linear": 2, "cubic": 4}[mode]
             size = network.parameter_count * np.dtype(storage).itemsize  # of one point
             for cold in (False, True):
-                copies = CACHES // (size * predictor.points) + 1 if cold else 1
-                many = [PfnnPredictor(network, mode, storage) for _ in range(copies)]
+                copies = CACHES // (size * (stored or network.sets)) + 1 if cold else 1
+                many = [network.predictor(mode, storage) for _ in range(copies)]
                 pool = np.ones((CACHES // (looked_up * size) if cold else 1, looked_up * size // 8), np.int64)
                 rows, times, floor = len(pool), [], []
                 for k in range(CALLS):
@@ -139,7 +137,7 @@ def crowds(network: Pfnn) -> None:
         options = onnxruntime.SessionOptions()
         options.intra_op_num_threads = 1
         session = onnxruntime.InferenceSession(str(path), options, providers=["CPUExecutionProvider"])
-    predictor, rng = PfnnPredictor(network), np.random.default_rng(2)
+    predictor, rng = network.predictor(), np.random.default_rng(2)
     print(
         f"\n{'characters':<14}{'ours':>9}{'onnxruntime':>13}{'ratio':>7}{'GFLOP/s':>9}{'share of 1/60 s':>17}"
     )
@@ -152,14 +150,14 @@ def crowds(network: Pfnn) -> None:
             ours.append(timed(lambda _, x=x, p=phase: predictor.predict(x, p), 1, process_time)[0])
             theirs.append(timed(lambda _, fed=fed: session.run(None, fed), 1, process_time)[0])
         a, b = np.median(ours), np.median(theirs)
-        speed = 2e-3 * network.parameter_count * network.control_points * count / a
+        speed = 2e-3 * network.parameter_count * network.sets * count / a
         print(f"{count:<14}{a:9.0f}{b:13.0f}{b / a:7.2f}{speed:9.1f}{a * 60e-6:17.2f}")
 
 
 def frames(network: Pfnn) -> None:
     """Whole frames: microseconds for each character."""
     print(f"\n{'next_pose, a character':<34}{'median':>9}{'p99':>9}{'a frame':>9}")
-    for mode in MODES:
+    for mode in STORED_AND_BLENDED:
         for count in (1, 11, 200):
             character = ProceduralAnimation(network, mode=mode, characters=count)
             angle = np.random.default_rng(3).uniform(0, 2 * np.pi, count)

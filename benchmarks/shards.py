@@ -25,7 +25,7 @@ from hobble.config.sections import Training
 from hobble.core.processors import processor_name
 from hobble.database.reader import Database
 from hobble.database.write import merge_shards, write_database, write_shard
-from hobble.models.pfnn.options import PfnnOptions
+from hobble.models.pfnn import PfnnOptions
 from hobble.training.batches import HostRows
 from hobble.training.checkpoint import new_state, step_for, use_threads
 from hobble.training.optimiser import update_for

@@ -22,7 +22,7 @@ from hobble.core.quat import Array
 from hobble.measures.walks import feet_in_stance, foot_slide, largest_turn, skating
 from hobble.models.load import load_network
 from hobble.models.network import Network
-from hobble.models.pfnn.predictor import MODES
+from hobble.models.pfnn import OPTIONS
 from hobble.runtime.animation import ProceduralAnimation
 from hobble.runtime.feet import leg_joints, sole_heights
 from hobble.runtime.options import Runtime
@@ -175,7 +175,7 @@ def main() -> int:
     parser.add_argument("network", help="weights.npz, a folder that holds it, or a folder of .bin files")
     parser.add_argument("--minutes", type=float, default=10.0)
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--mode", choices=tuple(MODES), default="cubic")
+    parser.add_argument("--mode", choices=OPTIONS.modes, default="cubic")
     parser.add_argument("--steering", type=float, default=2.0, help="0 is the original runtime")
     parser.add_argument(
         "--skeleton", default="config/skeletons/holden31.yaml", help="where the network has none"

@@ -8,8 +8,8 @@ floor is the time of the matrix products alone, at their best, with the same fac
 - per sample: weights built for every sample, differentiated by autograd, PyTorch's Adam (sixty-four samples
   at a time, since 1,024 need 5 GB);
 - blended: outputs of the control points blended, otherwise the same: the usual good implementation;
-- PyTorch, float32: `hobble.models.pfnn.step.PfnnStep`, as on other devices than a CPU;
-- fused, float32: `hobble.models.pfnn.fused.FusedPfnnStep`, the default below batch 256;
+- PyTorch, float32: `hobble.models.step.AutogradStep`, as on other devices than a CPU;
+- fused, float32: `hobble.models.step.FusedStep`, the default below batch 256;
 - fused, bfloat16: the same with factors rounded to bfloat16, the default from there on.
 
 `training_cuda.py` measures a GPU.
@@ -29,16 +29,21 @@ import torch
 from torch import Tensor
 
 from hobble.core.processors import multiplies_bfloat16, processor_name
-from hobble.models.pfnn.fused import FusedPfnnStep
-from hobble.models.pfnn.step import PfnnStep
-from hobble.models.pfnn.trainable import coefficients, untrained_network
-from hobble.models.products import product
+from hobble.models.forward import phase_shares
+from hobble.models.pfnn import PfnnOptions, TrainablePfnn
+from hobble.models.step import AutogradStep, FusedStep, product
 from hobble.training.checkpoint import use_threads
 from hobble.training.optimiser import Adam
 
 KEEP, L1, RATE, POINTS = 0.7, 0.01, 1e-4, 4
 PART = 64
 Batch = tuple[Tensor, Tensor, Tensor]
+
+
+def fresh(sizes: tuple[int, ...]) -> TrainablePfnn:
+    """An untrained network of `sizes`."""
+    count = POINTS * sum((size + 1) * out for size, out in pairwise(sizes))
+    return PfnnOptions(control_points=POINTS).trainable(torch.zeros(count), sizes, ()).randomise(1)
 
 
 def dropped(x: Tensor) -> Tensor:
@@ -62,14 +67,17 @@ def blended(layers: list[Tensor], x: Tensor, c: Tensor) -> Tensor:
 
 
 def by_autograd(forward: Callable, part: int, sizes: tuple[int, ...]) -> Callable[[Batch], None]:
-    layers = [layer.clone().requires_grad_() for layer in untrained_network(sizes, POINTS, 1).layers]
+    layers = [layer.clone().requires_grad_() for layer in fresh(sizes).layers]
     adam = torch.optim.Adam(layers, lr=RATE)
 
     def step(batch: Batch) -> None:
         adam.zero_grad()
         for start in range(0, len(batch[0]), part):
             x, y, p = (array[start : start + part] for array in batch)
-            error = torch.sum((forward(layers, x, coefficients(p, POINTS)) - y) ** 2) / batch[1].numel()
+            error = (
+                torch.sum((forward(layers, x, phase_shares(p, torch.arange(POINTS))) - y) ** 2)
+                / batch[1].numel()
+            )
             error.backward()
         (L1 / (2 * len(layers)) * sum(layer[:, :, :-1].abs().mean() for layer in layers)).backward()
         adam.step()
@@ -77,8 +85,8 @@ def by_autograd(forward: Callable, part: int, sizes: tuple[int, ...]) -> Callabl
     return step
 
 
-def by_hand(kind: type[PfnnStep], half: bool, sizes: tuple[int, ...]) -> Callable[[Batch], None]:
-    network = untrained_network(sizes, POINTS, 1)
+def by_hand(kind: type[AutogradStep], half: bool, sizes: tuple[int, ...]) -> Callable[[Batch], None]:
+    network = fresh(sizes)
     adam, step = Adam(network, RATE, 0.9, 0.999, L1), kind(network, 1 - KEEP, half)
 
     def go(batch: Batch) -> None:
@@ -134,12 +142,12 @@ def main() -> None:
     ways = {
         "per sample": by_autograd(per_sample, PART, sizes),
         "blended": by_autograd(blended, 1 << 30, sizes),
-        "PyTorch, float32": by_hand(PfnnStep, False, sizes),
-        "fused, float32": by_hand(FusedPfnnStep, False, sizes),
+        "PyTorch, float32": by_hand(AutogradStep, False, sizes),
+        "fused, float32": by_hand(FusedStep, False, sizes),
         "floor, float32": products(False, sizes),
     }
     if multiplies_bfloat16():
-        ways["fused, bfloat16"] = by_hand(FusedPfnnStep, True, sizes)
+        ways["fused, bfloat16"] = by_hand(FusedStep, True, sizes)
         ways["floor, bfloat16"] = products(True, sizes)
     inputs = sum(size * out for size, out in pairwise(sizes[:2]))
     all_layers = sum(size * out for size, out in pairwise(sizes))

@@ -23,13 +23,12 @@ from hobble.core.processors import processor_name
 # isort: split
 import torch
 from database import made_up
-from training import L1, POINTS, RATE, Batch, products
+from training import L1, RATE, Batch, fresh, products
 
 from hobble.config.sections import Training
 from hobble.database.reader import Database
 from hobble.database.write import write_database
-from hobble.models.pfnn.options import PfnnOptions
-from hobble.models.pfnn.trainable import untrained_network
+from hobble.models.pfnn import PfnnOptions
 from hobble.training.batches import LossWatch
 from hobble.training.checkpoint import step_for, use_threads
 from hobble.training.device_rows import DeviceRows
@@ -97,7 +96,7 @@ def main() -> None:
             training = Training(batch=size, precision=precision)
             found = []
             for way in (update_for, lambda step, adam, _: Update(step, adam)):
-                made = untrained_network(sizes, POINTS, 1).to(device)
+                made = fresh(sizes).to(device)
                 step, adam = step_for(made, training), Adam(made, RATE, 0.9, 0.999, L1)
                 found.append(speed(samples(rows, size, way(step, adam, size)), options.seconds, device))
             batch = tuple(torch.zeros(size, *tail, device=device) for tail in ((sizes[0],), (sizes[-1],), ()))

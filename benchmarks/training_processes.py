@@ -23,14 +23,14 @@ from hobble.core.processors import processor_name
 
 # isort: split
 import torch
+from training import fresh
 
-from hobble.models.pfnn.trainable import untrained_network
 from hobble.training.checkpoint import step_for, use_threads
 from hobble.training.optimiser import Adam, update_for
 from hobble.training.options import Training
 from hobble.training.processes import ALONE, Processes, join_processes
 
-POINTS, SECONDS = 4, 1.0
+SECONDS = 1.0
 LINKS = {
     "10 Gb/s Ethernet": (1.25e9, 30e-6),
     "25 Gb/s": (3.1e9, 20e-6),
@@ -40,7 +40,7 @@ LINKS = {
 
 def measure_step(processes: Processes, sizes: tuple[int, ...], batch: int) -> tuple[float, float]:
     """Seconds of a step, and of the sum in it."""
-    network = untrained_network(sizes, POINTS, 1)
+    network = fresh(sizes)
     adam = Adam(network, 1e-4, 0.9, 0.999, 0.01)
     step = step_for(network, Training(batch=batch))
     step.seed(1)
@@ -110,7 +110,7 @@ def main() -> None:
         for count, (whole, total) in best.items():
             numbers = f"{batch / whole:,.0f} | {best[counts[0]][0] / whole:.2f}"
             print(f"| {batch} | {count} | {numbers} | {1e3 * whole:.2f} | {1e3 * total:.2f} |")
-    on_paper(4 * (len(untrained_network(sizes, POINTS, 1).flat) + 1))
+    on_paper(4 * (len(fresh(sizes).flat) + 1))
 
 
 def on_paper(sent: int) -> None:

@@ -18,8 +18,7 @@ from hobble.core.clip import load_clip
 from hobble.core.errors import InputError
 from hobble.core.files import load_npz, read_json
 from hobble.core.untrusted import read_yaml
-from hobble.models import checks
-from hobble.models.load import load_network
+from hobble.models.load import load_network, read_numbers
 from hobble.motion.skeleton_file import load_skeleton
 from hobble.terrain.heightmaps import heightmaps, read_heights
 from hobble.terrain.options import HeightmapOptions
@@ -82,7 +81,7 @@ def test_arrays_of_one_byte_numbers_are_limited_in_memory(tmp_path: Path) -> Non
     assert path.stat().st_size < MB
     refused(lambda: read_heights(path), "a.npz: 81000000 heights, more than 67108864")
     arrays = {"Xmean": np.zeros(9), "W0": np.zeros((1, side, side), np.int8)}
-    refused(lambda: checks.read_numbers("a.npz", arrays, "W0", 3), "W0 holds 81000000 numbers")
+    refused(lambda: read_numbers("a.npz", arrays, "W0", 3), "W0 holds 81000000 numbers")
 
 
 def test_a_layer_of_the_release_that_is_too_large_is_refused(tmp_path: Path) -> None:

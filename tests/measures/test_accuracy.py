@@ -25,10 +25,9 @@ from hobble.measures.accuracy_run import (
     predict_function,
 )
 from hobble.measures.measure import JointOptions, MeasureInputs
-from hobble.models.checks import NEEDED_ROLES
-from hobble.models.load import load_network
+from hobble.models.forward import phase_shares, weights_at
+from hobble.models.load import NEEDED_ROLES, load_network
 from hobble.models.network import Network
-from hobble.models.pfnn.forward import phase_shares, weights_at
 from hobble.rows.clip_rows import ClipRows, pair_batches, save_clip_rows
 from hobble.rows.layout import RowLayout
 
@@ -123,9 +122,9 @@ def test_a_batched_prediction_equals_rows_predicted_with_blended_weights(tmp_pat
 
 def test_phase_shares_hit_the_control_points_and_sum_to_one():
     np.testing.assert_allclose(
-        phase_shares(np.array([0, 0.25, 0.5, 0.75, 1.0]), 4), np.eye(4)[[0, 1, 2, 3, 0]]
+        phase_shares(np.array([0, 0.25, 0.5, 0.75, 1.0]), np.arange(4)), np.eye(4)[[0, 1, 2, 3, 0]]
     )
-    shares = phase_shares(np.linspace(0, 1, 101), 5)
+    shares = phase_shares(np.linspace(0, 1, 101), np.arange(5))
     np.testing.assert_allclose(shares.sum(axis=1), 1)
     np.testing.assert_allclose(shares[0], shares[-1], atol=1e-12)
 

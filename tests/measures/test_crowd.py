@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from hobble.measures.walks import CrowdTarget, channel_values, generate_walks
-from hobble.models.pfnn.predictor import PfnnPredictor
+from hobble.models.predict import BlendPredictor
 from hobble.runtime.options import Runtime
 
 
@@ -29,13 +29,13 @@ def test_a_figure_walks_the_same_alone_and_in_a_crowd(hurtable) -> None:
 def test_figures_walk_as_one_until_their_targets_differ(hurtable, monkeypatch: pytest.MonkeyPatch) -> None:
     """One character walks for three healthy figures, two for two severities, three for three targets."""
     rows: list[int] = []
-    evaluate = PfnnPredictor.evaluate
+    evaluate = BlendPredictor.evaluate
 
     def counted(self, z, phase, out):  # type: ignore[no-untyped-def]
         rows.append(len(z))
         evaluate(self, z, phase, out)
 
-    monkeypatch.setattr(PfnnPredictor, "evaluate", counted)
+    monkeypatch.setattr(BlendPredictor, "evaluate", counted)
     link = hurtable.channels["injury"][3]
     gait = ["walk"] * 3
     healthy, hurt = (

@@ -10,7 +10,7 @@ import numpy as np
 from hobble.core.skeleton import Skeleton
 from hobble.database.reader import Database
 from hobble.database.write import write_database
-from hobble.models.pfnn.options import PfnnOptions
+from hobble.models.pfnn import PfnnOptions
 from hobble.rows.clip_rows import ClipRows, save_clip_rows
 from hobble.rows.layout import RowLayout
 from hobble.runtime.waypoints import Waypoint

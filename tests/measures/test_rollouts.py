@@ -15,7 +15,6 @@ from hobble.measures.measure import Measure, MeasureInputs, all_measures
 from hobble.measures.rollouts_run import RollOutInputs, inputs_of_clip, measure_roll_outs, roll_out_rows
 from hobble.measures.walks import in_root_coordinates
 from hobble.models.network import Network
-from hobble.models.pfnn.predictor import PfnnPredictor
 from hobble.rows.clip_rows import ClipRows, save_clip_rows
 from hobble.rows.layout import RowLayout
 from hobble.runtime.animation import ProceduralAnimation
@@ -70,7 +69,7 @@ def test_a_roll_out_equals_the_motion_of_the_runtime(hurtable: Network, ground: 
     hurtable = replace(hurtable, x_std=scale, y_std=np.full_like(hurtable.y_std, 0.2))
     inputs, local = recorded(hurtable, 80, ground)
     starts = np.array([1, 2, 17, 40, 79])
-    made, phase = roll_out(PfnnPredictor(hurtable), inputs, starts, 60)
+    made, phase = roll_out(hurtable.predictor(), inputs, starts, 60)
     assert [len(place) for place in made] == [5] + [4] * 39 + [3] * 20
     for age, place in enumerate(made):
         np.testing.assert_allclose(place, local[starts[: len(place)] + age], atol=1e-3)
@@ -78,7 +77,7 @@ def test_a_roll_out_equals_the_motion_of_the_runtime(hurtable: Network, ground: 
     # The pose is its own: a start from another pose stays another for a while.
     other = RollOutInputs(inputs.x.copy(), *list(vars(inputs).values())[1:])
     other.x[1, hurtable.layout.x_joint_position] += 5
-    moved, _ = roll_out(PfnnPredictor(hurtable), other, starts[:1], 2)
+    moved, _ = roll_out(hurtable.predictor(), other, starts[:1], 2)
     assert np.abs(moved[0] - local[1]).max() > 1
 
 
@@ -111,7 +110,7 @@ def clip_rows(network: Network, rows: int, seed: int, gap: int | None = None) ->
 
 def test_short_roll_outs_start_twice_and_long_ones_four_times_within_their_length(hurtable: Network) -> None:
     rows = clip_rows(hurtable, 240, 1, gap=90)
-    found = clip_roll_outs(PfnnPredictor(hurtable), rows, range(31), (1, 10, 20, 100, 200))
+    found = clip_roll_outs(hurtable.predictor(), rows, range(31), (1, 10, 20, 100, 200))
     # Of 90 and 150 frames in a row the first of each starts none.
     assert found[1].frames == 89 + 149
     assert found[10].frames == sum(min(10, n - s) for n in (90, 150) for s in range(1, n, 5))
@@ -129,8 +128,8 @@ def test_after_one_frame_a_pose_is_the_mean_of_prediction_and_extrapolation(hurt
     inputs = inputs_of_clip(rows, np.arange(40), rows.layout)
     layout = hurtable.layout
     np.testing.assert_array_equal(inputs.x[:, layout.x_channel("injury")], rows.channels["injury"])
-    y = PfnnPredictor(hurtable).predict(inputs.x, inputs.phase)
-    made, _ = roll_out(PfnnPredictor(hurtable), inputs, np.arange(1, 40), 1)
+    y = hurtable.predictor().predict(inputs.x, inputs.phase)
+    made, _ = roll_out(hurtable.predictor(), inputs, np.arange(1, 40), 1)
     before = inputs.x[1:, layout.x_joint_position].reshape(39, 31, 3).astype(float)
     a = inputs.turn[:-1, None]
     x, z = before[..., 0] - inputs.velocity[:-1, :1], before[..., 2] - inputs.velocity[:-1, 1:]
@@ -141,7 +140,7 @@ def test_after_one_frame_a_pose_is_the_mean_of_prediction_and_extrapolation(hurt
     guess = y[1:, layout.y_joint_position].reshape(39, 31, 3)
     np.testing.assert_allclose(made[0], (carried + speed + guess) / 2, atol=1e-4)
     truth = inputs.y[1:, layout.y_joint_position].reshape(39, 31, 3)
-    found = clip_roll_outs(PfnnPredictor(hurtable), rows, range(31), (1,))[1].to_dict()
+    found = clip_roll_outs(hurtable.predictor(), rows, range(31), (1,))[1].to_dict()
     assert found["position_error_cm"] == pytest.approx(
         np.linalg.norm(truth - made[0], axis=-1).mean(), rel=1e-5
     )

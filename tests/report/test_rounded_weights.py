@@ -14,7 +14,7 @@ import pytest
 
 from hobble.core.quat import Array
 from hobble.models.network import Network
-from hobble.models.pfnn.network import Pfnn
+from hobble.models.pfnn import Pfnn
 from hobble.report.character import GROUP, round_weights
 from hobble.runtime.animation import ProceduralAnimation
 

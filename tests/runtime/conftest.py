@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from hobble.core.skeleton import Skeleton, forward_kinematics
-from hobble.models.pfnn.network import Pfnn
+from hobble.models.pfnn import Pfnn
 from hobble.rows.layout import RowLayout
 
 MakeNetwork = Callable[..., Pfnn]

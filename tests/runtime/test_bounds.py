@@ -10,8 +10,9 @@ import pytest
 
 from hobble.core.errors import InputError
 from hobble.core.skeleton import Skeleton
-from hobble.models.pfnn.network import Pfnn
-from hobble.models.training_facts import TrainingFacts
+from hobble.models.load import read_facts
+from hobble.models.network import TrainingFacts
+from hobble.models.pfnn import Pfnn
 from hobble.runtime.animation import ProceduralAnimation
 from hobble.runtime.bounds import MARGIN_SHARE, SPEED_MARGIN, Bounds, limit_rows
 
@@ -134,11 +135,11 @@ def test_a_state_that_is_not_finite_restarts_and_warns_once(hurtable, part: str,
 
 def test_the_ranges_of_the_training_data_survive_their_file(network, holden31: Skeleton) -> None:
     seen, sizes = walked(network), (network.layout.x_size, network.layout.y_size)
-    back = TrainingFacts.read("x.npz", seen.arrays(), *sizes)
+    back = read_facts("x.npz", seen.arrays(), *sizes)
     assert back is not None
     for f in fields(seen):
         np.testing.assert_array_equal(getattr(back, f.name), getattr(seen, f.name))
-    assert TrainingFacts.read("x.npz", {}, *sizes) is None
+    assert read_facts("x.npz", {}, *sizes) is None
     for broken in (
         {"Xlow": seen.x_low[1:]},
         {"Yhigh": seen.y_high * np.nan},
@@ -147,8 +148,8 @@ def test_the_ranges_of_the_training_data_survive_their_file(network, holden31: S
         {"start_phase": np.float64(-3)},
     ):
         with pytest.raises(InputError, match=r"x\.npz"):
-            TrainingFacts.read("x.npz", {**seen.arrays(), **broken}, *sizes)
+            read_facts("x.npz", {**seen.arrays(), **broken}, *sizes)
     whole = seen.arrays()
     del whole["start_x"]
     with pytest.raises(InputError, match="start_x"):
-        TrainingFacts.read("x.npz", whole, *sizes)
+        read_facts("x.npz", whole, *sizes)

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hobble.models.checks import STATISTICS
+from hobble.models.load import STATISTICS
 
 
 def test_the_example_of_a_game_loop_runs(

@@ -12,10 +12,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hobble.core.errors import InputError
+from hobble.models.forward import catmull_rom, weights_at
 from hobble.models.load import load_network
 from hobble.models.network import STORAGES, Network
-from hobble.models.pfnn.forward import catmull_rom, weights_at
-from hobble.models.pfnn.predictor import MODES, PfnnPredictor
+from hobble.models.pfnn import OPTIONS
 from hobble.models.pfnn.release import read_release, write_release
 
 ROWS = 7
@@ -68,24 +68,22 @@ def arrays(network: Network) -> dict[str, np.ndarray]:
 def test_spline_weights_follow_the_definition(phase: float, points: int) -> None:
     table = np.random.default_rng(points).normal(size=(points, 3))
     np.testing.assert_allclose(weights_at(table, phase)[0], spline(table, phase), atol=1e-12)
-    assert catmull_rom(phase, points)[1].sum() == pytest.approx(1)
+    assert sum(catmull_rom(phase)) == pytest.approx(1)
 
 
 @pytest.mark.parametrize("points", [4, 6])
 def test_cubic_mode_equals_blending_the_weights_first(make_network, points: int) -> None:
     network = make_network(control_points=points, scale=20.0)
     x, phase = rows(network)
-    np.testing.assert_allclose(
-        PfnnPredictor(network).predict(x, phase), reference(network, x, phase), atol=2e-4
-    )
+    np.testing.assert_allclose(network.predictor().predict(x, phase), reference(network, x, phase), atol=2e-4)
 
 
 @pytest.mark.parametrize("storage", STORAGES)
-@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize("mode", OPTIONS.modes)
 @pytest.mark.parametrize("count", [2, 3, 4, 5, 23])
 def test_a_crowd_equals_single_characters(make_network, mode: str, storage: str, count: int) -> None:
     network = make_network(scale=20.0)
-    predictor = PfnnPredictor(network, mode, storage)
+    predictor = network.predictor(mode, storage)
     x, phase = rows(network, count)
     one_by_one = [predictor.predict(x[i : i + 1], phase[i : i + 1])[0] for i in range(count)]
     np.testing.assert_array_equal(predictor.predict(x, phase), one_by_one)
@@ -94,26 +92,26 @@ def test_a_crowd_equals_single_characters(make_network, mode: str, storage: str,
 def test_modes_approach_the_spline(make_network) -> None:
     network = make_network(scale=20.0)
     x, phase = rows(network, 40)
-    exact = PfnnPredictor(network).predict(x, phase)
-    error = {mode: np.abs(PfnnPredictor(network, mode).predict(x, phase) - exact).mean() for mode in MODES}
+    exact = network.predictor().predict(x, phase)
+    error = {mode: np.abs(network.predictor(mode).predict(x, phase) - exact).mean() for mode in OPTIONS.modes}
     assert 0 < error["linear"] < error["constant"] < 0.05 * np.abs(exact - network.y_mean).max()
     on_table = np.arange(10) / 10
     some = x[:10]
-    at_points = PfnnPredictor(network, "linear").predict(some, on_table)
-    np.testing.assert_allclose(at_points, PfnnPredictor(network).predict(some, on_table), atol=1e-4)
+    at_points = network.predictor("linear").predict(some, on_table)
+    np.testing.assert_allclose(at_points, network.predictor().predict(some, on_table), atol=1e-4)
 
 
 @given(st.floats(-2, 3))
 @settings(max_examples=50, deadline=None)
 def test_no_phase_reads_outside_the_table(phase: float) -> None:
-    from hobble.models.pfnn.predictor import _write_shares
+    from hobble.models.predict import write_phase_shares
 
     for blended, points in ((1, 50), (2, 10), (4, 4)):
         for p in (phase, 1.0, np.nextafter(1.0, 0.0), np.float64(np.float32(0.99999999))):
             # A number on each side, since compiled code does not check that an index is within the array.
             around = np.full(points + 2, 7, np.float32)
             around[1:-1] = 0
-            _write_shares(p, blended, points, around[1:-1])
+            write_phase_shares(blended, np.array([p]), around[None, 1:-1])
             assert around[[0, -1]].tolist() == [7, 7]
             assert around[1:-1].sum() == pytest.approx(1, abs=1e-6)
             assert np.count_nonzero(around[1:-1]) <= blended
@@ -122,7 +120,7 @@ def test_no_phase_reads_outside_the_table(phase: float) -> None:
 def test_phase_one_is_the_last_entry_of_the_constant_table(make_network) -> None:
     network = make_network(scale=20.0)
     x, _ = rows(network, 1)
-    predictor = PfnnPredictor(network, "constant")
+    predictor = network.predictor("constant")
     y = [predictor.predict(x, np.array([p]))[0] for p in (0.0, 0.985, 1.0)]
     np.testing.assert_array_equal(y[1], y[2])
     assert not np.allclose(y[0], y[2], atol=1e-4)
@@ -131,16 +129,14 @@ def test_phase_one_is_the_last_entry_of_the_constant_table(make_network) -> None
 def test_int16_storage_is_close(make_network) -> None:
     network = make_network(scale=20.0)
     x, phase = rows(network)
-    difference = PfnnPredictor(network, storage="int16").predict(x, phase) - PfnnPredictor(network).predict(
-        x, phase
-    )
+    difference = network.predictor(storage="int16").predict(x, phase) - network.predictor().predict(x, phase)
     assert 0 < np.abs(difference).max() < 1e-3 * np.abs(network.y_std * 20).max()
 
 
 def test_a_column_that_never_varied_is_ignored(network: Network) -> None:
     std = network.x_std.copy()
     std[5] = 0
-    blind = PfnnPredictor(replace(network, x_std=std))
+    blind = replace(network, x_std=std).predictor()
     x, phase = rows(network)
     before = blind.predict(x, phase)
     x[:, 5] += 1e6
@@ -149,9 +145,9 @@ def test_a_column_that_never_varied_is_ignored(network: Network) -> None:
 
 def test_an_unknown_mode_or_storage_is_refused(network: Network) -> None:
     with pytest.raises(ValueError, match="constant, linear, cubic"):
-        PfnnPredictor(network, "quadratic")
+        network.predictor("quadratic")
     with pytest.raises(ValueError, match="float32, int16"):
-        PfnnPredictor(network, "cubic", "float8")
+        network.predictor("cubic", "float8")
 
 
 def test_weights_file_round_trip(tmp_path: Path, hurtable: Network, holden31) -> None:
@@ -226,7 +222,7 @@ def test_release_folder_round_trip(tmp_path: Path, network: Network, holden31) -
         np.testing.assert_allclose(a, b, atol=1e-6)
     x, phase = rows(network)
     np.testing.assert_allclose(
-        PfnnPredictor(back).predict(x, phase), PfnnPredictor(network).predict(x, phase), atol=1e-4
+        back.predictor().predict(x, phase), network.predictor().predict(x, phase), atol=1e-4
     )
 
 
@@ -252,8 +248,8 @@ def test_the_released_network_predicts_its_published_rows(shared: Path) -> None:
     network = load_network(shared / "reference" / "pfnn_release_network.npz")
     assert network.sizes == (342, 512, 512, 311)
     assert network.parameter_count == 597_815
-    y = PfnnPredictor(network, "constant").predict(data["X"], data["P"].astype(float))
+    y = network.predictor("constant").predict(data["X"], data["P"].astype(float))
     assert np.abs(y - data["Y_release"]).max() < 1e-3
-    stored = PfnnPredictor(network, "constant", "int16").predict(data["X"], data["P"].astype(float))
+    stored = network.predictor("constant", "int16").predict(data["X"], data["P"].astype(float))
     joints = network.layout.y_joint_position
     assert np.abs(stored - y)[:, joints].max() < 0.01  # 0.1 mm

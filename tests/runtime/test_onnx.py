@@ -13,10 +13,10 @@ import pytest
 
 from hobble.core.errors import InputError
 from hobble.core.skeleton import Skeleton
+from hobble.models.forward import weights_at
 from hobble.models.load import load_network
-from hobble.models.pfnn.forward import weights_at
-from hobble.models.pfnn.onnx_export import OPSET, TOLERANCE, check_onnx, export_onnx, write_checked
-from hobble.models.pfnn.predictor import MODES, PfnnPredictor
+from hobble.models.onnx_file import OPSET, TOLERANCE, check, export, write_checked
+from hobble.models.pfnn import OPTIONS
 from hobble.models.pfnn.release import write_release
 from hobble.rows.layout import RowLayout
 from hobble.runtime.__main__ import main
@@ -28,7 +28,7 @@ def run(path: Path, x: np.ndarray, phase: np.ndarray) -> np.ndarray:
 
 
 @pytest.mark.parametrize("points", [4, 6])
-@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize("mode", OPTIONS.modes)
 def test_onnxruntime_predicts_the_same_as_the_runtime(
     make_network, tmp_path: Path, mode: str, points: int
 ) -> None:
@@ -40,13 +40,13 @@ def test_onnxruntime_predicts_the_same_as_the_runtime(
         # Also before 0 and after 1, and between every two points.
         phase = rng.uniform(-1, 2, rows).astype(np.float32)
         y = run(tmp_path / "network.onnx", x, phase)
-        np.testing.assert_allclose(y, PfnnPredictor(network, mode).predict(x, phase.astype(float)), atol=1e-4)
+        np.testing.assert_allclose(y, network.predictor(mode).predict(x, phase.astype(float)), atol=1e-4)
 
 
 def test_cubic_mode_equals_blending_the_weights_first(make_network, tmp_path: Path) -> None:
     """Weights blended first, in double precision."""
     network = make_network(scale=20.0)
-    export_onnx(tmp_path / "network.onnx", network)
+    export(tmp_path / "network.onnx", network, "cubic")
     x = np.random.default_rng(4).normal(0, 20, (20, network.layout.x_size)).astype(np.float32)
     phase = np.linspace(0, 1, 20, dtype=np.float32)
     y = run(tmp_path / "network.onnx", x, phase)
@@ -61,7 +61,7 @@ def test_cubic_mode_equals_blending_the_weights_first(make_network, tmp_path: Pa
 def test_a_column_that_never_varied_is_ignored(network, tmp_path: Path) -> None:
     std = network.x_std.copy()
     std[5] = 0
-    export_onnx(tmp_path / "network.onnx", replace(network, x_std=std))
+    export(tmp_path / "network.onnx", replace(network, x_std=std), "cubic")
     x = np.zeros((1, network.layout.x_size), np.float32)
     before = run(tmp_path / "network.onnx", x, np.zeros(1))
     x[:, 5] = 1e6
@@ -69,7 +69,7 @@ def test_a_column_that_never_varied_is_ignored(network, tmp_path: Path) -> None:
 
 
 def test_the_file_describes_its_inputs_and_outputs(hurtable, tmp_path: Path) -> None:
-    export_onnx(tmp_path / "network.onnx", hurtable, "linear")
+    export(tmp_path / "network.onnx", hurtable, "linear")
     model = onnx.load(tmp_path / "network.onnx")
     assert [(o.domain, o.version) for o in model.opset_import] == [("", OPSET)]
     shapes = [[d.dim_param or d.dim_value for d in v.type.tensor_type.shape.dim] for v in model.graph.input]
@@ -79,18 +79,18 @@ def test_the_file_describes_its_inputs_and_outputs(hurtable, tmp_path: Path) -> 
     assert RowLayout.from_dict(meta["layout"]) == hurtable.layout
     assert meta["channels"]["injury"] == list(hurtable.channels["injury"])
     assert Skeleton.from_dict(meta["skeleton"]).joints == hurtable.skeleton.joints
-    export_onnx(tmp_path / "again.onnx", hurtable, "linear")
+    export(tmp_path / "again.onnx", hurtable, "linear")
     assert (tmp_path / "again.onnx").read_bytes() == (tmp_path / "network.onnx").read_bytes()
 
 
 def test_the_file_of_another_network_is_detected(make_network, tmp_path: Path) -> None:
     network = make_network(scale=20.0)
-    export_onnx(tmp_path / "network.onnx", network)
+    export(tmp_path / "network.onnx", network, "cubic")
     other = replace(network, biases=tuple(b + np.float32(1e-3) for b in network.biases))
     with pytest.raises(InputError, match=r"network.onnx: onnxruntime and Hobble's runtime differ by"):
-        check_onnx(tmp_path / "network.onnx", other)
+        check(tmp_path / "network.onnx", other, "cubic")
     with pytest.raises(ValueError, match="not one of constant, linear, cubic"):
-        export_onnx(tmp_path / "other.onnx", network, "quadratic")
+        export(tmp_path / "other.onnx", network, "quadratic")
 
 
 def test_the_command_exports_onnx(
@@ -119,7 +119,7 @@ def test_the_released_network_is_exported_exactly(shared: Path, tmp_path: Path) 
     network = load_network(shared / "reference" / "pfnn_release_network.npz")
     x, phase = data["X"][::20].astype(np.float32), data["P"][::20].astype(np.float32)
     for mode in ("cubic", "constant"):
-        export_onnx(tmp_path / "network.onnx", network, mode)
+        export(tmp_path / "network.onnx", network, mode)
         y = run(tmp_path / "network.onnx", x, phase)
-        assert np.abs(y - PfnnPredictor(network, mode).predict(x, phase.astype(float))).max() < 1e-4
+        assert np.abs(y - network.predictor(mode).predict(x, phase.astype(float))).max() < 1e-4
     assert np.abs(y - data["Y_release"][::20]).max() < 1e-3

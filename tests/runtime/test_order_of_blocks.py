@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hobble.models.pfnn.network import Pfnn
+from hobble.models.pfnn import Pfnn
 from hobble.rows.layout import RowLayout, compose, frame_inputs
 from hobble.runtime.animation import ProceduralAnimation
 

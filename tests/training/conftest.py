@@ -13,7 +13,7 @@ import torch
 from hobble.core.skeleton import Skeleton
 from hobble.database.reader import Database
 from hobble.database.write import merge_shards, write_shard
-from hobble.models.pfnn.options import PfnnOptions
+from hobble.models.pfnn import PfnnOptions
 from hobble.rows.clip_rows import ClipRows
 from hobble.rows.layout import RowLayout
 from hobble.training.optimiser import Update

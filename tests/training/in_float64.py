@@ -17,7 +17,7 @@ import torch
 
 from hobble.database.reader import Database
 from hobble.models import network_options
-from hobble.models.trainable import Trainable
+from hobble.models.model import Trainable
 from hobble.training import train as module
 from hobble.training.augment import OtherPoses, RollOut
 from hobble.training.batches import HostRows, SampleBatch

@@ -13,7 +13,7 @@ from hobble.core.skeleton import Skeleton
 from hobble.database.reader import Database
 from hobble.database.write import write_database
 from hobble.models.load import load_network
-from hobble.models.matching.options import MatchingOptions
+from hobble.models.matching import MatchingOptions
 from hobble.rows.clip_rows import save_clip_rows
 from hobble.training.options import Training
 from hobble.training.run import run

@@ -5,18 +5,17 @@ from __future__ import annotations
 import pytest
 import torch
 
-from hobble.models.pfnn.trainable import untrained_network
 from hobble.training import optimiser
 from hobble.training.optimiser import Adam
+from tests.models.definition import fresh
 
 
-@pytest.mark.parametrize("dtype", [torch.float32, torch.bfloat16])
-def test_the_compiled_adam_equals_the_plain_one(dtype: torch.dtype) -> None:
-    networks = [untrained_network((40, 30, 20), 4, 1) for _ in range(2)]
+def test_the_compiled_adam_equals_the_plain_one() -> None:
+    networks = [fresh((40, 30, 20)) for _ in range(2)]
     generator = torch.Generator().manual_seed(1)
     adams = [Adam(network, 0.01, 0.9, 0.999, 0.1) for network in networks]
     for share in (0.2, 0.6, 1.0, 0.7, 0.0):
-        gradients = [torch.randn(layer.shape, generator=generator).to(dtype) for layer in networks[0].layers]
+        gradients = [torch.randn(layer.shape, generator=generator) for layer in networks[0].layers]
         adams[0].step(gradients, share)
         adams[1].steps += 1
         adams[1].step_with_torch(gradients, torch.tensor(adams[1].step_factors(share)))
@@ -25,7 +24,7 @@ def test_the_compiled_adam_equals_the_plain_one(dtype: torch.dtype) -> None:
 
 
 def test_only_the_l1_term_moves_weights_that_have_no_gradient() -> None:
-    network = untrained_network((8, 6, 4), 4, 1)
+    network = fresh((8, 6, 4))
     network.layers[0][0, 0, 0] = 0.0
     before = network.flat.clone()
     adam = Adam(network, 0.001, 0.9, 0.999, 0.01)
@@ -40,6 +39,6 @@ def test_only_the_l1_term_moves_weights_that_have_no_gradient() -> None:
 
 def test_the_share_of_a_layer_in_the_l1_term() -> None:
     """.01 * mean|W| / 6 for three layers, because the original divides by its six arrays."""
-    network = untrained_network((342, 512, 512, 311), 4, 1)
+    network = fresh((342, 512, 512, 311))
     slopes = optimiser.l1_slopes(network, 0.01)
     assert slopes == pytest.approx([0.01 / 6 / (4 * n) for n in (342 * 512, 512 * 512, 512 * 311)])

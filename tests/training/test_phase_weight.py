@@ -9,8 +9,8 @@ import pytest
 import torch
 
 from hobble.database.reader import Database
-from hobble.models.pfnn.forward import forward
-from hobble.models.pfnn.options import PfnnOptions
+from hobble.models.forward import forward, phase_shares
+from hobble.models.pfnn import PfnnOptions
 from hobble.training import run as stage
 from hobble.training.batches import HeldOutErrors
 from training.conftest import Recipe
@@ -51,7 +51,7 @@ def test_held_out_errors_do_not_depend_on_the_weight(data: Database) -> None:
 def test_the_file_has_the_phase_in_its_own_unit(
     small_database: Path, network: PfnnOptions, training: Recipe, tmp_path: Path
 ) -> None:
-    weights = tmp_path / "weights.npz"
+    file = tmp_path / "weights.npz"
     stage.run(
         small_database,
         configuration="test",
@@ -61,15 +61,16 @@ def test_the_file_has_the_phase_in_its_own_unit(
         threads=1,
         start=None,
         code=None,
-        weights=weights,
+        weights=file,
         history=tmp_path / "history.csv",
         checkpoint=tmp_path / "checkpoint.npz",
     )
     data = Database.open(small_database)
     s, at = data.statistics, data.layout.y_phase_change.start
     rows = next(data.blocks("train", 0, 0, 1, 1, block_rows=10_000))
-    with np.load(weights) as made:
-        found = forward([made[f"W{i}"] for i in range(3)], [made[f"b{i}"] for i in range(3)], rows.x, rows.p)
+    with np.load(file) as made:
+        weights, biases = ([made[f"{letter}{i}"] for i in range(3)] for letter in "Wb")
+        found = forward(weights, biases, phase_shares(rows.p, np.arange(4)), rows.x)
         change = (found * made["Ystd"] + made["Ymean"])[:, at]
     wanted = rows.y[:, at] * s.y_std[at] + s.y_mean[at]
     assert np.mean((change - wanted) ** 2) < 0.2 * wanted.var()

@@ -12,14 +12,13 @@ import torch
 
 from hobble.database.reader import Database
 from hobble.measures.rollouts_run import RollOutInputs
-from hobble.models.pfnn.fused import FusedPfnnStep
-from hobble.models.pfnn.step import PfnnStep
-from hobble.models.pfnn.trainable import untrained_network
+from hobble.models.step import AutogradStep, FusedStep
 from hobble.training.augment import RollOut
 from hobble.training.batches import HostRows
 from hobble.training.optimiser import Update
 from hobble.training.train import train
 from tests.measures.whole_roll_outs import roll_out
+from tests.models.definition import fresh
 
 CPU = torch.device("cpu")
 FRAMES, STARTS = 5, 9
@@ -147,9 +146,9 @@ def test_training_uses_the_roll_outs(
     assert number == len(given) == 8
 
 
-@pytest.mark.parametrize("kind", [PfnnStep, FusedPfnnStep])
-def test_the_training_step_keeps_its_errors_for_the_roll_out(kind: type[PfnnStep]) -> None:
-    network = untrained_network((6, 5, 4), 4, 1)
+@pytest.mark.parametrize("kind", [AutogradStep, FusedStep])
+def test_the_training_step_keeps_its_errors_for_the_roll_out(kind: type[AutogradStep]) -> None:
+    network = fresh((6, 5, 4))
     generator = torch.Generator().manual_seed(1)
     x, y = (torch.randn(7, n, generator=generator) for n in (6, 4))
     p = torch.rand(7, generator=generator)

@@ -13,11 +13,10 @@ from hobble.core.errors import HobbleError
 from hobble.core.skeleton import Skeleton
 from hobble.database.reader import Database
 from hobble.database.write import write_database
-from hobble.models.mann.options import MannOptions
-from hobble.models.options import Options
-from hobble.models.pfnn.options import PfnnOptions
-from hobble.models.plain.options import PlainOptions
-from hobble.models.trainable import Trainable
+from hobble.models.mann import MannOptions
+from hobble.models.model import Options, Trainable
+from hobble.models.pfnn import PfnnOptions
+from hobble.models.plain import PlainOptions
 from hobble.rows.layout import mirror_of_x, mirror_of_y
 from hobble.training.checkpoint import new_state
 from hobble.training.optimiser import Symmetry

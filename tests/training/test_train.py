@@ -16,11 +16,11 @@ from hobble.core import files
 from hobble.core.errors import HobbleError, InputError
 from hobble.database.reader import Block, Database
 from hobble.database.write import write_database
-from hobble.models.pfnn.trainable import untrained_network
 from hobble.training import checkpoint, train
 from hobble.training.batches import HeldOutErrors, HostRows
 from hobble.training.checkpoint import State, columns, write_history
 from hobble.training.device_rows import DeviceRows, gpu_has_room, rows_on_device_or_host
+from tests.models.definition import fresh
 
 from .conftest import SPLITS, clip_rows
 
@@ -144,7 +144,7 @@ def test_without_held_out_clips_the_errors_are_left_empty(
 def test_a_sample_of_all_held_out_rows_has_their_error(
     data: Database, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    network = untrained_network((data.layout.x_size, 8, data.layout.y_size), 4, 1)
+    network = fresh((data.layout.x_size, 8, data.layout.y_size))
     held_out = HeldOutErrors(data, torch.device("cpu"), 0)
     assert sum(len(part[0]) for part in held_out.sample) == 70
     assert held_out.errors(network) == held_out.errors_on_every_row(network)
@@ -237,7 +237,7 @@ def test_bfloat16_is_chosen_where_a_device_has_it(
         return including_emulation or major >= 8
 
     monkeypatch.setattr(torch.cuda, "is_bf16_supported", supported)
-    network = untrained_network((4, 3, 2), 4, 1).to("meta")
+    network = fresh((4, 3, 2)).to("meta")
     monkeypatch.setattr(type(network), "step", lambda self, dropout, half: half)
     assert checkpoint.step_for(network, training | {"batch": 256}) is half
 

@@ -8,10 +8,9 @@ from typing import Any
 import pytest
 import torch
 
-from hobble.models.pfnn.fused import FusedPfnnStep
-from hobble.models.pfnn.step import PfnnStep
-from hobble.models.pfnn.trainable import untrained_network
+from hobble.models.step import AutogradStep, FusedStep
 from hobble.training.optimiser import Adam, CapturedUpdate, Update, update_for
+from tests.models.definition import fresh
 
 ROWS = 12
 
@@ -52,9 +51,9 @@ def cuda(monkeypatch: pytest.MonkeyPatch) -> None:
 def updates() -> tuple[Update, CapturedUpdate]:
     made: list[Update] = []
     for kind in (Update, CapturedUpdate):
-        network = untrained_network((8, 7, 7, 5), 4, 1)
+        network = fresh((8, 7, 7, 5))
         adam = Adam(network, 0.01, 0.9, 0.999, 0.01)
-        step = PfnnStep(network, 0.3)
+        step = AutogradStep(network, 0.3)
         made.append(kind(step, adam, ROWS) if kind is CapturedUpdate else kind(step, adam))
         step.seed(3)
     plain, captured = made
@@ -87,5 +86,5 @@ def test_a_captured_cuda_update_equals_the_plain_one() -> None:
 
 
 def test_nothing_is_captured_on_a_cpu() -> None:
-    network = untrained_network((8, 7, 5), 4, 1)
-    assert type(update_for(FusedPfnnStep(network, 0.3), Adam(network, 0.01, 0.9, 0.999, 0.0), 32)) is Update
+    network = fresh((8, 7, 5))
+    assert type(update_for(FusedStep(network, 0.3), Adam(network, 0.01, 0.9, 0.999, 0.0), 32)) is Update

@@ -14,9 +14,8 @@ from hobble.core.errors import HobbleError
 from hobble.core.files import load_npz
 from hobble.core.skeleton import Skeleton
 from hobble.database.reader import Database
-from hobble.models import model_of_kind
-from hobble.models.pfnn.options import PfnnOptions
-from hobble.models.training_facts import TrainingFacts
+from hobble.models.network import TrainingFacts
+from hobble.models.pfnn import PfnnOptions
 from hobble.rows.layout import CONTACTS, GAITS, RowLayout
 from hobble.training.run import write_weights
 
@@ -30,7 +29,7 @@ def data(small_database: Path) -> Database:
 
 def write(path: Path, data: Database, seed: int = 1) -> dict[str, np.ndarray]:
     """Write an untrained network, and return the expected arrays."""
-    made = model_of_kind("pfnn").untrained_network(PfnnOptions(units=6), data.layout, figure(), seed)
+    made = PfnnOptions(units=6).untrained_network(data.layout, figure(), seed)
     write_weights(path, made, data, "mine", {"passes": 3})
     return {name: np.array(array) for name, array in made.arrays().items()}
 

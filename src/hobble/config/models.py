@@ -10,8 +10,8 @@ from pydantic import AfterValidator, Field, create_model, field_validator, model
 from hobble.channels import CHANNEL_NAMES, all_channels, channel
 from hobble.config import sections as s
 from hobble.core.clip_files import CLIP_NAME_RULE, is_valid_clip_name
-from hobble.models import DEFAULT_KIND, model_of_kind
-from hobble.models.options import Options
+from hobble.models import DEFAULT_KIND, options_of_kind
+from hobble.models.model import Options
 
 
 def _check_clip_name(name: str) -> str:
@@ -164,9 +164,8 @@ class Configuration(s.Section):
     network_of: Name | None = Field(
         None, description="use the network of this other configuration instead of training one"
     )
-    network: Options = model_of_kind(
-        DEFAULT_KIND
-    ).options_class()()  # for other kinds of network, see `configuration_of`
+    # For other kinds of network, see `configuration_of`.
+    network: Options = options_of_kind(DEFAULT_KIND)()
     training: s.Training = s.Training()
     runtime: s.Runtime = s.Runtime()
     evaluation: s.Evaluation = s.Evaluation()
@@ -193,7 +192,7 @@ def configuration_of(kind: str) -> type[Configuration]:
 
     kind: one of `hobble.models.NETWORK_KINDS`.
     """
-    options = model_of_kind(kind).options_class()
+    options = options_of_kind(kind)
     return create_model("Configuration", __base__=Configuration, network=(options, options()))
 
 

@@ -15,7 +15,7 @@ from hobble.core import quat
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 from hobble.figure.mesh import Mesh, body_mesh
-from hobble.models.packing import to_base64
+from hobble.models.network import to_base64
 
 UNIT = 0.01  # cm; positions of corners are stored as multiples of this
 TURN = 32767  # the integer that stands for 1 in packed rotations

@@ -11,24 +11,19 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from hobble.models.model import Model
-
 if TYPE_CHECKING:
-    from hobble.models.options import Options
+    from hobble.models.model import Options
 
 # The values of `network.kind` in a configuration.
 NETWORK_KINDS = tuple(sorted(path.parent.name for path in Path(__file__).parent.glob("*/__init__.py")))
 DEFAULT_KIND = "pfnn"  # the kind of network where a configuration or a network's file names no kind
 
 
-def model_of_kind(kind: str) -> Model:
-    """The `Model` of the kind named `kind`, one of NETWORK_KINDS."""
-    return importlib.import_module(f"hobble.models.{kind}").MODEL
+def options_of_kind(kind: str) -> type[Options]:
+    """The class of options of the kind named `kind`, one of NETWORK_KINDS. They say all about the kind."""
+    return importlib.import_module(f"hobble.models.{kind}").OPTIONS
 
 
 def network_options(section: Mapping[str, Any]) -> Options:
-    """A configuration's section `network`, checked and turned into its kind's subclass of `Options`.
-
-    The function is not called `options`, because a module of this package has that name.
-    """
-    return model_of_kind(section.get("kind", DEFAULT_KIND)).options_class().model_validate(section)
+    """A configuration's section `network`, checked and turned into its kind's subclass of `Options`."""
+    return options_of_kind(section.get("kind", DEFAULT_KIND)).model_validate(section)

@@ -1,7 +1,7 @@
 // Layers of a network. Each layer has K sets of weights. Its output is the sum of the outputs of the sets, each multiplied by the
 // share of its set. An ELU follows each layer except the last.
 // The page contains weights as integers, with factors to multiply them by. 16-bit weights come from `packed_rows` of
-// `hobble.models.packing`, with a factor for each row. 8-bit weights come from `hobble.report.rounded_weights`, with a factor for
+// `hobble.models.network`, with a factor for each row. 8-bit weights come from `hobble.report.rounded_weights`, with a factor for
 // each group of columns.
 import { bytes } from "../report/web/numbers.js";
 

@@ -1,12 +1,16 @@
-"""The interface of networks of any kind that are ready to run, for the runtime, measurements and report."""
+"""The interface of networks of any kind that are ready to run, for the runtime, measurements and report.
+
+Also facts about the training data, which a network carries with it, and the packing of arrays for the page.
+"""
 
 from __future__ import annotations
 
+import base64
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, ClassVar, Protocol
+from typing import Any, ClassVar, Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,8 +19,7 @@ from hobble.channels.speed_limits import Limits
 from hobble.core.errors import HobbleError
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
-from hobble.models.training_facts import TrainingFacts
-from hobble.rows.layout import GAITS, RowLayout
+from hobble.rows.layout import GAITS, RowLayout, compose
 
 # The inputs include heights of the ground on the character's path and on both sides of it. The sides are at
 # this distance (cm) from the path, unless the network's file gives another distance.
@@ -51,6 +54,108 @@ class Predictor(Protocol):
 
     def predict(self, x: Array, phase: Array, out: Array | None = None) -> Array:
         """Y (C, Y) float32 of X (C, X) float32 at phases (C,): `standardise`, then `evaluate`."""
+
+
+# Name in the network's file -> field of `TrainingFacts`, for the fields with a number for each column.
+FACTS = {
+    "Xlow": "x_low",
+    "Xhigh": "x_high",
+    "Ylow": "y_low",
+    "Yhigh": "y_high",
+    "start_x": "start_x",
+    "start_y": "start_y",
+}
+MOVES = 1e9  # added to a squared distance; larger than the squared distance of any row
+STANDING_GAIT = 0.99  # a row with at least this share of the gait "stand" counts as standing
+# If the mean of the gait "stand" over all rows is higher than this, a character starts from a standing row.
+# Otherwise it starts from the row nearest to the mean of all rows.
+MIN_STANDING_SHARE = 0.005
+
+
+@dataclass(frozen=True)
+class TrainingFacts:
+    """Facts about the training rows, in raw units; the arrays are float32.
+
+    x_low, x_high (X,), y_low, y_high (Y,): smallest and largest value of each column. start_x (X,), start_y
+    (Y,), start_phase: the row from which a character starts. It is the standing row with the least movement,
+    or the row nearest to the mean if standing is rare. fastest: largest speed of any joint in any row, cm a
+    frame.
+    """
+
+    x_low: Array = field(repr=False)
+    x_high: Array = field(repr=False)
+    y_low: Array = field(repr=False)
+    y_high: Array = field(repr=False)
+    start_x: Array = field(repr=False)
+    start_y: Array = field(repr=False)
+    start_phase: float
+    fastest: float
+
+    def arrays(self) -> dict[str, Array]:
+        """Name -> array, for the network's file."""
+        columns = {name: getattr(self, key) for name, key in FACTS.items()}
+        return {**columns, "start_phase": np.float64(self.start_phase), "fastest": np.float64(self.fastest)}
+
+    @classmethod
+    def from_rows(cls, layout: RowLayout, parts: Iterable[Any], statistics: Any) -> TrainingFacts:
+        """The facts about all rows.
+
+        parts: the rows, in blocks (`UncomposedRows` in `hobble.database.reader`). statistics: means and
+        standard deviations of their columns (x_mean, x_std, y_mean, y_std).
+
+        A row is stored without ground, and with several fits: terrains that can lie under it. Only the ground
+        and the heights of joints above it depend on the fit. So for the ranges, a row is composed only with
+        its extreme fits, the lowest and the highest in each column. The start row is composed with its first
+        fit.
+        """
+        # The column of the gait "stand" at the middle of the trajectory, which is the present frame.
+        stand = layout.x_gait.start + GAITS.index("stand") * layout.samples + layout.samples // 2
+        often_stands = statistics.x_mean[stand] > MIN_STANDING_SHARE
+        body = np.r_[layout.x_position, layout.x_direction, layout.x_joint_position, layout.x_joint_velocity]
+        low, high = (np.inf, np.inf), (-np.inf, -np.inf)
+        nearest, start, fastest = np.inf, None, 0.0
+        for part in parts:
+            least, most = (f.reduceat(part.fits, part.first_fit, axis=0) for f in (np.minimum, np.maximum))
+            # The last column of a fit, its lift, is subtracted from the heights of joints. So the heights are
+            # lowest with the highest lift.
+            rows = _raw(layout, part, least[:, :-1], most[:, -1:], statistics)
+            low = tuple(np.minimum(a, values.min(axis=0)) for a, values in zip(low, rows, strict=True))
+            rows = _raw(layout, part, most[:, :-1], least[:, -1:], statistics)
+            high = tuple(np.maximum(a, values.max(axis=0)) for a, values in zip(high, rows, strict=True))
+            first_fit = part.fits[part.first_fit]
+            x, y = _raw(layout, part, first_fit[:, :-1], first_fit[:, -1:], statistics)
+            speed = np.linalg.norm(y[:, layout.y_joint_velocity].reshape(len(y), -1, 3), axis=-1)
+            fastest = max(fastest, float(speed.max()))
+            # `distance`: how far each row is from the ideal start row.
+            if often_stands:  # ideal: no movement, neither of the root along its path nor of any joint
+                along_path = np.square(x[:, layout.x_position]).sum(axis=1, dtype=float)
+                distance = along_path + np.square(speed).sum(axis=1, dtype=float)
+                # A row that does not stand is taken only if no row stands.
+                distance = np.where(x[:, stand] >= STANDING_GAIT, distance, distance + MOVES)
+            else:  # ideal: the mean of all rows
+                mean, std = statistics.x_mean[body], statistics.x_std[body]
+                distance = np.square((x[:, body] - mean) / std).mean(axis=1)
+            row = int(distance.argmin())
+            if start is None or distance[row] < nearest:
+                nearest, start = float(distance[row]), (x[row], y[row], float(part.p[row]))
+        assert start is not None, "a database has rows"
+        arrays = (low[0], high[0], low[1], high[1], *start[:2])
+        columns: dict[str, Any] = {
+            key: np.asarray(a, np.float32) for key, a in zip(FACTS.values(), arrays, strict=True)
+        }
+        return cls(**columns, start_phase=start[2], fastest=fastest)
+
+
+def _raw(layout: RowLayout, part: Any, ground: Array, lift: Array, statistics: Any) -> tuple[Array, Array]:
+    """x (n, X) and y (n, Y) in raw units, with a terrain under each row.
+
+    part: n rows. ground: (n, m) heights of the terrain. lift: (n, 1) cm by which the joints are lowered.
+    statistics: means and standard deviations of the columns.
+    """
+    x, y = np.empty((len(part.x), layout.x_size), np.float32), part.y.copy()
+    s = statistics
+    compose(layout, part.x, ground, lift, x, y, s.x_std, s.y_std)
+    return x * s.x_std + s.x_mean, y * s.y_std + s.y_mean
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -116,6 +221,21 @@ class Network(ABC):
         if wanted not in cls.modes:
             raise ValueError(f"mode {wanted!r}: not one of {', '.join(cls.modes)}")
         return wanted
+
+    @classmethod
+    @abstractmethod
+    def read(cls, path: str | Path, arrays: Mapping[str, Any], shared_fields: Mapping[str, Any]) -> Self:
+        """The network of a file.
+
+        path: the file, for error messages. arrays: those of the file, by name, as `FinishedNetwork.arrays`
+        returned them. shared_fields: the fields of `Network`, by name, already checked. Raises InputError for
+        arrays that make no network; `hobble.models.load` has functions for these checks.
+        """
+
+    @classmethod
+    def read_folder(cls, folder: Path) -> Mapping[str, Array] | None:
+        """The arrays of a folder in another program's format; None if it holds no network of this kind."""
+        return None
 
     @property
     @abstractmethod
@@ -184,3 +304,41 @@ def standardise_inputs(network: Network, x: Array) -> Array:
 def inverse_or_0(std: Array) -> Array:
     """1 / std, and 0 for a column that never varied, to avoid a division by 0."""
     return np.where(std > 0, 1 / np.maximum(std, 1e-30), 0)
+
+
+def to_base64(array: NDArray[Any]) -> str:
+    """The little-endian bytes of an array as base64."""
+    array = np.ascontiguousarray(array)
+    return base64.b64encode(array.astype(array.dtype.newbyteorder("<")).tobytes()).decode("ascii")
+
+
+def pack_layer(weights: Array, biases: Array) -> dict[str, Any]:
+    """Weights (K, out, in) as integers of -32767..32767, with a factor for each row, and biases (K, out).
+
+    In the result, points: K. rows: out. columns: in. scale: (K, out) factors of the integers. weights, scale
+    and biases are text from `to_base64`.
+    """
+    # The factor of a row of zeros must not be 0, because the weights are divided by it.
+    scale = np.maximum(np.abs(weights).max(axis=-1) / 32767, 1e-30).astype(np.float32)
+    return {
+        "points": weights.shape[0],
+        "rows": weights.shape[1],
+        "columns": weights.shape[2],
+        "weights": to_base64(np.round(weights / scale[..., None]).astype(np.int16)),
+        "scale": to_base64(scale),
+        "biases": to_base64(biases.astype(np.float32)),
+    }
+
+
+def pack_table(table: Array) -> dict[str, Any]:
+    """A table (R, columns) as integers of -32767..32767 with a factor for each column.
+
+    In the result, rows: R. values: the integers, and scale: the factors (columns,), as text from `to_base64`.
+    """
+    scale = np.maximum(np.abs(table).max(axis=0) / 32767, 1e-30).astype(np.float32)
+    return {
+        "rows": table.shape[0],
+        "columns": table.shape[1],
+        "values": to_base64(np.round(table / scale).astype(np.int16)),
+        "scale": to_base64(scale),
+    }

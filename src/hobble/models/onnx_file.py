@@ -1,4 +1,4 @@
-"""Writes a network as one ONNX file and checks it. The graph contains the standardisation.
+"""Writes a blended stack as one ONNX file and checks it. The graph contains the standardisation.
 
 The inputs are `x` (batch, X) and `phase` (batch,) in cycles, the output is `y` (batch, Y). All are float32, x
 and y are in raw units, and a batch may have any size. Networks that ignore the phase have this second input,
@@ -9,15 +9,18 @@ too, so that all files are called in the same way. Only this module needs the on
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from hobble.core.errors import HobbleError, InputError
 from hobble.core.files import atomic_path
-from hobble.models.network import Network, inverse_or_0
+from hobble.core.quat import Array
+from hobble.models.network import inverse_or_0
+
+if TYPE_CHECKING:
+    from hobble.models.blend import BlendedNetwork
 
 OPSET = 15  # version of the ONNX operators
 # Largest allowed difference from Hobble's runtime, in units of Y; relative for values above 1.
@@ -25,67 +28,118 @@ TOLERANCE = 1e-4
 CHECKED_ROWS = 64  # a file is checked with this many random rows of X
 
 
+class Node(str):
+    """The name of a node's output or of a constant in a `Graph`. Arithmetic with it adds nodes."""
+
+    graph: Graph
+
+    def __add__(self, other: Any) -> Node:  # type: ignore[override]
+        return self.graph("Add", self, other)
+
+    def __sub__(self, other: Any) -> Node:
+        return self.graph("Sub", self, other)
+
+    def __rsub__(self, other: Any) -> Node:
+        return self.graph("Sub", other, self)
+
+    def __mul__(self, other: Any) -> Node:  # type: ignore[override]
+        return self.graph("Mul", self, other)
+
+    def __rmul__(self, other: Any) -> Node:  # type: ignore[override]
+        return self.graph("Mul", other, self)
+
+    def __truediv__(self, other: Any) -> Node:
+        return self.graph("Div", self, other)
+
+
 class Graph:
-    """Collects the nodes and constants of an ONNX graph and gives each a unique name.
+    """Collects the nodes and constants of an ONNX graph and gives each a unique name. A call adds a node."""
 
-    A call adds a node. helper, numpy_helper: modules of onnx.
-    """
-
-    def __init__(self, helper: Any, numpy_helper: Any) -> None:
-        self.helper, self.numpy_helper = helper, numpy_helper
+    def __init__(self) -> None:
         self.nodes: list[Any] = []
         self.constants: list[Any] = []
 
-    def constant(self, value: Any, dtype: Any = np.float32) -> str:
-        """Add a constant; returns its name."""
-        name = f"c{len(self.constants)}"
-        array = np.ascontiguousarray(value, dtype).reshape(np.shape(value))
-        self.constants.append(self.numpy_helper.from_array(array, name))
-        return name
+    def named(self, name: str) -> Node:
+        """The node with the name `name`, such as an input."""
+        node = Node(name)
+        node.graph = self
+        return node
 
-    def __call__(self, op: str, *inputs: str, output: str = "", **attributes: Any) -> str:
-        """Add a node with the ONNX operator `op`; returns the name of its output.
+    def __call__(self, op: str, *inputs: Any, output: str = "", **attributes: Any) -> Node:
+        """Add a node with the ONNX operator `op`; returns its output.
 
-        inputs: names of other outputs or constants. output: its name, by default a new one.
+        inputs: other nodes, numbers, lists or arrays. Lists and arrays of whole numbers become int64
+        constants, all else float32. output: its name, by default a new one.
         """
+        from onnx import helper
+
         output = output or f"n{len(self.nodes)}"
-        self.nodes.append(self.helper.make_node(op, inputs, [output], **attributes))
-        return output
+        names = [given if isinstance(given, Node) else self._constant(given) for given in inputs]
+        self.nodes.append(helper.make_node(op, names, [output], **attributes))
+        return self.named(output)
+
+    def _constant(self, value: Any) -> Node:
+        from onnx import numpy_helper
+
+        array = np.asarray(value)
+        is_whole = array.dtype.kind == "i" and array.ndim > 0
+        array = np.array(array, np.int64 if is_whole else np.float32, order="C")
+        self.constants.append(numpy_helper.from_array(array, f"c{len(self.constants)}"))
+        return self.named(self.constants[-1].name)
 
 
-Body = Callable[[Graph, str], str]  # adds the nodes of a network; see `export`
+def add_layers(
+    g: Graph,
+    weights: tuple[Array, ...],
+    biases: tuple[Array, ...],
+    h: Node,
+    share: Node | None = None,
+    index: Node | None = None,
+) -> Node:
+    """Add the nodes of layers with an ELU between them; returns the outputs of the last one.
+
+    weights: (K, out, in) of each layer. biases: (K, out) of each. h: the inputs. index: (batch, n) numbers of
+    the sets to blend; None: all. share: (batch, n) their shares; None: there is one set.
+    """
+    for number, (weight, bias) in enumerate(zip(weights, biases, strict=True)):
+        h = g("Elu", h) if number else h
+        sets, outputs, inputs = weight.shape
+        if share is None:
+            h = g("MatMul", h, weight[0].T) + bias[0]
+            continue
+        if index is None:  # one product for all sets side by side
+            each = g("MatMul", h, weight.reshape(sets * outputs, inputs).T)
+            each = g("Reshape", each, [-1, sets, outputs]) + bias
+        else:
+            each = g("MatMul", g("Gather", weight, index), g("Unsqueeze", h, [1, 3]))
+            each = g("Squeeze", each, [3]) + g("Gather", bias, index)
+        h = g("ReduceSum", each * g("Unsqueeze", share, [2]), [1], keepdims=0)
+    return h
 
 
-def export(path: str | Path, network: Network, mode: str, body: Body) -> None:
+def export(path: str | Path, network: BlendedNetwork, mode: str) -> None:
     """Write the network, with a metadata entry `hobble` that describes columns, skeleton and channels.
 
-    body: adds the nodes of the network to the graph. It gets the graph and the name of the standardised
-    inputs, and returns the name of the standardised outputs. The phases have the name "phase". Raises
-    HobbleError if onnx is not installed.
+    Raises HobbleError if onnx is not installed, ValueError for an unknown mode.
     """
     try:
         import onnx
-        from onnx import TensorProto, helper, numpy_helper
+        from onnx import TensorProto, helper
     except ImportError as error:
         raise HobbleError('onnx is not installed: pip install "hobble[onnx]"') from error
-    g = Graph(helper, numpy_helper)
-    z = g("Sub", "x", g.constant(network.x_mean))
-    z = g("Mul", z, g.constant(inverse_or_0(network.x_std)))
-    h = body(g, z)
-    g("Add", g("Mul", h, g.constant(network.y_std)), g.constant(network.y_mean), output="y")
-    columns_of: tuple[tuple[str, list[int]], ...] = (
-        ("x", [len(network.x_mean)]),
-        ("phase", []),
-        ("y", [len(network.y_mean)]),
-    )
-    inputs_and_output = [
+    g = Graph()
+    weights, biases, _ = network.prepare(mode)
+    z = (g.named("x") - network.x_mean) * inverse_or_0(network.x_std)
+    index, share = network.onnx_shares(g, z, mode)
+    h = add_layers(g, weights, biases, network.onnx_extended(g, z), share, index)
+    g("Add", h * network.y_std, network.y_mean, output="y")
+    x, phase, y = (
         helper.make_tensor_value_info(name, TensorProto.FLOAT, ["batch", *sizes])
-        for name, sizes in columns_of
-    ]
-    graph = helper.make_graph(g.nodes, "hobble", inputs_and_output[:2], inputs_and_output[2:], g.constants)
+        for name, sizes in (("x", [len(network.x_mean)]), ("phase", []), ("y", [len(network.y_mean)]))
+    )
     opset = helper.make_opsetid("", OPSET)
     model = helper.make_model(
-        graph,
+        helper.make_graph(g.nodes, "hobble", [x, phase], [y], g.constants),
         opset_imports=[opset],
         producer_name="hobble",
         ir_version=helper.find_min_ir_version_for([opset]),
@@ -96,7 +150,7 @@ def export(path: str | Path, network: Network, mode: str, body: Body) -> None:
         temporary.write_bytes(model.SerializeToString(deterministic=True))
 
 
-def check(path: str | Path, network: Network, mode: str) -> float:
+def check(path: str | Path, network: BlendedNetwork, mode: str) -> float:
     """Run the file in onnxruntime and the network in Hobble's runtime; return the largest difference of Y.
 
     Both get CHECKED_ROWS random rows. The difference is relative for values of Y above 1. Raises InputError
@@ -123,14 +177,14 @@ def check(path: str | Path, network: Network, mode: str) -> float:
     return difference
 
 
-def write(path: str | Path, network: Network, mode: str, body: Body) -> float:
+def write_checked(path: str | Path, network: BlendedNetwork, mode: str) -> float:
     """`export` to a temporary file, `check` it, then rename it to `path`. Returns what `check` returns."""
     with atomic_path(path) as temporary:
-        export(temporary, network, mode, body)
+        export(temporary, network, mode)
         return check(temporary, network, mode)
 
 
-def _metadata(network: Network, mode: str) -> dict[str, Any]:
+def _metadata(network: BlendedNetwork, mode: str) -> dict[str, Any]:
     """The metadata: what a program that reads the file needs to use the columns."""
     keys = ("configuration", "contacts", "limits", "units")
     return {

@@ -19,8 +19,7 @@ from hobble.figure.mesh import body_mesh, mesh_key
 from hobble.gait.cycles import measure_cycles
 from hobble.gait.profile import Profile, features, healthy_profile, profile_of_walk
 from hobble.gait.recognise import LEANING, PARTS, SIDES, STRENGTHS, Grader, grader_of_all_people
-from hobble.models.network import Network, inverse_or_0
-from hobble.models.packing import to_base64
+from hobble.models.network import Network, inverse_or_0, to_base64
 from hobble.runtime import (
     bounds,
     caller_targets,
@@ -439,7 +438,7 @@ def _are_layers(value: Any) -> bool:
 
 
 def _round_layer(packed_layer: Mapping[str, Any]) -> dict[str, Any]:
-    """A layer with weights of 8 bits. packed_layer: from `hobble.models.packing.pack_layer`."""
+    """A layer with weights of 8 bits. packed_layer: from `hobble.models.network.pack_layer`."""
     shape = packed_layer["points"], packed_layer["rows"], packed_layer["columns"]
     integers = np.frombuffer(base64.b64decode(packed_layer["weights"]), "<i2").reshape(shape)
     scale = np.frombuffer(base64.b64decode(packed_layer["scale"]), "<f4").reshape(*shape[:2], 1)

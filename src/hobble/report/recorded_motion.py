@@ -18,8 +18,7 @@ from hobble.core.skeleton import Skeleton
 from hobble.figure.gltf import fitted_rotations
 from hobble.figure.mesh import body_mesh, mesh_key
 from hobble.figure.pack import packed_turns
-from hobble.models.network import Network
-from hobble.models.packing import to_base64
+from hobble.models.network import Network, to_base64
 from hobble.rows.captured import headings, root_path, rotate_by_yaw, unbroken_stretches
 from hobble.rows.clip_rows import ClipRows, compose_pairs, load_clip_rows
 from hobble.runtime.export import restore_bone_lengths

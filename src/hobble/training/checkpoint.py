@@ -20,11 +20,7 @@ from hobble.core.processors import count_cores, multiplies_bfloat16
 from hobble.core.skeleton import Skeleton
 from hobble.database.chunks import FILE
 from hobble.database.reader import Database
-from hobble.models import model_of_kind
-from hobble.models.model import TrainedModel
-from hobble.models.options import Options
-from hobble.models.thread_trial import threads_for
-from hobble.models.trainable import Trainable, TrainingStep
+from hobble.models.model import Options, Trainable, TrainedOptions, TrainingStep
 from hobble.training.optimiser import Adam
 from hobble.training.options import Machines, Training
 from hobble.training.processes import ALONE, Processes
@@ -222,15 +218,12 @@ START_ARRAYS = (
 BFLOAT16_FROM_BATCH = 256
 
 
-def use_threads(threads: int, batch: int | None = None) -> None:
+def use_threads(threads: int) -> None:
     """Set the number of threads of PyTorch and numba, and make PyTorch deterministic.
 
-    threads: the wanted number; it is lowered to the number of cores. batch: rows of a batch. If `batch` is
-    given, a short trial decides whether one thread is faster than `threads`.
+    threads: the wanted number; it is lowered to the number of cores.
     """
     threads = max(1, min(threads, count_cores(), numba.config.NUMBA_NUM_THREADS))  # type: ignore[attr-defined]
-    if batch is not None:
-        threads = threads_for(batch, threads)
     torch.set_num_threads(threads)
     numba.set_num_threads(threads)
     torch.use_deterministic_algorithms(True)
@@ -374,9 +367,8 @@ def new_state(
 ) -> State:
     """The state before the first section: a new network for the database's rows, and a new optimiser."""
     skeleton = Skeleton.from_dict(database.skeleton)
-    kind = model_of_kind(network.kind)
-    assert isinstance(kind, TrainedModel), "networks of this kind are built from rows without a training"
-    new_network = kind.untrained_network(network, database.layout, skeleton, training.seed)
+    assert isinstance(network, TrainedOptions), "networks of this kind are built from rows without a training"
+    new_network = network.untrained_network(database.layout, skeleton, training.seed)
     new_network = new_network.to(choose_device(training.device, processes))
     return State(new_network, Adam(new_network, **training.model_dump(include=set(ADAM_KEYS))))
 

@@ -13,9 +13,8 @@ from torch import Tensor
 from hobble.core.compiled import njit
 from hobble.core.skeleton import Skeleton
 from hobble.database.reader import Database
-from hobble.models.kernels import as_numpy, to_float32, use_threads
-from hobble.models.layer_mirror import LayerSymmetry
-from hobble.models.trainable import ALL_ROWS, Trainable, TrainingStep
+from hobble.models.model import ALL_ROWS, LayerMirror, Trainable, TrainingStep
+from hobble.models.step import use_threads
 from hobble.rows.layout import mirror_of_x, mirror_of_y
 from hobble.training.processes import ALONE, Processes
 
@@ -81,8 +80,8 @@ class Adam:
             self.network.views(self.second_moment),
         ]
         for *tensors, gradient, slope in zip(*views, gradients, self.slopes, strict=True):
-            arrays = [as_numpy(tensor.flatten(0, 1)) for tensor in tensors]  # w, m and v of `_adam_loop`
-            arrays.append(as_numpy(gradient.view(tensors[0].shape).flatten(0, 1)))
+            arrays = [tensor.flatten(0, 1).numpy() for tensor in tensors]  # w, m and v of `_adam_loop`
+            arrays.append(gradient.view(tensors[0].shape).flatten(0, 1).numpy())
             use_threads(tensors[0].numel())
             numbers = (self.beta1, self.beta2, rate, root, slope, EPSILON)
             _adam_loop(*arrays, *(arrays[0].dtype.type(number) for number in numbers))
@@ -109,15 +108,13 @@ def _adam_loop(
 ) -> None:
     """One step of Adam on a layer: parameters w, moments m and v, and gradient g, all (rows, in + 1).
 
-    b1, b2: beta1 and beta2. rate, root: see `Adam.step_factors`. slope: see `l1_slopes`. g may be bfloat16,
-    whose bits are in uint16.
+    b1, b2: beta1 and beta2. rate, root: see `Adam.step_factors`. slope: see `l1_slopes`.
     """
     one, zero = w.dtype.type(1), w.dtype.type(0)
     last = w.shape[1] - 1
-    half = g.itemsize == 2  # g is bfloat16
     for row in numba.prange(w.shape[0]):
         for i in range(w.shape[1]):
-            d = w.dtype.type(to_float32(g[row, i])) if half else w.dtype.type(g[row, i])
+            d = g[row, i]
             if i < last:  # the last column holds the biases
                 d += slope * (one if w[row, i] > zero else (-one if w[row, i] < zero else zero))
             m[row, i] = b1 * m[row, i] + (one - b1) * d
@@ -325,3 +322,39 @@ class Symmetry:
         """Make the network symmetric."""
         for symmetry in self.layers:
             symmetry.enforce()
+
+
+class LayerSymmetry:
+    """Makes the parameters of a layer equal to those of its mirror image.
+
+    A layer y = W x + b is symmetric if mirrored inputs, half a cycle later, give mirrored outputs. The mirror
+    images of x and y are x' = M x + d and y' = N y + e. M and N are permutations with signs, and each is its
+    own inverse; d and e are shifts. The mirror image of (W, b) is (N W M, N (W d + b) + e), with the W and b
+    of half a cycle later. Mirroring twice gives the same layer, so the mean of a layer and its mirror image
+    is symmetric.
+    """
+
+    def __init__(self, layer: Tensor, mirror: LayerMirror) -> None:
+        device = layer.device
+        self.layer, self.half_cycle = layer, mirror.half_cycle
+        self.input_source, self.output_source = (
+            torch.from_numpy(columns.source).to(device) for columns in (mirror.inputs, mirror.outputs)
+        )
+        self.input_shift, self.output_shift = (
+            torch.from_numpy(columns.shift).to(device, layer.dtype)
+            for columns in (mirror.inputs, mirror.outputs)
+        )
+        signs = np.outer(mirror.outputs.sign, mirror.inputs.sign)
+        self.weight_signs = torch.from_numpy(signs).to(device, layer.dtype)[:, None]
+        self.bias_signs = torch.from_numpy(mirror.outputs.sign).to(device, layer.dtype)[:, None]
+
+    def mirror_image(self) -> Tensor:
+        """The mirror image (out, K, in + 1) of the layer."""
+        swapped = self.layer.roll(self.half_cycle, 1)[self.output_source]
+        weights, biases = swapped[:, :, :-1], swapped[:, :, -1]
+        biases = self.bias_signs * (biases + weights @ self.input_shift) + self.output_shift[:, None]
+        return torch.cat([weights[:, :, self.input_source] * self.weight_signs, biases[:, :, None]], dim=2)
+
+    def enforce(self) -> None:
+        """Replace the layer by the mean of itself and its mirror image."""
+        self.layer.add_(self.mirror_image()).mul_(0.5)

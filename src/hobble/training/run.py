@@ -18,12 +18,9 @@ from hobble.core.errors import HobbleError
 from hobble.core.files import save_npz
 from hobble.core.skeleton import Skeleton
 from hobble.database.reader import Database
-from hobble.models import model_of_kind
 from hobble.models.load import load_network
-from hobble.models.model import BuiltModel, FinishedNetwork
-from hobble.models.network import TERRAIN_SIDE, Network
-from hobble.models.options import Options
-from hobble.models.training_facts import TrainingFacts
+from hobble.models.model import BuiltOptions, FinishedNetwork, Options
+from hobble.models.network import TERRAIN_SIDE, Network, TrainingFacts
 from hobble.rows.layout import CONTACTS, GAITS
 from hobble.training.batches import TRAIN, HeldOutErrors
 from hobble.training.checkpoint import State, duration, pack, write_history
@@ -130,15 +127,14 @@ def build(
     clips: as in `build_and_save`. Raises InputError if a file does not fit the database, and HobbleError if
     a clip has no file.
     """
-    kind = model_of_kind(network.kind)
-    assert isinstance(kind, BuiltModel), "this kind is trained, not built"
+    assert isinstance(network, BuiltOptions), "this kind is trained, not built"
     used = [clip for clip in database.manifest.clips if clip["split"] == TRAIN and clip["rows"]]
     if missing := [clip["clip"] for clip in used if clip["clip"] not in clips]:
         raise HobbleError(
             f"the database has rows of {', '.join(missing)}, but the files of these clips are missing"
         )
     files = [clips[clip["clip"]] for clip in used]
-    built = kind.build(network, files, database.layout, Skeleton.from_dict(database.skeleton))
+    built = network.build(files, database.layout, Skeleton.from_dict(database.skeleton))
     return built, sum(clip["rows"] for clip in used)
 
 
@@ -183,7 +179,7 @@ def run(
     clip's rows in order, needed only for a network that is built, not trained.
     """
     data = Database.open(database, training.memory_mb).with_phase_weight(training.phase_weight)
-    if isinstance(model_of_kind(network.kind), BuiltModel):
+    if isinstance(network, BuiltOptions):
         build_and_save(
             data,
             clips or {},

@@ -17,7 +17,7 @@ from tqdm import tqdm
 
 from hobble.core.errors import HobbleError
 from hobble.database.reader import Database
-from hobble.models.options import Options
+from hobble.models.model import Options
 from hobble.training.augment import OtherPaces, OtherPoses, RollOut, VersionPoses
 from hobble.training.batches import SPLIT, TRAIN, HeldOutErrors, LossWatch
 from hobble.training.checkpoint import (
@@ -64,7 +64,7 @@ def train(
     stays), if there are fewer samples than sections, if `keep` or `patience` need a held-out error but no
     clip is held out, and if `symmetric` is set for a network that cannot be symmetric.
     """
-    use_threads(threads, training.batch)
+    use_threads(threads)
     if (training.patience or training.keep == "best") and not database.row_count(SPLIT):
         raise HobbleError(
             "`training.keep: best` and training.patience need the held-out error, but no clip is held out. "

@@ -7,8 +7,7 @@ import json
 from typing import Any
 
 from hobble.config.load_configuration import Catalogue
-from hobble.models import model_of_kind
-from hobble.models.model import BuiltModel, Model
+from hobble.models.model import BuiltOptions, Options
 from hobble.workflow.batches import Batches
 from hobble.workflow.channel_sources import database_folder
 from hobble.workflow.clips import DATASETS
@@ -80,11 +79,11 @@ class Configurations:
 
     def model_package(self, configuration: str) -> str:
         """Full name of the Python package for the kind of network, such as hobble.models.pfnn."""
-        return f"hobble.models.{self.catalogue.configuration(self.network_owner(configuration)).network.kind}"
+        return f"hobble.models.{self.network_options(configuration).kind}"
 
-    def model(self, configuration: str) -> Model:
-        """The object MODEL of the package `model_package`, which describes the kind of network."""
-        return model_of_kind(self.catalogue.configuration(self.network_owner(configuration)).network.kind)
+    def network_options(self, configuration: str) -> Options:
+        """The options of the configuration's network."""
+        return self.catalogue.configuration(self.network_owner(configuration)).network
 
     def network(self, configuration: str, file: str) -> str:
         """Path of `file` in the folder of the configuration's network."""
@@ -97,7 +96,7 @@ class Configurations:
 
     def is_built(self, configuration: str) -> bool:
         """Whether the network is built directly from the rows of the clips instead of trained."""
-        return isinstance(self.model(configuration), BuiltModel)
+        return isinstance(self.network_options(configuration), BuiltOptions)
 
     def clips_to_build_from(self, configuration: str) -> list[str]:
         """If the network is built: the training clips, in the order of `splits`. Else []."""

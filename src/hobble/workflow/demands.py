@@ -17,8 +17,7 @@ from pathlib import Path
 
 from hobble.channels import channel
 from hobble.measures.measure import measure_named
-from hobble.models import model_of_kind
-from hobble.models.model import TrainedModel
+from hobble.models.model import TrainedOptions
 from hobble.rows.layout import RowLayout
 from hobble.training.options import Machines
 from hobble.workflow.batches import ClipBatch
@@ -229,12 +228,8 @@ class Demands:
     def parameter_count(self, configuration: str) -> float:
         """Number of trained parameters of a configuration's network; 0 if it is not trained."""
         chosen, layout = self.project.catalogue.configuration(configuration), self.layout(configuration)
-        kind = model_of_kind(chosen.network.kind)
-        return (
-            kind.parameter_count(chosen.network, layout.x_size, layout.y_size)
-            if isinstance(kind, TrainedModel)
-            else 0
-        )
+        is_trained = isinstance(chosen.network, TrainedOptions)
+        return chosen.network.parameter_count(layout.x_size, layout.y_size) if is_trained else 0
 
     def layout(self, configuration: str) -> RowLayout:
         """The columns of a configuration's rows."""

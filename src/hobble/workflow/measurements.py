@@ -62,7 +62,7 @@ class Measurements:
             return []
         options = chosen.options.model_validate(self.options(configuration, name))
         runtime = Runtime.model_validate(self.runtime(configuration, name))
-        pieces = chosen.pieces(options, runtime, self.configurations.model(configuration).modes)
+        pieces = chosen.pieces(options, runtime, self.configurations.network_options(configuration).modes)
         return [piece_file(configuration, name, piece) for piece in pieces] if len(pieces) > 1 else []
 
     def _input(self, configuration: str, item: str) -> str:

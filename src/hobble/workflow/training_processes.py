@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import IO
 
 from hobble.core.errors import HobbleError
-from hobble.models.options import Options
+from hobble.models.model import Options
 from hobble.training.options import Machines, Training
 from hobble.workflow import lifetime, training_process
 

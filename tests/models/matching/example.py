@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from hobble.core.skeleton import Skeleton
-from hobble.models import model_of_kind
 from hobble.models.load import network_from_arrays
+from hobble.models.matching import MatchingOptions
 from hobble.models.matching.network import Matching
 from hobble.rows.clip_rows import ClipRows, save_clip_rows
 from hobble.rows.layout import RowLayout, body_column_count
@@ -64,8 +64,8 @@ def built(skeleton: Skeleton, folder: Path, **options: Any) -> tuple[Any, dict[s
     for number in range(len(FRAMES)):
         files.append(folder / f"clip-{number}.npz")
         save_clip_rows(files[-1], clip(skeleton, number))
-    layout, kind = layout_of(skeleton), model_of_kind("matching")
-    tables = kind.build(kind.options_class().model_validate(options), files, layout, skeleton)
+    layout = layout_of(skeleton)
+    tables = MatchingOptions(**options).build(files, layout, skeleton)
     rng = np.random.default_rng(1)
     arrays: dict[str, Any] = dict(tables.arrays())
     for name, size in (("X", layout.x_size), ("Y", layout.y_size)):

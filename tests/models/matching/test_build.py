@@ -10,10 +10,8 @@ import pytest
 
 from hobble.core.errors import InputError
 from hobble.core.skeleton import Skeleton
-from hobble.models import model_of_kind
-from hobble.models.matching.build import find_runs, on_mean_ground
-from hobble.models.matching.options import MatchingOptions
-from hobble.models.matching.search_features import feature_groups
+from hobble.models.matching import MatchingOptions
+from hobble.models.matching.build import feature_groups, find_runs, on_mean_ground
 from hobble.rows.clip_rows import compose_pairs, save_clip_rows
 from hobble.rows.layout import RowLayout
 
@@ -90,8 +88,8 @@ def test_a_group_has_its_configured_weight(holden31: Skeleton, tmp_path: Path) -
 
 def test_rows_of_another_layout_are_refused(holden31: Skeleton, tmp_path: Path) -> None:
     save_clip_rows(tmp_path / "one.npz", clip(holden31, 0))
-    kind, layout = model_of_kind("matching"), RowLayout(len(holden31.joints), window=30)
+    layout = RowLayout(len(holden31.joints), window=30)
     with pytest.raises(InputError, match=r"one\.npz"):
-        kind.build(MatchingOptions(), [tmp_path / "one.npz"], layout, holden31)
+        MatchingOptions().build([tmp_path / "one.npz"], layout, holden31)
     with pytest.raises(InputError, match="no frame"):
-        kind.build(MatchingOptions(), [], layout_of(holden31), holden31)
+        MatchingOptions().build([], layout_of(holden31), holden31)

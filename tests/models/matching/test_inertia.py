@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from hobble.core import quat
-from hobble.models.matching.inertia import OFFSETS, OFFSETS_PER_JOINT, ROW, memory_size, show_rows
+from hobble.models.matching.network import OFFSETS, OFFSETS_PER_JOINT, ROW, memory_size, show_rows
 
 J, HALFLIFE = 3, 6.0
 AT = np.array([0, 3 * J, 6 * J, 9 * J])  # positions, velocities, rotations, change of phase

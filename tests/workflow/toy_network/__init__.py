@@ -1,26 +1,30 @@
 """The smallest possible kind of network, a linear one: y = W x + b, for any phase."""
 
-from hobble.models.model import TrainedModel
+from typing import Literal
+
+from hobble.models.model import TrainedOptions
 
 
-class _Toy(TrainedModel):
-    def options_class(self):
-        from hobble.models.toy.options import ToyOptions
+class ToyOptions(TrainedOptions):
+    """The kind of network is the only option."""
 
-        return ToyOptions
+    kind: Literal["toy"] = "toy"
 
-    def parameter_count(self, options, inputs, outputs):
-        return (inputs + 1) * outputs
-
-    def untrained_network(self, options, layout, skeleton, seed):
-        from hobble.models.toy.trainable import fresh
-
-        return fresh(layout.x_size, layout.y_size, seed)
-
-    def read(self, path, arrays, shared_fields):
+    @classmethod
+    def network_class(cls):
         from hobble.models.toy.network import Toy
 
-        return Toy.read(path, arrays, shared_fields)
+        return Toy
+
+    def parameter_count(self, inputs, outputs):
+        return (inputs + 1) * outputs
+
+    def untrained_network(self, layout, skeleton, seed):
+        import torch
+        from hobble.models.toy.network import TrainableToy
+
+        flat = torch.zeros(self.parameter_count(layout.x_size, layout.y_size))
+        return TrainableToy(flat, layout.x_size, layout.y_size).randomise(seed)
 
 
-MODEL = _Toy()
+OPTIONS = ToyOptions

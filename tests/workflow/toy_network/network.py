@@ -1,4 +1,4 @@
-"""The linear network at run time."""
+"""The linear network at run time, and in training."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from typing import ClassVar
 import numpy as np
 
 from hobble.core.errors import InputError
-from hobble.models import checks
-from hobble.models.network import Network, inverse_or_0, standardise_inputs
-from hobble.models.packing import pack_layer
+from hobble.models.load import read_numbers
+from hobble.models.model import Trainable
+from hobble.models.network import Network, inverse_or_0, pack_layer, standardise_inputs
 
 
 @dataclass(frozen=True)
@@ -23,7 +23,7 @@ class Toy(Network):
 
     @classmethod
     def read(cls, path, arrays, shared_fields):
-        w, b = checks.read_numbers(path, arrays, "W0", 2), checks.read_numbers(path, arrays, "b0", 1)
+        w, b = read_numbers(path, arrays, "W0", 2), read_numbers(path, arrays, "b0", 1)
         if w.shape != (len(shared_fields["y_mean"]), len(shared_fields["x_mean"])) or b.shape != w.shape[:1]:
             raise InputError(path, f"W0 {w.shape} and b0 {b.shape} do not fit")
         return cls(weights=w, biases=b, **shared_fields)
@@ -69,3 +69,58 @@ class Predictor:
         out = np.empty((len(x), len(self.network.y_mean)), np.float32) if out is None else out
         self.evaluate(z, phase, out)
         return out
+
+
+@dataclass(frozen=True)
+class TrainableToy(Trainable):
+    kind: ClassVar[str] = "toy"
+
+    inputs: int = 0
+    outputs: int = 0
+
+    @property
+    def shapes(self):
+        return [(self.outputs, 1, self.inputs + 1)]
+
+    def __call__(self, x, p):
+        layer = self.layers[0][:, 0]
+        return x @ layer[:, :-1].T + layer[:, -1]
+
+    def step(self, dropout, half):
+        return Step(self)
+
+    def arrays(self):
+        layer = self.layers[0][:, 0].cpu().numpy()
+        return {"W0": np.ascontiguousarray(layer[:, :-1]), "b0": np.ascontiguousarray(layer[:, -1])}
+
+    @property
+    def file_metadata(self):
+        return {"network": "y = W0 x + b0 on standardised x and y"}
+
+    @property
+    def description(self):
+        return f"{self.inputs}-{self.outputs} linear"
+
+
+class Step:
+    """The gradient is one matrix product. There is no dropout."""
+
+    def __init__(self, network):
+        import torch  # not needed to run the network
+
+        self.network, self.gradients, self.error = network, [], torch.empty(0)
+        self.generator, self.input_mask = torch.Generator(), 0
+
+    def __call__(self, x, y, p, masks):
+        import torch
+
+        self.error = self.network(x, p) - y
+        with_ones = torch.cat([x, torch.ones(len(x), 1)], dim=1)
+        self.gradients = [self.error.T @ with_ones * (2.0 / y.numel())]
+        return self.error.square().mean()
+
+    def masks(self, rows, own=slice(None)):
+        return []
+
+    def seed(self, seed):
+        self.generator.manual_seed(seed)

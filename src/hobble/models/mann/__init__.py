@@ -1,55 +1,229 @@
-"""The mode-adaptive network (Zhang, Starke, Komura, Saito 2018).
-
-Start reading at `hobble.models.mann.forward`.
-"""
+"""The mode-adaptive network (Zhang, Starke, Komura, Saito 2018); `hobble.models.forward` explains it."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from itertools import pairwise
+from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from hobble.core.errors import InputError
+from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
-from hobble.models.model import TrainedModel
-from hobble.rows.layout import RowLayout
+from hobble.models.blend import BlendedNetwork, BlendedOptions, TrainableBlend
+from hobble.models.forward import forward, softmax
+from hobble.models.load import read_layers
+from hobble.models.model import Trainable
+from hobble.models.network import pack_layer
+from hobble.rows.layout import GAITS, RowLayout
 
 if TYPE_CHECKING:
-    from hobble.models.mann.network import Mann
-    from hobble.models.mann.options import MannOptions
-    from hobble.models.mann.trainable import TrainableMann
+    from torch import Tensor
+
+    from hobble.models.onnx_file import Graph, Node
+    from hobble.models.predict import Shares, Stack
+
+FEET = ("left_heel", "left_toe", "right_heel", "right_toe")  # roles of the joints
+GATE_INPUTS = 3 * len(FEET) + 2 * len(GAITS) + 2  # number of the columns that the gate gets
 
 
-class _Mann(TrainedModel):
-    def options_class(self) -> type[MannOptions]:
-        from hobble.models.mann.options import MannOptions
+class MannOptions(BlendedOptions):
+    """experts: number of experts, that is, sets of weights. gate_layers: number of hidden layers of the gate.
 
-        return MannOptions
+    gate_units: units of each of these. The defaults are those of Zhang et al. 2018.
+    """
 
-    def parameter_count(self, options: MannOptions, inputs: int, outputs: int) -> int:
-        from hobble.models.mann.forward import GATE_INPUTS
+    kind: Literal["mann"] = "mann"
+    experts: Annotated[int, Field(ge=2, le=32)] = 8
+    gate_layers: Annotated[int, Field(ge=1, le=4)] = 2
+    gate_units: Annotated[int, Field(gt=0, le=1024)] = 32
 
-        # A layer from a to b units has a * b weights and b biases.
-        expert = sum((a + 1) * b for a, b in pairwise(options.sizes(inputs, outputs)))
-        gate = sum((a + 1) * b for a, b in pairwise(options.gate_sizes(GATE_INPUTS)))
-        return options.experts * expert + gate
+    @classmethod
+    def network_class(cls) -> type[Mann]:
+        """As in `Options`."""
+        return Mann
 
-    def untrained_network(
-        self, options: MannOptions, layout: RowLayout, skeleton: Skeleton, seed: int
-    ) -> TrainableMann:
-        from hobble.models.mann.forward import gate_columns
-        from hobble.models.mann.trainable import untrained_network
+    def trainable(self, flat: Any, sizes: tuple[int, ...], columns: tuple[int, ...]) -> TrainableMann:
+        """As in `BlendedOptions`."""
+        gate = (GATE_INPUTS, *[self.gate_units] * self.gate_layers, self.experts)
+        return TrainableMann(flat, sizes, self.experts, gate, columns)
 
-        columns = gate_columns(layout, skeleton)
-        return untrained_network(
-            options.sizes(layout.x_size, layout.y_size), options.gate_sizes(len(columns)), columns, seed
+    def gate_columns(self, layout: RowLayout, skeleton: Skeleton) -> tuple[int, ...]:
+        """The columns of X that the gate gets.
+
+        These are the velocities of heels and toes, the gait now and at the end of the trajectory, and the
+        position of the end of the trajectory, which depends on the target velocity.
+        """
+        samples, now, last = layout.samples, layout.samples // 2, layout.samples - 1
+        feet = [3 * skeleton.role(role) + axis for role in FEET for axis in range(3)]
+        gaits = [gait * samples + sample for sample in (now, last) for gait in range(len(GAITS))]
+        return (
+            *(layout.x_joint_velocity.start + column for column in feet),
+            *(layout.x_gait.start + column for column in gaits),
+            layout.x_position.start + last,
+            layout.x_position.start + samples + last,
         )
 
-    def read(self, path: str | Path, arrays: Mapping[str, Any], shared_fields: Mapping[str, Any]) -> Mann:
-        """As in `Model`. shared_fields: those that networks of all kinds have."""
-        from hobble.models.mann.network import Mann
 
-        return Mann.read(path, arrays, shared_fields)
+OPTIONS = MannOptions
 
 
-MODEL = _Mann()
+@dataclass(frozen=True)
+class Mann(BlendedNetwork):
+    """A mode-adaptive network of K experts.
+
+    gate_weights: (1, out, in) for each layer of the gate; gate_biases: (1, out) for each. columns: (G,) the
+    columns of X that the gate gets.
+    """
+
+    kind: ClassVar[str] = "mann"
+    uses_phase: ClassVar[bool] = False
+    # Reading the weights of all experts takes most of a prediction's time. As int16 they have half the size.
+    default_storage: ClassVar[str] = "int16"
+    set_word: ClassVar[str] = "experts"
+    set_range: ClassVar[tuple[int, int]] = (2, 64)
+
+    gate_weights: tuple[Array, ...] = field(repr=False)
+    gate_biases: tuple[Array, ...] = field(repr=False)
+    columns: NDArray[np.int64] = field(repr=False)
+
+    @classmethod
+    def read_more(
+        cls, path: str | Path, arrays: Mapping[str, Any], weights: tuple[Array, ...]
+    ) -> dict[str, Any]:
+        """As in `BlendedNetwork`. V0 (out, in), d0 (out,), ... are the layers of the gate.
+
+        `gate` (G,) holds the columns of X that the gate gets.
+        """
+        columns = _read_gate_columns(path, arrays, weights[0].shape[2])
+        gate_weights, gate_biases = read_layers(path, arrays, "Vd", len(columns), len(weights[0]))
+        return {"gate_weights": gate_weights, "gate_biases": gate_biases, "columns": columns}
+
+    @property
+    def parameter_count(self) -> int:
+        """The number of all weights and biases, because a prediction may need all experts."""
+        layers = (*self.weights, *self.biases, *self.gate_weights, *self.gate_biases)
+        return sum(array.size for array in layers)
+
+    @property
+    def description(self) -> str:
+        """As in `Network`."""
+        return f"mode-adaptive network of {self.layers_in_words()} and {self.sets} experts"
+
+    def shares(self, z: Array, phase: Array) -> Array:
+        """As in `BlendedNetwork`; the phase is ignored."""
+        one = np.ones((len(z), 1), np.float32)
+        return softmax(forward(self.gate_weights, self.gate_biases, one, z[:, self.columns]))
+
+    def prepare(self, mode: str) -> tuple[tuple[Array, ...], tuple[Array, ...], Shares]:
+        """As in `BlendedNetwork`."""
+        from hobble.models.predict import Stack
+
+        # The gate stays float32: it is small, and rounding it would change the shares of all experts.
+        gate = Stack(self.gate_weights, self.gate_biases)
+        return self.weights, self.biases, partial(_fast_shares, gate, self.columns, self.sets)
+
+    def page_data(self, inputs: NDArray[np.int64], outputs: NDArray[np.int64]) -> dict[str, Any]:
+        """As in `BlendedNetwork`. gateLayers: of the gate. gate: its columns, as positions in `inputs`."""
+        position = {int(column): i for i, column in enumerate(inputs)}
+        present = [i for i, column in enumerate(self.columns) if int(column) in position]
+        first, *others = self.gate_weights
+        gate = zip([first[:, :, present], *others], self.gate_biases, strict=True)
+        return {
+            **super().page_data(inputs, outputs),
+            "gateLayers": [pack_layer(w, b) for w, b in gate],
+            "gate": [position[int(self.columns[i])] for i in present],
+        }
+
+    def onnx_shares(self, g: Graph, z: Node, mode: str) -> tuple[None, Node]:
+        """As in `BlendedNetwork`."""
+        from hobble.models.onnx_file import add_layers
+
+        h = add_layers(g, self.gate_weights, self.gate_biases, g("Gather", z, self.columns, axis=1))
+        return None, g("Softmax", h, axis=1)
+
+
+def _fast_shares(gate: Stack, columns: NDArray[np.int64], sets: int, z: Array, phase: Array) -> Array:
+    """The shares (C, K) of Shares (C, K) for standardised inputs z (C, X)."""
+    from hobble.models.predict import logits_to_shares
+
+    shares = np.empty((len(z), sets), np.float32)
+    gate.run(np.ones((len(z), 1), np.float32), z[:, columns], shares)
+    logits_to_shares(shares)
+    return shares
+
+
+def _read_gate_columns(path: str | Path, arrays: Mapping[str, Any], inputs: int) -> NDArray[np.int64]:
+    """The array `gate`: the columns of X that the gate gets. inputs: number of columns of X."""
+    if "gate" not in arrays:
+        raise InputError(path, "not a network: no gate")
+    array = np.asarray(arrays["gate"])
+    if array.ndim != 1 or array.dtype.kind not in "iu" or not array.size:
+        raise InputError(path, f"gate has shape {array.shape} and type {array.dtype}, not columns of X")
+    if array.min() < 0 or array.max() >= inputs or len(np.unique(array)) != array.size:
+        raise InputError(path, f"gate must hold columns of X (0 to {inputs - 1}), each at most once")
+    return array.astype(np.int64)
+
+
+@dataclass(frozen=True)
+class TrainableMann(TrainableBlend):
+    """A mode-adaptive network in training.
+
+    gate: units of each layer of the gate, its inputs first. columns: the columns of X that the gate gets.
+    """
+
+    kind: ClassVar[str] = "mann"
+
+    gate: tuple[int, ...]
+    columns: tuple[int, ...]
+
+    mirrors = Trainable.mirrors  # refuses: the gate would have to be mirrored, too
+
+    @property
+    def gate_units(self) -> tuple[int, ...]:
+        """As in `TrainableBlend`."""
+        return self.gate
+
+    def shares(self, gate: list[Tensor], x: Tensor, p: Tensor, masks: list[Tensor] | None) -> Tensor:
+        """As in `TrainableBlend`; p is ignored."""
+        import torch
+        from torch.nn.functional import elu, linear
+
+        h = x[:, list(self.columns)]
+        for number, layer in enumerate(gate):
+            h = elu(h) if number else h
+            h = linear(h * masks[number] if masks else h, layer[:, 0, :-1], layer[:, 0, -1])
+        return torch.softmax(h, dim=1)
+
+    def arrays(self) -> dict[str, np.ndarray]:
+        """As in `TrainableBlend`. `V0` (out, in), `d0` (out,), ... are the layers of the gate.
+
+        `gate` holds the columns of X that the gate gets.
+        """
+        arrays = super().arrays()
+        for number, layer in enumerate(self.layers[: self.gate_layers]):
+            values = layer[:, 0].cpu().numpy()
+            arrays[f"V{number}"] = np.ascontiguousarray(values[:, :-1])
+            arrays[f"d{number}"] = np.ascontiguousarray(values[:, -1])
+        return arrays | {"gate": np.array(self.columns, np.int64)}
+
+    @property
+    def file_metadata(self) -> dict[str, Any]:
+        """As in `FinishedNetwork`."""
+        gate = "V0 x[gate] + d0"
+        for i in range(1, self.gate_layers):
+            gate = f"V{i} elu({gate}) + d{i}"
+        shares = f"W and b are blended from those of the experts, in the shares softmax({gate})"
+        return {"experts": self.sets, "network": self.formula() + shares}
+
+    @property
+    def description(self) -> str:
+        """As in `FinishedNetwork`."""
+        gate = "-".join(map(str, self.gate))
+        words = f"{self.units_in_words}, {self.sets} experts side by side and a gate of {gate}"
+        return f"{words} ({self.flat.numel():,} parameters)"

@@ -19,11 +19,11 @@ from hobble.core.errors import InputError
 from hobble.core.files import atomic_path
 from hobble.core.quat import Array
 from hobble.core.untrusted import read_bytes
-from hobble.models.checks import LARGEST_WEIGHT, MOST_LAYERS, STATISTICS
-from hobble.models.pfnn.forward import phase_shares, weights_at
+from hobble.models.forward import phase_shares, weights_at
+from hobble.models.load import LARGEST_WEIGHT, MOST_LAYERS, STATISTICS
 
 if TYPE_CHECKING:
-    from hobble.models.pfnn.network import Pfnn
+    from hobble.models.blend import BlendedNetwork
 
 PHASES = 50  # number of phases at which weights are stored, equally spaced over a cycle
 CONTROL_POINTS = 4  # of the splines on which the weights lie
@@ -34,7 +34,7 @@ MOST_WEIGHTS = 1 << 21  # largest number of weights in a file; the released file
 LARGEST_RESIDUAL = 1e-4
 
 
-def write_release(folder: str | Path, network: Pfnn) -> None:
+def write_release(folder: str | Path, network: BlendedNetwork) -> None:
     """Write the files of the network into `folder`, which is created if it is missing."""
     folder = Path(folder)
     phases = np.arange(PHASES) / PHASES
@@ -47,7 +47,7 @@ def write_release(folder: str | Path, network: Pfnn) -> None:
 
 
 def read_release(folder: str | Path) -> Mapping[str, Array]:
-    """The arrays W0 (4, out, in), b0 (4, out), ..., Xmean, ... of a folder, for `Pfnn.read`.
+    """The arrays W0 (4, out, in), b0 (4, out), ..., Xmean, ... of a folder, for `Network.read`.
 
     W0, b0, ... are the control points of splines, fitted to the weights at the 50 phases by least squares.
     Raises InputError if a file is missing, has a wrong size or numbers that are not finite, or if the weights
@@ -85,7 +85,7 @@ def _control_points(folder: Path, name: str, values: Array) -> Array:
             folder / f"{name}_{beyond[0]:03d}.bin",
             f"holds numbers that are not finite or above {LARGEST_WEIGHT:g}",
         )
-    shares = phase_shares(np.arange(PHASES) / PHASES, CONTROL_POINTS)
+    shares = phase_shares(np.arange(PHASES) / PHASES, np.arange(CONTROL_POINTS))
     points = np.linalg.lstsq(shares, values.astype(float), rcond=None)[0]
     residual = float(np.abs(shares @ points - values).max())
     if not residual < LARGEST_RESIDUAL:

@@ -2,44 +2,118 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from itertools import pairwise
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
-from hobble.core.skeleton import Skeleton
-from hobble.models.model import TrainedModel
-from hobble.rows.layout import RowLayout
+import numpy as np
+
+from hobble.core.quat import Array
+from hobble.models.blend import BlendedNetwork, BlendedOptions, TrainableBlend
+from hobble.rows.layout import ColumnMirror
 
 if TYPE_CHECKING:
-    from hobble.models.plain.network import Plain
-    from hobble.models.plain.options import PlainOptions
-    from hobble.models.plain.trainable import TrainablePlain
+    from torch import Tensor
+
+    from hobble.models.onnx_file import Graph, Node
+    from hobble.models.predict import Shares
+
+PHASE_INPUTS = 2  # sine and cosine of the phase, after the columns of X
 
 
-class _Plain(TrainedModel):
-    def options_class(self) -> type[PlainOptions]:
-        from hobble.models.plain.options import PlainOptions
+class PlainOptions(BlendedOptions):
+    """A feed-forward network. By default its layers have the sizes of the phase-functioned network's."""
 
-        return PlainOptions
+    kind: Literal["plain"] = "plain"
 
-    def parameter_count(self, options: PlainOptions, inputs: int, outputs: int) -> int:
-        weights_of_phase = 2 * options.units  # the first layer also gets sine and cosine of the phase
-        sizes = options.sizes(inputs, outputs)
-        return sum((size + 1) * out for size, out in pairwise(sizes)) + weights_of_phase
+    @classmethod
+    def network_class(cls) -> type[Plain]:
+        """As in `Options`."""
+        return Plain
 
-    def untrained_network(
-        self, options: PlainOptions, layout: RowLayout, skeleton: Skeleton, seed: int
-    ) -> TrainablePlain:
-        from hobble.models.plain.trainable import untrained_network
+    @property
+    def why_not_symmetric(self) -> str:
+        """As in `Options`: always "", because any plain network can be trained with `training.symmetric`."""
+        return ""
 
-        return untrained_network(options.sizes(layout.x_size, layout.y_size), seed)
-
-    def read(self, path: str | Path, arrays: Mapping[str, Any], shared_fields: Mapping[str, Any]) -> Plain:
-        """As in `Model`. shared_fields: those that networks of all kinds have."""
-        from hobble.models.plain.network import Plain
-
-        return Plain.read(path, arrays, shared_fields)
+    def trainable(self, flat: Any, sizes: tuple[int, ...], columns: tuple[int, ...]) -> TrainablePlain:
+        """As in `BlendedOptions`."""
+        return TrainablePlain(flat, sizes, 1)
 
 
-MODEL = _Plain()
+OPTIONS = PlainOptions
+
+
+@dataclass(frozen=True)
+class Plain(BlendedNetwork):
+    """A feed-forward network. Its first layer gets X, then sine and cosine of the phase."""
+
+    kind: ClassVar[str] = "plain"
+    extra_inputs: ClassVar[int] = PHASE_INPUTS
+
+    @property
+    def description(self) -> str:
+        """As in `Network`."""
+        return f"feed-forward network of {self.layers_in_words()}, given the phase"
+
+    def shares(self, z: Array, phase: Array) -> Array:
+        """As in `BlendedNetwork`: 1 for the only set."""
+        return np.ones((len(z), 1), np.float32)
+
+    def extended(self, z: Array, phase: Array) -> Array:
+        """As in `BlendedNetwork`."""
+        angle = 2 * np.pi * np.asarray(phase, float)
+        return np.concatenate([z, np.stack([np.sin(angle), np.cos(angle)], axis=1)], axis=1, dtype=np.float32)
+
+    def prepare(self, mode: str) -> tuple[tuple[Array, ...], tuple[Array, ...], Shares]:
+        """As in `BlendedNetwork`."""
+        return self.weights, self.biases, self.shares
+
+    def onnx_shares(self, g: Graph, z: Node, mode: str) -> tuple[None, None]:
+        """As in `BlendedNetwork`."""
+        return None, None
+
+    def onnx_extended(self, g: Graph, z: Node) -> Node:
+        """As in `BlendedNetwork`."""
+        angle = g("Unsqueeze", g.named("phase") * (2 * np.pi), [1])
+        return g("Concat", z, g("Sin", angle), g("Cos", angle), axis=1)
+
+
+@dataclass(frozen=True)
+class TrainablePlain(TrainableBlend):
+    """A plain network in training."""
+
+    kind: ClassVar[str] = "plain"
+    extra_inputs: ClassVar[int] = PHASE_INPUTS
+
+    def shares(self, gate: list[Tensor], x: Tensor, p: Tensor, masks: list[Tensor] | None) -> Tensor:
+        """As in `TrainableBlend`: 1 for the only set."""
+        return p.new_ones(len(p), 1)
+
+    def extended(self, x: Tensor, p: Tensor) -> Tensor:
+        """As in `TrainableBlend`."""
+        import torch
+
+        angle = 2 * torch.pi * p[:, None]
+        return torch.cat([x, torch.sin(angle), torch.cos(angle)], dim=1)
+
+    def mirror_of_inputs(self, inputs: ColumnMirror) -> ColumnMirror:
+        """As in `TrainableBlend`. Half a cycle later, sine and cosine of the phase have the opposite sign."""
+        return ColumnMirror(
+            np.append(inputs.source, len(inputs.source) + np.arange(PHASE_INPUTS)),
+            np.append(inputs.sign, -np.ones(PHASE_INPUTS)),
+            np.append(inputs.shift, np.zeros(PHASE_INPUTS)),
+        )
+
+    def arrays(self) -> dict[str, np.ndarray]:
+        """As in `FinishedNetwork`: `W0` (out, in), `b0` (out,), `W1`, `b1`, ..."""
+        return {name: array[0] for name, array in super().arrays().items()}
+
+    @property
+    def file_metadata(self) -> dict[str, Any]:
+        """As in `FinishedNetwork`."""
+        return {"network": f"{self.formula('(x, sin 2 pi p, cos 2 pi p)')}p is the phase"}
+
+    @property
+    def description(self) -> str:
+        """As in `FinishedNetwork`."""
+        return f"{self.units_in_words}, given the phase ({self.flat.numel():,} parameters)"

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numba import njit
 
-from hobble.models.tiles import DEPTH, ROWS, WIDTH, aligned_zeros, in_panels, multiply, panel_count
+from hobble.models.predict import DEPTH, ROWS, WIDTH, aligned_zeros, in_panels, multiply
 
 
 @njit
@@ -17,7 +17,7 @@ def product(weights, panels, inputs, x, rows, y, places):
 def times(weights: np.ndarray, x: np.ndarray) -> np.ndarray:
     """x W' computed in tiles. The sums are stored in reverse order, to check that `places` is used."""
     outputs, inputs = weights.shape
-    panels = panel_count(outputs)
+    panels = -(-outputs // WIDTH)
     flat = aligned_zeros(panels * WIDTH * inputs, weights.dtype)
     flat[:] = in_panels(weights).ravel()
     y = np.zeros((len(x), panels * WIDTH), np.float32)

@@ -1,0 +1,146 @@
+"""The training steps compute the loss and the gradient of the definition."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+import torch
+
+from hobble.models.mann import TrainableMann
+from hobble.models.pfnn import TrainablePfnn
+from hobble.models.plain import TrainablePlain
+from hobble.models.step import AutogradStep, FusedStep
+from hobble.training.optimiser import Adam
+
+from . import definition
+from .definition import fresh, new
+
+STEPS = [AutogradStep, FusedStep]
+# A class of networks, its arguments and the rows of a batch.
+CASES: list[tuple[Any, tuple, int]] = [
+    (TrainablePfnn, ((6, 5, 4), 4), 1),
+    (TrainablePfnn, ((6, 5, 5, 3), 4), 33),
+    (TrainablePfnn, ((7, 4, 4, 4, 3), 6), 8),
+    (TrainablePlain, ((6, 5, 4), 1), 9),
+    (TrainablePlain, ((7, 4, 4, 4, 3), 1), 9),
+    (TrainableMann, ((6, 5, 4), 2, (3, 4, 2), (5, 0, 2)), 1),
+    (TrainableMann, ((6, 5, 5, 3), 8, (2, 4, 4, 8), (1, 3)), 33),
+    (TrainableMann, ((7, 4, 4, 4, 3), 3, (2, 3), (0, 6)), 8),
+]
+LARGE: list[tuple[Any, tuple]] = [
+    (TrainablePfnn, ((30, 24, 24, 20), 4)),
+    (TrainableMann, ((30, 24, 24, 20), 8, (6, 8, 8, 8), tuple(range(6)))),
+]
+
+
+def problem(kind: Any, arguments: tuple, rows: int, dtype: torch.dtype = torch.float64, spread: float = 0.5):
+    """A network and a batch, both random."""
+    generator = torch.Generator().manual_seed(3)
+    network = new(kind, *arguments).to("cpu", dtype)
+    network.flat.normal_(0, spread, generator=generator)
+    x = torch.randn(rows, network.inputs, generator=generator, dtype=torch.float64)
+    y = torch.randn(rows, network.outputs, generator=generator, dtype=torch.float64)
+    p = torch.rand(rows, generator=generator, dtype=torch.float64)
+    return network, x.to(dtype), y.to(dtype), p.to(dtype)
+
+
+@pytest.mark.parametrize("step_class", STEPS)
+@pytest.mark.parametrize(("kind", "arguments", "rows"), CASES)
+def test_loss_and_gradient_are_those_of_the_definition(step_class, kind, arguments, rows) -> None:
+    network, x, y, p = problem(kind, arguments, rows)
+    step = step_class(network, 0.3)
+    step.seed(5)
+    masks = step.masks(rows)
+    assert {round(float(value), 9) for mask in masks for value in mask.flatten()} >= {0.0, round(1 / 0.7, 9)}
+    assert (masks[step.input_mask][:, network.inputs :] == 1).all(), "inputs after X are never dropped"
+    found = step(x.clone(), y, p, masks)
+    layers = [layer.clone().requires_grad_() for layer in network.layers]
+    plain = definition.loss(network, layers, x, y, p, masks)
+    plain.backward()
+    assert float(found) == pytest.approx(plain.item(), rel=1e-12)
+    for gradient, layer in zip(step.gradients, layers, strict=True):
+        assert layer.grad is not None
+        assert float(layer.grad.abs().max()) > 0
+        assert torch.allclose(gradient.view(layer.shape), layer.grad, rtol=1e-9, atol=1e-13)
+
+
+@pytest.mark.parametrize("step_class", STEPS)
+@pytest.mark.parametrize(("kind", "arguments", "rows"), CASES[1::3])
+def test_without_dropout_the_error_is_that_of_the_network(step_class, kind, arguments, rows) -> None:
+    network, x, y, p = problem(kind, arguments, rows)
+    step = step_class(network, 0.0)
+    step(x.clone(), y, p, step.masks(rows))
+    assert torch.allclose(step.error, network(x, p) - y, rtol=1e-10, atol=1e-12)
+
+
+@pytest.mark.parametrize("step_class", STEPS)
+def test_ten_training_steps_equal_those_of_torch_adam(step_class) -> None:
+    """Ten steps with dropout, the L1 term and Adam, against PyTorch's own Adam on the plain definition."""
+    network, x, y, p = problem(TrainablePfnn, ((6, 5, 5, 3), 4), 12)
+    layers = [layer.clone().requires_grad_() for layer in network.layers]
+    theirs = torch.optim.Adam(layers, lr=0.01, betas=(0.9, 0.99))
+    ours, step = Adam(network, 0.01, 0.9, 0.99, l1=0.5), step_class(network, 0.3)
+    step.seed(1)
+    for _ in range(10):
+        masks = step.masks(len(x))
+        theirs.zero_grad()
+        weights = sum(torch.mean(torch.abs(layer[:, :, :-1])) for layer in layers)
+        error = definition.loss(network, layers, x, y, p, masks)
+        (error + 0.5 * weights / (2 * len(layers))).backward()
+        theirs.step()
+        step(x, y, p, masks)
+        ours.step(step.gradients)
+    for mine, plain in zip(network.layers, layers, strict=True):
+        assert torch.allclose(mine, plain, rtol=1e-9, atol=1e-11)
+
+
+@pytest.mark.parametrize(("kind", "arguments"), LARGE)
+@pytest.mark.parametrize("step_class", STEPS)
+@pytest.mark.parametrize("half", [False, True])
+def test_the_gradient_is_exact_to_the_precision_of_the_factors(step_class, kind, arguments, half) -> None:
+    network, x, y, p = problem(kind, arguments, 40, torch.float32, 0.1)
+    exact = network.to("cpu", torch.float64)
+    step, reference = step_class(network, 0.3, half), AutogradStep(exact, 0.3)
+    masks = step.masks(len(x))
+    found = step(x.clone(), y, p, masks)
+    wanted = reference(x.double(), y.double(), p.double(), [mask.double() for mask in masks])
+    assert found.dtype == torch.float32
+    assert float(found) == pytest.approx(float(wanted), rel=1e-2 if half else 1e-5)
+    for mine, plain in zip(step.gradients, reference.gradients, strict=True):
+        mine = mine.double().view(plain.shape)
+        assert float((mine - plain).norm() / plain.norm()) < (0.03 if half else 1e-5)
+
+
+@pytest.mark.parametrize("step_class", STEPS)
+@pytest.mark.parametrize("dropout", [0.0, 0.3])
+def test_dropout_keeps_its_share_and_scales_it_up(step_class, dropout: float) -> None:
+    step = step_class(fresh((300, 200, 10)), dropout)
+    step.seed(9)
+    first = step.masks(500)
+    assert [tuple(mask.shape) for mask in first] == [(500, 300), (500, 200)]
+    for mask in first:
+        assert set(mask.unique().tolist()) <= {0.0, torch.tensor(1 / (1 - dropout)).item()}
+        assert float((mask > 0).float().mean()) == pytest.approx(1 - dropout, abs=0.005)
+        assert float((mask > 0).float().mean(0).std()) < 0.05  # no column is dropped more often than others
+        assert float((mask > 0).float().mean(1).std()) < 0.05
+    second = step.masks(500)
+    step.seed(9)
+    assert all(torch.equal(a, b) for a, b in zip(first, step.masks(500), strict=True))
+    if dropout:
+        both = (first[0] > 0) & (second[0] > 0)
+        assert float(both.float().mean()) == pytest.approx((1 - dropout) ** 2, abs=0.01)
+
+
+def test_initial_weights_fill_their_bounds_and_biases_are_zero() -> None:
+    network = new(TrainableMann, (40, 30, 20), 4, (5, 8, 4), (0, 1, 2, 3, 4))
+    for layer, (a, b) in zip(network.layers, ((5, 8), (8, 4), (40, 30), (30, 20)), strict=True):
+        bound = (6 / (a * b)) ** 0.5
+        assert torch.count_nonzero(layer[:, :, -1]) == 0
+        assert 0.9 * bound < float(layer[:, :, :-1].abs().max()) <= bound
+    assert not torch.equal(network.layers[2][:, 0], network.layers[2][:, 1]), "experts differ"
+
+
+def test_the_formula_shows_each_hidden_layer() -> None:
+    three = fresh((9, 8, 7, 6, 5)).file_metadata["network"]
+    assert three.startswith("y = W3 elu(W2 elu(W1 elu(W0 x + b0) + b1) + b2) + b3 on standardised x and y")
