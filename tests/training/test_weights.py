@@ -14,7 +14,7 @@ from hobble.core.errors import HobbleError
 from hobble.core.files import load_npz
 from hobble.core.skeleton import Skeleton
 from hobble.database.reader import Database
-from hobble.models.network import TrainingFacts
+from hobble.models.load import read_facts
 from hobble.models.pfnn import PfnnOptions
 from hobble.rows.layout import CONTACTS, GAITS, RowLayout
 from hobble.training.run import write_weights
@@ -61,7 +61,7 @@ def test_the_weights_file_describes_its_columns(data: Database, tmp_path: Path) 
 def test_the_weights_file_has_the_ranges_of_the_training_rows_only(data: Database, tmp_path: Path) -> None:
     write(tmp_path / "weights.npz", data)
     arrays = load_npz(tmp_path / "weights.npz")
-    seen = TrainingFacts.read("weights.npz", arrays, data.layout.x_size, data.layout.y_size)
+    seen = read_facts("weights.npz", arrays, data.layout.x_size, data.layout.y_size)
     assert seen is not None
     blocks = list(data.blocks("train", 0, 0, 1, 0))
     s = data.statistics

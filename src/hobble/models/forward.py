@@ -84,6 +84,5 @@ def phase_shares(phase: Any, points: Any) -> Any:
 
 def weights_at(points: Array, phase: Array) -> Array:
     """The values (P, ...) float64 at phases (P,) of splines with the control points `points` (K, ...)."""
-    return np.tensordot(
-        phase_shares(np.asarray(phase, float), np.arange(len(points))), points.astype(float), 1
-    )
+    shares = phase_shares(np.atleast_1d(np.asarray(phase, float)), np.arange(len(points)))
+    return np.tensordot(shares, points.astype(float), 1)

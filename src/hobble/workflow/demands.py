@@ -228,8 +228,9 @@ class Demands:
     def parameter_count(self, configuration: str) -> float:
         """Number of trained parameters of a configuration's network; 0 if it is not trained."""
         chosen, layout = self.project.catalogue.configuration(configuration), self.layout(configuration)
-        is_trained = isinstance(chosen.network, TrainedOptions)
-        return chosen.network.parameter_count(layout.x_size, layout.y_size) if is_trained else 0
+        if isinstance(chosen.network, TrainedOptions):
+            return chosen.network.parameter_count(layout.x_size, layout.y_size)
+        return 0
 
     def layout(self, configuration: str) -> RowLayout:
         """The columns of a configuration's rows."""
