@@ -15,6 +15,7 @@ from hobble.core.files import load_npz
 from hobble.core.skeleton import Skeleton
 from hobble.database.reader import Database
 from hobble.models.load import read_facts
+from hobble.models.network import TrainingFacts
 from hobble.models.pfnn import PfnnOptions
 from hobble.rows.layout import CONTACTS, GAITS, RowLayout
 from hobble.training.run import write_weights
