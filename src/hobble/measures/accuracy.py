@@ -24,6 +24,7 @@ from hobble.measures.compare import (
     ConfigurationResults,
     compare_series,
     published_row,
+    published_sd,
 )
 from hobble.measures.measure import SPLITS, Cost, JointOptions, Measure, Row, SampleOptions, sample_in_words
 from hobble.report.parts import SPLITS as SPLIT_LABELS
@@ -133,22 +134,18 @@ def clip_bars(found: Json, material: ReportMaterial) -> Chart | None:
     if published:
         shape, note = reference_line(100 * published["mean"], f"{published['label']}, published")
         shapes, notes = [shape], [note]
-    order = [row["clip"] for row in rows]
+    held_out = any(row["split"] == "held_out" for row in rows)
     return Chart(
         "accuracy-clips",
         "Error of each clip",
         "The error of a joint is the distance between its predicted and its captured position, divided by "
         "its distance from the root (eq. 3.1 of Segerstedt). Bars are means over frames and joints. Whiskers "
         "are one standard deviation long."
-        + (
-            " Held-out clips come first: the network was not trained on them."
-            if any(row["split"] == "held_out" for row in rows)
-            else ""
-        ),
+        + (" Held-out clips come first: the network was not trained on them." if held_out else ""),
         traces,
         {
             "xaxis": axis("relative error, %", rangemode="tozero"),
-            "yaxis": {"categoryorder": "array", "categoryarray": order, "automargin": True},
+            "yaxis": _clip_axis([row["clip"] for row in rows]),
             "shapes": shapes,
             "annotations": notes,
             "bargap": 0.35,
@@ -160,33 +157,15 @@ def clip_bars(found: Json, material: ReportMaterial) -> Chart | None:
 
 def clip_boxes(found: Json) -> Chart | None:
     """A box for each clip: quantiles of its error over frames and joints. None if no clip has quantiles."""
-    rows = [row for row in _rows(found)[::-1] if quantiles(row)]  # plotly puts the first clip at the bottom
+    rows = [row for row in _rows(found)[::-1] if has_quantiles(row)]  # plotly puts the first at the bottom
     if not rows:
         return None
     traces = []
-    for split in ("held_out", "train"):
-        chosen = [row for row in rows if row["split"] == split]
-        if not chosen:
-            continue
-        values = [[100 * v for v in quantiles(row)] for row in chosen]  # type: ignore[union-attr]
-        low, q1, median, q3, high = (list(column) for column in zip(*values, strict=True))
-        traces.append(
-            {
-                "type": "box",
-                "orientation": "h",
-                "name": NAMES[split],
-                "y": [row["clip"] for row in chosen],
-                "lowerfence": low,
-                "q1": q1,
-                "median": median,
-                "q3": q3,
-                "upperfence": high,
-                "mean": [100 * row["mean"] for row in chosen],
-                "marker": {"color": COLOURS[split]},
-                "line": {"width": 1.4, "color": COLOURS[split] if split == "held_out" else "@faint"},
-                "fillcolor": "@accent-wash" if split == "held_out" else "@sunken",
-            }
-        )
+    for split, fill, line in (("held_out", "@accent-wash", "@accent"), ("train", "@sunken", "@faint")):
+        if chosen := [row for row in rows if row["split"] == split]:
+            box = boxes(NAMES[split], chosen, COLOURS[split])
+            place = {"orientation": "h", "y": [row["clip"] for row in chosen]}
+            traces.append({**box, **place, "line": {"width": 1.4, "color": line}, "fillcolor": fill})
     return Chart(
         "accuracy-boxes",
         "Spread within each clip",
@@ -196,40 +175,36 @@ def clip_boxes(found: Json) -> Chart | None:
         traces,
         {
             "xaxis": axis("relative error, %", rangemode="tozero"),
-            "yaxis": {
-                "categoryorder": "array",
-                "categoryarray": [r["clip"] for r in rows],
-                "automargin": True,
-            },
+            "yaxis": _clip_axis([row["clip"] for row in rows]),
             "boxmode": "overlay",
         },
         height=_height(len(rows)),
     )
 
 
-def quantiles(row: dict[str, Any]) -> list[float] | None:
-    """The 5th, 25th, 50th, 75th and 95th percentile of the relative error; None if one is missing.
+def boxes(name: str, errors: Sequence[Json], colour: str) -> Trace:
+    """Plotly boxes of the relative error in %, one for each entry of accuracy.json in `errors`."""
+    low, q1, median, q3, high = ([100 * entry[key] for entry in errors] for key in QUANTILES)
+    fences = {"lowerfence": low, "q1": q1, "median": median, "q3": q3, "upperfence": high}
+    mean = [100 * entry["mean"] for entry in errors]
+    return {"type": "box", "name": name, **fences, "mean": mean, "marker": {"color": colour}}
 
-    row: the errors of a clip or a split, as in accuracy.json.
-    """
-    values = [row[key] for key in QUANTILES if row.get(key) is not None]
-    return values if len(values) == len(QUANTILES) else None
+
+def _clip_axis(clips: Sequence[str]) -> dict[str, Any]:
+    """The vertical axis of a chart with a row for each clip, from the bottom."""
+    return {"categoryorder": "array", "categoryarray": list(clips), "automargin": True}
+
+
+def has_quantiles(row: Json) -> bool:
+    """Whether the errors of a clip or a split have all QUANTILES."""
+    return all(row.get(key) is not None for key in QUANTILES)
 
 
 def accuracy_table(found: Json, name: str) -> Table:
     """A row for each clip that was measured: its number of frames and its errors. name: the configuration."""
-    columns = [
-        Column("clip"),
-        Column("split", lambda value: NAMES.get(value, value)),
-        Column.count("frames"),
-        Column.number("mean"),
-        Column.number("sd"),
-        Column.number("position error, cm"),
-    ]
-    rows = [
-        [r["clip"], r["split"], r.get("frames"), r["mean"], r.get("sd"), r.get("position_error_cm")]
-        for r in _rows(found)
-    ]
+    columns = [Column("clip"), Column("split", lambda value: NAMES.get(value, value)), Column.count("frames")]
+    columns += [Column.number(label) for label in ("mean", "sd", "position error, cm")]
+    rows = [[row.get(key) for key in CLIP_COLUMNS[: len(columns)]] for row in _rows(found)]
     return Table(f"{name}-accuracy", columns, rows)
 
 
@@ -446,20 +421,19 @@ def accuracy_differences(all_measured: Sequence[ConfigurationResults]) -> list[d
     There is a row for each split and each clip on which both configurations were measured. `over` is the name
     of this split or clip.
     """
-    out: list[dict[str, Any]] = []
-    for a, b in combinations(all_measured, 2):
-        errors_a, errors_b = ({**_errors_of_splits(m), **_errors_of_clips(m)} for m in (a, b))
-        for over in errors_a:
-            if over in errors_b and errors_a[over]["frames"] and errors_b[over]["frames"]:
-                differences = compare_series(errors_a[over], errors_b[over])
-                out.append({"a": a.name, "b": b.name, "over": over, **differences})
-    return out
+    series = {m.name: _series(m.results_of(NAME)) for m in all_measured}
+    return [
+        {"a": a, "b": b, "over": over, **compare_series(series[a][over], series[b][over])}
+        for a, b in combinations(series, 2)
+        for over in series[a]
+        if over in series[b] and series[a][over]["frames"] and series[b][over]["frames"]
+    ]
 
 
-def _errors_of_splits(results: ConfigurationResults) -> dict[str, Json]:
-    """Split -> its errors over all frames, with the mean errors of its clips under `means`."""
-    found = results.results_of(NAME)
-    return {split: {**found[split], "means": clip_means(found, split)} for split in SPLITS}
+def _series(found: Json) -> dict[str, Json]:
+    """Split or clip -> its errors. A split also has `means`, the mean errors of its clips."""
+    splits = {split: {**found[split], "means": clip_means(found, split)} for split in SPLITS}
+    return {**splits, **{entry["clip"]: entry for entry in found["clips"]}}
 
 
 def clip_means(found: Json, split: str) -> list[float]:
@@ -469,20 +443,16 @@ def clip_means(found: Json, split: str) -> list[float]:
 
 def _published_splits(all_measured: Sequence[ConfigurationResults], published: Json) -> list[dict[str, Any]]:
     """Published errors of each configuration, beside our errors on each split."""
-    by_name = {m.name: m for m in all_measured}
+    by_name = {m.name: m.results_of(NAME) for m in all_measured}
     out = []
     for row in published["accuracy"]:
-        results = by_name.get(row["configuration"])
+        found = by_name.get(row["configuration"])
         for split in SPLITS:
-            ours = results.results_of(NAME)[split]["mean_of_clips"] if results else None
-            out.append(published_row(f"relative error, {SPLIT_NAMES[split]} clips", row, row["mean"], ours))
-            if "sd" in row:
-                # The standard deviation (sd) was printed in the text of the publication, not in its table.
-                in_text = {**row, "table": None}
-                means = clip_means(results.results_of(NAME), split) if results else []
-                sd = float(np.std(means)) if len(means) > 1 else None
-                what = f"standard deviation of the means of {SPLIT_NAMES[split]} clips"
-                out.append(published_row(what, in_text, row["sd"], sd))
+            clips = f"{SPLIT_NAMES[split]} clips"
+            ours = found[split]["mean_of_clips"] if found else None
+            out.append(published_row(f"relative error, {clips}", row, row["mean"], ours))
+            means = clip_means(found, split) if found else []
+            out += published_sd(f"standard deviation of the means of {clips}", row, means)
     return out
 
 
@@ -493,36 +463,34 @@ def _published_clips(all_measured: Sequence[ConfigurationResults], published: Js
     do not. Segerstedt (2021) published the errors of two networks: "segerstedt" is his own, "release" is the
     network that Holden et al. released.
     """
-    out = []
-    for row in published["clips"]:
-        for results in all_measured:
-            for clip in results.results_of(NAME)["clips"]:
-                if clip["clip"].removesuffix("_000") == row["clip"]:
-                    for source in ("segerstedt", "release"):
-                        entry = {"configuration": results.name, "source": source}
-                        what = f"relative error, {clip['clip']}"
-                        out.append(published_row(what, entry, row[source], clip["mean"]))
-    return out
+    return [
+        published_row(
+            f"relative error, {clip['clip']}",
+            {"configuration": results.name, "source": source},
+            row[source],
+            clip["mean"],
+        )
+        for row in published["clips"]
+        for results in all_measured
+        for clip in results.results_of(NAME)["clips"]
+        if clip["clip"].removesuffix("_000") == row["clip"]
+        for source in ("segerstedt", "release")
+    ]
 
 
-def _errors_of_clips(results: ConfigurationResults) -> dict[str, Json]:
-    """Clip -> its errors over all frames."""
-    return {entry["clip"]: entry for entry in results.results_of(NAME)["clips"]}
-
-
-# Columns of the table of pairs of configurations: (key in compare.json, heading). "one" and "other" are the
+# Columns of the table of pairs of configurations: key in compare.json -> heading. "one" and "other" are the
 # two configurations of a pair. "sd of frames" is the standard deviation over single frames. "sd of means" is
 # that of the means of clips, or, for frame times, of the means of laps on the test track.
-PAIR_COLUMNS = (
-    ("mean_a", "mean, one"),
-    ("sd_a", "sd of frames, one"),
-    ("sd_of_means_a", "sd of means, one"),
-    ("mean_b", "mean, other"),
-    ("sd_b", "sd of frames, other"),
-    ("sd_of_means_b", "sd of means, other"),
-    ("difference", "eq. 3.2, frames"),
-    ("difference_of_means", "eq. 3.2, means"),
-)
+PAIR_COLUMNS = {
+    "mean_a": "mean, one",
+    "sd_a": "sd of frames, one",
+    "sd_of_means_a": "sd of means, one",
+    "mean_b": "mean, other",
+    "sd_b": "sd of frames, other",
+    "sd_of_means_b": "sd of means, other",
+    "difference": "eq. 3.2, frames",
+    "difference_of_means": "eq. 3.2, means",
+}
 # The difference between two configurations is the difference of their mean errors, divided by standard
 # deviations (sd; eq. 3.2 of Segerstedt 2021). compare.json has it twice, with different standard deviations.
 # Key of the difference -> what it is divided by, for the menu of the chart.
@@ -559,54 +527,30 @@ def compared_columns(compared: Compared) -> Iterator[OverviewColumn]:
 
 def error_boxes(compared: Compared) -> Chart | None:
     """A box for each configuration: the spread of its error over all frames of a split. A menu selects it."""
-    options: dict[str, list[Trace]] = {}
+    colours, options = configuration_colours(compared), {}
     for split, label in SPLIT_LABELS.items():
-        traces: list[Trace] = []
+        traces = []
         for entry in compared["accuracy"]:
-            percentiles = quantiles(entry[split])
-            if percentiles is None:
-                continue
-            # In %. Each is a list, because plotly draws a box for each entry.
-            low, q1, median, q3, high = ([100 * value] for value in percentiles)
-            colour = configuration_colours(compared)[entry["configuration"]]
-            traces.append(
-                {
-                    "type": "box",
-                    "name": entry["configuration"],
-                    "x": [entry["configuration"]],
-                    "lowerfence": low,
-                    "q1": q1,
-                    "median": median,
-                    "q3": q3,
-                    "upperfence": high,
-                    "mean": [100 * entry[split]["mean"]],
-                    "boxmean": True,
-                    "marker": {"color": colour},
-                    "line": {"width": 1.6, "color": colour},
-                }
-            )
+            name = entry["configuration"]
+            if has_quantiles(entry[split]):
+                line = {"width": 1.6, "color": colours[name]}
+                box = boxes(name, [entry[split]], colours[name])
+                traces.append({**box, "x": [name], "boxmean": True, "line": line})
         if traces:
             options[label] = traces
-    published = [
-        row
-        for row in compared["published"]["accuracy"]
-        if row["configuration"] in configuration_names(compared)
-    ]
     if not options:
         return None
-    for traces in options.values():
-        if published:
-            traces.append(
-                {
-                    "type": "scatter",
-                    "mode": "markers",
-                    "name": "published mean",
-                    "x": [row["configuration"] for row in published],
-                    "y": [100 * row["mean"] for row in published],
-                    "marker": {"symbol": "diamond-open", "size": 10, "color": "@ink"},
-                    "hovertemplate": "%{x}: %{y:.2f} % published<extra></extra>",
-                }
-            )
+    names = configuration_names(compared)
+    published = [row for row in compared["published"]["accuracy"] if row["configuration"] in names]
+    marks: Trace = {
+        "type": "scatter",
+        "mode": "markers",
+        "name": "published mean",
+        "x": [row["configuration"] for row in published],
+        "y": [100 * row["mean"] for row in published],
+        "marker": {"symbol": "diamond-open", "size": 10, "color": "@ink"},
+        "hovertemplate": "%{x}: %{y:.2f} % published<extra></extra>",
+    }
     return Chart(
         "compare-boxes",
         "Spread of the error",
@@ -616,7 +560,7 @@ def error_boxes(compared: Compared) -> Chart | None:
         layout={"yaxis": axis("relative error, %", rangemode="tozero"), "showlegend": False},
         height=400,
         choose="Clips",
-        options=options,
+        options={label: [*traces, marks] if published else traces for label, traces in options.items()},
     )
 
 
@@ -630,13 +574,13 @@ def difference_table(compared: Compared) -> Table | None:
     pairs = [("error", r) for r in compared["difference"]]
     pairs += [("mean ms a frame", r) for r in compared["milliseconds"].get("difference", ())]
     rows = [
-        [r["a"], r["b"], f"{what}, {r['over'].replace('_', ' ')}", *(r.get(key) for key, _ in PAIR_COLUMNS)]
+        [r["a"], r["b"], f"{what}, {r['over'].replace('_', ' ')}", *(r.get(key) for key in PAIR_COLUMNS)]
         for what, r in pairs
     ]
     if not rows:
         return None
     columns = [Column("one"), Column("other"), Column("measured")]
-    columns += [Column.number(label) for _, label in PAIR_COLUMNS]
+    columns += [Column.number(label) for label in PAIR_COLUMNS.values()]
     return Table("compare-difference", columns, rows, "Differences between all pairs")
 
 
@@ -661,7 +605,7 @@ def clip_dots(compared: Compared) -> Chart | None:
         )
     layout = {
         "xaxis": axis("relative error, %", rangemode="tozero"),
-        "yaxis": {"categoryorder": "array", "categoryarray": order, "automargin": True, "type": "category"},
+        "yaxis": {**_clip_axis(order), "type": "category"},
     }
     caption = "Each row is a clip, with one dot for each configuration. Held-out clips are at the top."
     return Chart("compare-clips", "Error of each clip", caption, traces, layout, 130 + 19 * len(order))

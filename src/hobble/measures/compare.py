@@ -148,6 +148,16 @@ def published_row(
     }
 
 
+def published_sd(measure: str, row: Json, means: Sequence[float], unit: str = "") -> list[dict[str, Any]]:
+    """The published standard deviation of means next to ours; [] if `row` has none. measure: see above.
+
+    It was printed in the text of the publication, not in its table. means: ours, one for each clip or lap.
+    """
+    ours = float(np.std(means)) if len(means) > 1 else None
+    in_text = {**row, "table": None}
+    return [published_row(measure, in_text, row["sd"], ours, unit)] if "sd" in row else []
+
+
 def compare_configurations(all_measured: Sequence[ConfigurationResults], published: Json) -> Json:
     """The content of compare.json. Configurations are in the order of `all_measured`.
 

@@ -28,6 +28,7 @@ from hobble.measures.compare import (
     fit_line,
     flatten,
     published_row,
+    published_sd,
 )
 from hobble.measures.measure import Cost, Measure, Row
 from hobble.report.parts import (
@@ -107,34 +108,13 @@ STEPS = {
 OFF_TRACK = 100.0  # cm from the line between two waypoints; places farther away are marked in the chart
 
 
-def lap_steps(lap: dict[str, Any]) -> dict[str, float]:
-    """Step of a frame -> its mean milliseconds per frame in one lap.
-
-    If the lap only has the time of a whole frame, the key is "frame".
-    """
-    times = lap.get("milliseconds")
-    if isinstance(times, dict):
-        return {k: v for k, v in times.items() if k not in ("total", "sd") and isinstance(v, (int, float))}
-    return {"frame": times} if isinstance(times, (int, float)) else {}
-
-
-def step_order(step: str) -> int:
-    """A sort key: steps of a frame have the order of STEPS, and unknown steps come last."""
-    return list(STEPS).index(step) if step in STEPS else len(STEPS)
-
-
 def lap_chart(found: Json, material: ReportMaterial) -> Chart | None:
     """Milliseconds per frame of each step, stacked, lap by lap, for each phase mode."""
-    options = {}
-    for entry in found.get("modes") or [found]:
-        traces = _lap_bars(entry)
-        if traces:
-            options[f"{entry.get('mode', 'the')} phase"] = traces
-    if not options:
+    if not found.get("laps"):
         return None
     # The configured phase mode comes first, because the chart begins with the first option.
-    configured = f"{found.get('mode', 'the')} phase"
-    options = {name: options[name] for name in sorted(options, key=lambda name: name != configured)}
+    entries = sorted(found.get("modes", [found]), key=lambda entry: entry["mode"] != found["mode"])
+    options = {f"{entry['mode']} phase": _lap_bars(entry["laps"]) for entry in entries}
     shapes, notes = [], []
     published = material.published_entry("responsivity")
     if published:
@@ -142,13 +122,8 @@ def lap_chart(found: Json, material: ReportMaterial) -> Chart | None:
             published["milliseconds"], f"{published['label']}: published mean", vertical=False
         )
         shapes, notes = [shape], [note]
-    lap_counts = [max(len(trace["x"]) for trace in traces) for traces in options.values()]
-    laps = max(lap_counts)
-    fewer_laps = (
-        f" In the other phase modes there are only {min(lap_counts)} laps, to save time."
-        if min(lap_counts) < laps
-        else ""
-    )
+    laps, fewest = (pick(len(entry["laps"]) for entry in entries) for pick in (max, min))
+    fewer_laps = f" In the other phase modes there are only {fewest} laps, to save time."
     return Chart(
         "laps",
         "Milliseconds per frame, lap by lap",
@@ -157,7 +132,7 @@ def lap_chart(found: Json, material: ReportMaterial) -> Chart | None:
         "network's input; insert: standardise this input; predict: evaluate the network; output: turn its "
         "output into a pose; update: move on by a frame. A diamond is the median time of a whole frame. If "
         "another program delays a few frames, the bar becomes higher, but the diamond hardly moves. At 60 "
-        "Hz, a frame may take 16.7 ms." + fewer_laps,
+        "Hz, a frame may take 16.7 ms." + (fewer_laps if fewest < laps else ""),
         layout={
             "barmode": "stack",
             "xaxis": axis("lap", dtick=1 if laps < 25 else None),
@@ -236,46 +211,29 @@ def _off_track_markers(places: list[tuple[float, float, float, int]]) -> Trace:
     }
 
 
-def _lap_bars(entry: dict[str, Any]) -> list[Trace]:
-    """Stacked bars of the steps' mean times in each lap, and diamonds at the medians.
-
-    entry: the results of one phase mode.
-    """
-    laps = entry.get("laps")
-    laps = [lap for lap in laps if lap_steps(lap)] if isinstance(laps, list) else []
-    if not laps:
-        return []
-    numbers = [lap.get("lap", i + 1) for i, lap in enumerate(laps)]
+def _lap_bars(laps: Sequence[Json]) -> list[Trace]:
+    """Stacked bars of the steps' mean times in each lap of a phase mode, and diamonds at the medians."""
+    numbers, hover = [lap["lap"] for lap in laps], "lap %{x}: %{y:.3f} ms<extra>%{fullData.name}</extra>"
+    common = {"x": numbers, "hovertemplate": hover}
     bars: list[Trace] = [
         {
             "type": "bar",
             "name": step,
-            "x": numbers,
-            "y": [lap_steps(lap).get(step) for lap in laps],
-            "marker": {"color": STEPS.get(step, "@g0")},
-            "hovertemplate": "lap %{x}: %{y:.3f} ms<extra>%{fullData.name}</extra>",
+            "y": [lap["milliseconds"][step] for lap in laps],
+            "marker": {"color": colour},
+            **common,
         }
-        for step in sorted(lap_steps(laps[0]), key=step_order)
+        for step, colour in STEPS.items()
     ]
-    medians = [lap_median(lap) for lap in laps]
-    if all(value is None for value in medians):
-        return bars
     dots: Trace = {
         "type": "scatter",
         "mode": "markers",
         "name": "median",
-        "x": numbers,
-        "y": medians,
+        "y": [lap["milliseconds"]["spread"]["median"] for lap in laps],
         "marker": {"symbol": "diamond", "size": 8, "color": "@ink"},
-        "hovertemplate": "lap %{x}: %{y:.3f} ms<extra>%{fullData.name}</extra>",
+        **common,
     }
     return [*bars, dots]
-
-
-def lap_median(lap: dict[str, Any]) -> float | None:
-    """Median time of a whole frame in one lap, ms; None if it is not known."""
-    times = lap.get("milliseconds")
-    return (times.get("spread") or {}).get("median") if isinstance(times, dict) else None
 
 
 FEWEST_STEPS = 10  # if the character takes fewer steps, the mean foot slide is not shown
@@ -320,14 +278,13 @@ def section(found: Json, material: ReportMaterial) -> PageSection:
 
 def figures(found: Json, material: ReportMaterial) -> Iterator[KeyFigure]:
     """A key figure for the top of the report: the time of a frame."""
-    milliseconds = frame_milliseconds(found)
-    if milliseconds is not None:
+    if found.get("milliseconds"):
+        milliseconds = frame_milliseconds(found)
         published = material.published_entry("responsivity")
-        note = (
-            f"median; one core can run {format_number(FRAME_BUDGET_MS / milliseconds, 3)} characters at 60 Hz"
-        )
+        characters = format_number(FRAME_BUDGET_MS / milliseconds, 3)
+        note = f"median; one core can run {characters} characters at 60 Hz"
         if published:
-            mean = format_number(frame_mean(found), 2)
+            mean = format_number(found["milliseconds"]["total"], 2)
             note += f"; mean {mean} ms, published mean {published['milliseconds']} ms"
         yield KeyFigure("Time per frame", format_number(milliseconds, 2), "ms", note, 20)
 
@@ -341,50 +298,41 @@ def hints(found: Json, material: ReportMaterial) -> Iterator[Hint]:
 def lap_table(found: Json, name: str) -> Table | None:
     """A row per lap: how it went, the mean time of each step of a frame, and the median time of a frame."""
     laps = found.get("laps")
-    if not isinstance(laps, list) or not laps:
+    if not laps:
         return None
-    lap_columns = {key: column for key, column in LAP_COLUMNS.items() if key in laps[0]}
-    frame_steps = sorted(lap_steps(laps[0]), key=step_order)
-    columns = [*lap_columns.values(), *(Column.number(f"{step}, mean ms") for step in frame_steps)]
-    columns.append(Column.number("whole frame, median ms"))
+    columns = {key: column for key, column in LAP_COLUMNS.items() if key in laps[0]}
     rows = [
         [
-            None if key == "foot_slide_cm" and _too_few_steps(lap.get("steps")) else lap.get(key)
-            for key in lap_columns
+            *(
+                None if key == "foot_slide_cm" and lap["steps"] < FEWEST_STEPS else lap[key]
+                for key in columns
+            ),
+            *(lap["milliseconds"][step] for step in STEPS),
+            lap["milliseconds"]["spread"]["median"],
         ]
-        + [lap_steps(lap).get(step) for step in frame_steps]
-        + [lap_median(lap)]
         for lap in laps
     ]
-    return Table(f"{name}-responsivity", columns, rows)
-
-
-def _too_few_steps(steps: int | None) -> bool:
-    """Whether the character took too few steps for a mean foot slide."""
-    return steps is not None and steps < FEWEST_STEPS
+    heads = [*columns.values(), *(Column.number(f"{step}, mean ms") for step in STEPS)]
+    return Table(f"{name}-responsivity", [*heads, Column.number("whole frame, median ms")], rows)
 
 
 def track_figures(found: Json) -> list[KeyFigure]:
     """Key figures: how well the character followed the track."""
-    if not isinstance(found.get("laps"), list):
+    if not found.get("laps"):
         return []
-    spread = (found.get("milliseconds") or {}).get("spread") or {}
-    reached = f"{found.get('waypoints_reached')} of {found.get('waypoints')}"
-    steps = sum(lap.get("steps") or 0 for lap in found["laps"])
-    slide = None if _too_few_steps(steps) else found.get("foot_slide_cm")
+    spread, laps = found["milliseconds"]["spread"], found["laps"]
+    reached = f"{found['waypoints_reached']} of {found['waypoints']}"
+    steps = sum(lap["steps"] for lap in laps)
+    slide = None if steps < FEWEST_STEPS else found["foot_slide_cm"]
     slide_note = f"mean slide of a toe during a stance, averaged over the laps ({steps:,} steps)"
-    laps = f"{found.get('laps_finished')} of {len(found['laps'])} laps finished"
+    finished = f"{found['laps_finished']} of {len(laps)} laps finished"
+    overshoot = format_number(found["path_overshoot_cm"])
     return [
-        KeyFigure("Waypoints reached", reached, "", laps),
-        KeyFigure(
-            "Largest distance from the track",
-            format_number(found.get("path_overshoot_cm")),
-            "cm",
-            "the largest of all laps",
-        ),
+        KeyFigure("Waypoints reached", reached, "", finished),
+        KeyFigure("Largest distance from the track", overshoot, "cm", "the largest of all laps"),
         KeyFigure("Foot slide", format_number(slide), "cm" if slide is not None else "", slide_note),
         _turn_figure(found),
-        KeyFigure("Slow frames", format_number(spread.get("p99")), "ms", "1 % of the frames are slower"),
+        KeyFigure("Slow frames", format_number(spread["p99"]), "ms", "1 % of the frames are slower"),
     ]
 
 
@@ -409,86 +357,48 @@ def _turn_figure(found: Json) -> KeyFigure:
 
 def speed_table(found: Json, material: ReportMaterial) -> Table | None:
     """A table of milliseconds per frame: our median and mean, followed by the published means."""
-    ours = frame_milliseconds(found)
-    if ours is None:
+    if not found.get("milliseconds"):
         return None
-    sources = material.published["sources"]
-    mode = found.get("mode")
-    rows: list[list[Any]] = [
-        [
-            f"{material.name}, {mode} phase" if mode else material.name,
-            ours,
-            frame_mean(found),
-            "this report",
-        ]
-    ]
-    for entry in material.published["responsivity"]:
-        rows.append([entry["label"], None, entry["milliseconds"], citation(entry, sources)])
-    for entry in material.published["modes"]:
-        rows.append(
-            [
-                f"prediction alone, {entry['mode']} phase",
-                None,
-                entry["milliseconds"],
-                citation(entry, sources),
-            ]
-        )
-    columns = [
-        Column("network"),
-        Column.number("median, ms per frame"),
-        Column.number("mean, ms per frame"),
-        Column("source", kind="long"),
-    ]
+    sources, ours = material.published["sources"], frame_milliseconds(found)
+    whose = f"{material.name}, {found['mode']} phase"
+    rows: list[list[Any]] = [[whose, ours, found["milliseconds"]["total"], "this report"]]
+    for entry in (*material.published["responsivity"], *material.published["modes"]):
+        what = entry.get("label") or f"prediction alone, {entry['mode']} phase"
+        rows.append([what, None, entry["milliseconds"], citation(entry, sources)])
+    columns = [Column("network"), Column.number("median, ms per frame"), Column.number("mean, ms per frame")]
+    columns.append(Column("source", kind="long"))
     return Table(f"{material.name}-published-speed", columns, rows, "Comparison with published results")
 
 
-def frame_milliseconds(found: Json) -> float | None:
-    """Median milliseconds of a whole frame over all laps; the mean if there is no median.
-
-    The median is shown because a few slow frames hardly change it.
-    """
-    times = found.get("milliseconds")
-    median = (times.get("spread") or {}).get("median") if isinstance(times, dict) else None
-    return frame_mean(found) if median is None else float(median)
-
-
-def frame_mean(found: Json) -> float | None:
-    """Mean milliseconds of a whole frame, to compare with the published means."""
-    value = found.get("milliseconds")
-    if isinstance(value, dict):
-        value = value.get("total", sum(v for v in value.values() if isinstance(v, (int, float))))
-    return float(value) if isinstance(value, (int, float)) else None
+def frame_milliseconds(found: Json) -> float:
+    """Median milliseconds of a whole frame over all laps. A few slow frames hardly change it."""
+    return float(found["milliseconds"]["spread"]["median"])
 
 
 def _speed_hints(found: Json) -> Iterator[Hint]:
-    milliseconds = frame_milliseconds(found)
-    if milliseconds is None:
+    if not found.get("milliseconds"):
         return
+    milliseconds, slow = frame_milliseconds(found), found["milliseconds"]["spread"]["p99"]
     if milliseconds > FRAME_BUDGET_MS:
         yield Hint(
             "warn",
             f"A frame takes {milliseconds:.1f} ms, too slow for 60 Hz.",
             "Try mode: linear in the section runtime.",
         )
-        return
-    share = milliseconds / FRAME_BUDGET_MS
-    times = found.get("milliseconds")
-    slow = (times.get("spread") or {}).get("p99") if isinstance(times, dict) else None
-    if slow is not None and slow > FRAME_BUDGET_MS:
+    elif slow > FRAME_BUDGET_MS:
         yield Hint(
             "warn",
             f"1 % of the frames take {slow:.1f} ms or more, too slow for 60 Hz.",
             f"The median is {milliseconds:.2f} ms. Measure again while nothing else runs on the machine.",
         )
-    elif slow is not None:
+    else:
+        share = 100 * milliseconds / FRAME_BUDGET_MS
         yield Hint(
             "good",
-            f"A frame takes {100 * share:.1f} % of the 16.7 ms that 60 Hz allows. 99 of 100 frames take at "
+            f"A frame takes {share:.1f} % of the 16.7 ms that 60 Hz allows. 99 of 100 frames take at "
             f"most {math.ceil(100 * slow / FRAME_BUDGET_MS)} % of that time.",
             "That is fast enough for a game.",
         )
-    else:
-        yield Hint("good", f"A frame takes {100 * share:.1f} % of the 16.7 ms that 60 Hz allows.", "")
 
 
 def _track_hints(found: Json) -> Iterator[Hint]:
@@ -665,18 +575,14 @@ def _published_times(all_measured: Sequence[ConfigurationResults], published: Js
     by_name = {m.name: m for m in all_measured}
     out = []
     for row in published["responsivity"]:
-        results = by_name.get(row["configuration"])
-        ours = results.results_of(NAME)["milliseconds"]["total"] if results else None
+        m = by_name.get(row["configuration"])
+        ours = m.results_of(NAME)["milliseconds"]["total"] if m else None
         out.append(published_row("a frame", row, row["milliseconds"], ours, "ms"))
-        if "sd" in row:
-            in_text = {**row, "table": None}  # the standard deviation is only in the text of the thesis
-            means = lap_means(results.results_of(NAME)) if results else []
-            sd = float(np.std(means)) if len(means) > 1 else None
-            out.append(published_row("standard deviation of the means of laps", in_text, row["sd"], sd, "ms"))
+        means = lap_means(m.results_of(NAME)) if m else []
+        out += published_sd("standard deviation of the means of laps", row, means, "ms")
     for row in published["modes"]:
-        results = by_name.get(row["configuration"])
-        entries = mode_entries(results) if results else []
-        times = {entry["mode"]: entry["milliseconds"]["predict"] for entry in entries}
+        m = by_name.get(row["configuration"])
+        times = {e["mode"]: e["milliseconds"]["predict"] for e in (mode_entries(m) if m else ())}
         what = f"a prediction, {row['mode']}"
         out.append(published_row(what, row, row["milliseconds"], times.get(row["mode"]), "ms"))
     return out
