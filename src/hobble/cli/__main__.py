@@ -3,14 +3,22 @@
 from __future__ import annotations
 
 import argparse
+import inspect
 import sys
 from collections.abc import Callable, Sequence
+from typing import Any
 
-from hobble.cli import injury, labels, motion, play
+from hobble.cli.commands import Injury, Labels, Motion, Play
 from hobble.core.errors import HobbleError
 from hobble.measures import study
 
-COMMANDS = {"motion": motion, "labels": labels, "injury": injury, "study": study, "play": play}
+COMMANDS: dict[str, Any] = {
+    "motion": Motion,
+    "labels": Labels,
+    "injury": Injury,
+    "study": study,
+    "play": Play,
+}
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -25,7 +33,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     )
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
     for name, module in COMMANDS.items():
-        text = str(module.__doc__)  # its first line is the entry in the list of subcommands
+        text = str(inspect.getdoc(module))  # its first line is the entry in the list of subcommands
         command = commands.add_parser(
             name,
             help=text.splitlines()[0],

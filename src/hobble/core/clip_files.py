@@ -76,6 +76,21 @@ def require_single_file(clip: str, files: list[Path]) -> Path:
     return files[0]
 
 
+def clips_in(folder: Path) -> dict[str, Path]:
+    """Clip name -> BVH file, for all files in a folder and its subfolders. `folder` may also be one file.
+
+    Raises InputError if there are none, or if two files have the same clip name.
+    """
+    if folder.is_file():
+        return {folder.stem: folder}
+    if not folder.is_dir():
+        raise InputError(folder, "no such file or folder")
+    found = {name: require_single_file(name, files) for name, files in sorted(find_clips(folder).items())}
+    if not found:
+        raise InputError(folder, "no .bvh files here")
+    return found
+
+
 def unused_file_notes(folder: Path, clips: Collection[str]) -> list[str]:
     """Warnings about the files in a folder and its subfolders that belong to no clip.
 

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from hobble.core.clip import Clip
-from hobble.core.clip_files import find_clips, require_single_file, unused_file_notes
+from hobble.core.clip_files import clips_in, unused_file_notes
 from hobble.core.errors import HobbleError, InputError
 from hobble.core.files import load_npz, save_npz
 from hobble.core.quat import Array
@@ -201,13 +201,7 @@ def summarise_clips(
     skeleton_folder: the folder of the skeleton files. options: how the files are read (the section `motion`
     of a data set).
     """
-    files = (
-        [folder]
-        if folder.is_file()
-        else [require_single_file(n, f) for n, f in sorted(find_clips(folder).items())]
-    )
-    if not files:
-        raise InputError(folder, "no .bvh files here")
+    files = list(clips_in(folder).values())
     clips = tuple(
         _summary_of_file(file, skeleton, skeleton_folder, options or ClipMotion()) for file in files
     )

@@ -242,3 +242,24 @@ def guess_roles(rig: Skeleton) -> dict[str, str]:
 def _quoted(name: str) -> str:
     """A name as a YAML string in single quotes."""
     return "'" + name.replace("'", "''") + "'"
+
+
+def skeleton_folder() -> Path:
+    """The folder of the skeleton files, in the repository or else in the installed package."""
+    package = Path(__file__).resolve().parents[1]
+    in_repository = package.parents[1] / "config" / "skeletons"
+    return in_repository if in_repository.is_dir() else package / "skeletons"
+
+
+def find_skeleton(name: str) -> Path:
+    """The path of a skeleton file. name: a skeleton's name, or a path to a YAML file.
+
+    Raises InputError if there is no skeleton of that name.
+    """
+    if name.endswith((".yaml", ".yml")):
+        return Path(name)
+    path = skeleton_folder() / f"{name}.yaml"
+    if not path.is_file():
+        known = ", ".join(sorted(other.stem for other in path.parent.glob("*.yaml")))
+        raise InputError(path, "no such skeleton", fix=f"Use {known}, or the path of a YAML file.")
+    return path
