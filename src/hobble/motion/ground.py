@@ -15,7 +15,7 @@ from hobble.core import quat
 from hobble.core.clip import Clip
 from hobble.core.errors import InputError
 from hobble.core.quat import Array
-from hobble.motion.axes import UP, unit
+from hobble.motion.axes import UP, body_axes, unit
 from hobble.motion.body import SIDES
 from hobble.motion.physics import Balance, find_balance
 from hobble.motion.rig import leg_length
@@ -175,10 +175,9 @@ def _fitted_plane(horizontal: Array, height: Array) -> tuple[Array, Array]:
 
 def _body_directions(clip: Clip) -> tuple[Array, Array, Array]:
     """Three unit vectors (F, 3): up along the trunk, up along the legs, and from right to left."""
-    at = {role: clip.positions[:, clip.skeleton.role(role)] for role in clip.skeleton.roles}
-    across = at["left_hip"] - at["right_hip"] + at["left_shoulder"] - at["right_shoulder"]
-    legs = at["hips"] - 0.5 * (at["left_heel"] + at["right_heel"])
-    return unit(at["head"] - at["hips"]), unit(legs), unit(across)
+    left, trunk, _ = body_axes(clip.skeleton, clip.positions)
+    hips, *heels = (clip.positions[:, clip.skeleton.role(r)] for r in ("hips", "left_heel", "right_heel"))
+    return trunk, unit(hips - 0.5 * (heels[0] + heels[1])), left
 
 
 def _up_from_posture(trunk: Array, legs: Array, across: Array) -> Array:

@@ -17,7 +17,7 @@ import numpy as np
 from hobble.core.quat import Array
 from hobble.motion.axes import bend_direction, unit
 from hobble.motion.body import SIDES, Body, lowest_common_ancestor, middle, path_between, path_to_root
-from hobble.motion.names import are_twins, is_control, is_end, limb_parts, part_of, side_of, side_of_pair
+from hobble.motion.names import are_twins, is_end, kind_score, limb_parts, part_of, side_of, side_of_pair
 
 SAMPLES = 150  # at most this many frames of the clip are looked at
 # The lengths of a bone and its counterpart differ by at most this share. If names say left and right, twice
@@ -32,14 +32,10 @@ RATIOS = {"leg": (0.6, 1.6), "arm": (0.48, 1.6)}  # range of shank / thigh, and 
 # Least distance of the two hips as a share of the distance of the knees, and of the two shoulders as a share
 # of the distance of the elbows. The shares are small, because knees and elbows may be spread for balance.
 APART = {"leg": 0.2, "arm": 0.4}
-SWING = 10.0  # degrees: chains whose bend varies by this much or more get the full score in `_kind_score`
+SWING = 10.0  # degrees: chains whose bend varies by this much or more get the full score in `_score`
 # Largest mean cosine of the angle between legs and trunk, both seen from the hips. It is -1 if they point in
 # opposite directions, as in a standing body.
 AWAY = -0.2
-WORDS = {  # words in the names of joints (`names.part_of`) that suggest a kind of limb
-    "leg": {"thigh", "shank", "foot", "ankle", "toe", "leg", "hip"},
-    "arm": {"clavicle", "upperarm", "forearm", "hand", "wrist", "finger", "arm", "shoulder"},
-}
 # Parts of a limb, from the trunk outward. Each is the name of the joint where the part begins.
 PARTS = {"leg": ("thigh", "shank", "foot"), "arm": ("upperarm", "forearm", "hand")}
 # A figure counts as four-legged if three things hold in more than the share NEARLY_ALL of the frames:
@@ -240,8 +236,8 @@ def _find_limbs(rig: MovingRig) -> tuple[Limbs, Limbs]:
                 continue
             # Legs are longer than arms, and point away from the trunk.
             score = np.log(_limb_length(rig, legs) / _limb_length(rig, arms)) - away
-            score += _kind_score(rig, legs, "leg")
-            score += _kind_score(rig, arms, "arm")
+            score += _score(rig, legs, "leg")
+            score += _score(rig, arms, "arm")
             if best is None or score >= best[0]:
                 best = score, legs, arms
     if best is None:
@@ -261,19 +257,13 @@ def _limb_length(rig: MovingRig, limbs: Limbs) -> float:
     return rig.distance(a, b) + rig.distance(b, c)
 
 
-def _kind_score(rig: MovingRig, limbs: Limbs, kind: str) -> float:
-    """Score from -1 to 2 for how much two limbs are like legs or arms. kind: "leg" or "arm".
+def _score(rig: MovingRig, limbs: Limbs, kind: str) -> float:
+    """Score from -1 to 2 for how much two limbs are like legs or arms, by their names and their motion.
 
-    Names of joints that suggest this kind of limb raise the score. Names of the other kind lower it, and so
-    do names of joints that are not part of the body but control other joints. Limbs also bend and stretch,
-    while hair, skirts and wings often keep one angle.
+    kind: "leg" or "arm". Limbs bend and stretch, while hair, skirts and wings often keep one angle.
     """
-    names = [rig.names[j] for chain in limbs.chains for j in chain]
-    parts = [part_of(name) for name in names]
-    other = WORDS["arm" if kind == "leg" else "leg"]
-    against = sum(part in other or is_control(name) for part, name in zip(parts, names, strict=True))
-    by_name = (sum(part in WORDS[kind] for part in parts) - against) / len(parts)
     ranges = [np.ptp(np.percentile(rig.bend_degrees(*joints), [3, 97])) for joints in limbs.joints]
+    by_name = kind_score([rig.names[j] for chain in limbs.chains for j in chain], kind)
     return by_name + float(np.minimum(np.mean(ranges) / SWING, 1.0))
 
 

@@ -42,6 +42,10 @@ WORDS = {
     "hip": "hip buttock femoral",
 }
 SPELLINGS = {part: tuple(known.split()) for part, known in WORDS.items()}
+KINDS = {  # parts that suggest a kind of limb
+    "leg": {"thigh", "shank", "foot", "ankle", "toe", "leg", "hip"},
+    "arm": {"clavicle", "upperarm", "forearm", "hand", "wrist", "finger", "arm", "shoulder"},
+}
 # Words in the names of joints that are no part of the body but move other joints.
 CONTROLS = ("ik", "mch", "ctrl", "control", "ctl", "pole", "target", "effector")
 ENDS = ("end", "nub", "site", "tip", "top")  # words in the names of joints that only mark the end of a bone
@@ -127,6 +131,17 @@ def is_end(name: str) -> bool:
 def is_control(name: str) -> bool:
     """Whether a name says that the joint is not part of the body but moves other joints, like foot_ik.L."""
     return any(w in CONTROLS for w in words(name))
+
+
+def kind_score(names: Sequence[str], kind: str) -> float:
+    """Score from -1 to 1 for how strongly the names of joints suggest a kind of limb, "leg" or "arm".
+
+    Names of the other kind lower the score. So do names of joints that only control other joints.
+    """
+    parts = [part_of(name) for name in names]
+    other = KINDS["arm" if kind == "leg" else "leg"]
+    against = sum(part in other or is_control(name) for part, name in zip(parts, names, strict=True))
+    return (sum(part in KINDS[kind] for part in parts) - against) / len(parts)
 
 
 def limb_parts(names: Sequence[str]) -> dict[str, int]:

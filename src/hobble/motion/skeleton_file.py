@@ -21,7 +21,7 @@ from hobble.core.errors import InputError
 from hobble.core.skeleton import Skeleton
 from hobble.core.untrusted import printable, read_text, read_yaml
 from hobble.motion.body import ARM, LEG, SIDES, TRUNK, lowest_common_ancestor, path_between, path_to_root
-from hobble.motion.names import limb_parts, part_of, side_of
+from hobble.motion.names import KINDS, limb_parts, part_of, side_of
 
 FARTHEST = 1e5  # cm: each component of a joint's offset from its parent is at most this large
 # The roles of each limb, from the trunk outward, and all roles that there are.
@@ -34,14 +34,8 @@ ORDER = (  # advice in error messages
 )
 APART = 0.25  # leg lengths: the joint from which the legs hang may be at most this far from the hips
 # A part of a limb (as `names.part_of` calls it) -> the role of the joint at which it begins.
-ROLE_OF_PART = {
-    "arm": {"upperarm": "shoulder", "forearm": "elbow", "hand": "wrist"},
-    "leg": {"thigh": "hip", "shank": "knee", "foot": "heel", "toe": "toe"},
-}
-WORDS = {  # what parts of a limb are called in names
-    "arm": ("clavicle", "shoulder", "upperarm", "arm", "forearm", "wrist", "hand"),
-    "leg": ("hip", "thigh", "leg", "shank", "ankle", "foot", "toe"),
-}
+ROLE_OF_PART = {"upperarm": "shoulder", "forearm": "elbow", "hand": "wrist"}
+ROLE_OF_PART |= {"thigh": "hip", "shank": "knee", "foot": "heel", "toe": "toe"}
 
 
 @dataclass(frozen=True)
@@ -232,10 +226,10 @@ def guess_roles(rig: Skeleton) -> dict[str, str]:
         if sides[name] is None and part in TRUNK:
             out.setdefault(part, name)
     for side in SIDES:
-        for limb, role_of in ROLE_OF_PART.items():
-            joints = [name for name in rig.joints if sides[name] == side and parts[name] in WORDS[limb]]
-            found = {part: joints[i] for part, i in limb_parts(joints).items()}
-            out |= {f"{side}_{role_of[part]}": name for part, name in found.items() if part in role_of}
+        for words in KINDS.values():
+            joints = [name for name in rig.joints if sides[name] == side and parts[name] in words]
+            found = {part: joints[i] for part, i in limb_parts(joints).items() if part in ROLE_OF_PART}
+            out |= {f"{side}_{ROLE_OF_PART[part]}": name for part, name in found.items()}
     return out
 
 
