@@ -1,4 +1,4 @@
-"""The name of a channel may occur only in its own folder."""
+"""The name of a channel may occur only in its own folder, and in what asks for this channel."""
 
 from __future__ import annotations
 
@@ -10,10 +10,16 @@ from pathlib import Path
 import pytest
 
 from hobble.channels import CHANNEL_NAMES
+from hobble.measures.measure import all_measures
 
 SRC = Path(__file__).parents[2] / "src" / "hobble"
 # The list of channels, and the generators of hurt motion, which write what one channel reads.
 ALLOWED = ("channels/__init__.py", "hurt/", "synthetic/")
+# What asks for one channel: its command, its films and their study. Measurements say so in `Measure.channel`.
+ENDS = (".py", "_run.py")
+ASKING = {
+    "injury": ("cli/__main__.py", "cli/injury.py", "measures/films.py", "measures/study.py"),
+}
 
 
 def words(path: Path) -> Iterator[str]:
@@ -37,11 +43,13 @@ def words(path: Path) -> Iterator[str]:
 def naming(name: str, folder: Path = SRC) -> list[str]:
     """The files under a folder that name a channel, without those of the channel itself."""
     found = []
+    asking = [f"measures/{one.name}{end}" for one in all_measures() if one.channel == name for end in ENDS]
+    allowed = (f"channels/{name}/", *ALLOWED, *ASKING.get(name, ()), *asking)
     for path in sorted(folder.rglob("*")):
         at = path.relative_to(folder).as_posix()
         if path.suffix not in (".py", ".js", ".j2", ".ts") or "node_modules" in at:
             continue
-        if at.startswith((f"channels/{name}/", *ALLOWED)):
+        if at.startswith(allowed):
             continue
         if any(re.search(rf"(?<![a-z]){name}(?![a-z])", text, re.IGNORECASE) for text in words(path)):
             found.append(at)

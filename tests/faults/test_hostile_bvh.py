@@ -115,7 +115,7 @@ def test_endless_files_are_refused(tmp_path: Path) -> None:
 
 
 def test_a_status_file_that_counts_two_billion_frames_takes_no_room(tmp_path: Path) -> None:
-    from hobble.channels.injury.severity import clip_severity
+    from hobble.channels.injury.status import clip_severity
     from hobble.core.clip import Clip
 
     skeleton = load_skeleton(SKELETON).skeleton

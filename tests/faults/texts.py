@@ -10,8 +10,7 @@ from typing import Any
 import numpy as np
 from hypothesis import HealthCheck, Phase, given, seed, settings
 
-from hobble.channels.injury.severity import range_warnings, severity_matrix
-from hobble.channels.injury.status import read_status
+from hobble.channels.injury.status import range_warnings, read_status, severity_matrix
 from hobble.core.errors import InputError
 from hobble.motion.make import make_clip
 from hobble.motion.options import ClipMotion

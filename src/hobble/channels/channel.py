@@ -10,14 +10,13 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import Any, Protocol
 
-# Methods import numpy themselves, because Snakemake imports this module while it plans its jobs. It does not
-# need numpy there and should not wait for it.
-if TYPE_CHECKING:
-    from hobble.core.clip import Clip
-    from hobble.core.quat import Array
-    from hobble.core.section import Section
+import numpy as np
+
+from hobble.core.clip import Clip
+from hobble.core.quat import Array
+from hobble.core.section import Section
 
 
 class HasLinks(Protocol):
@@ -129,8 +128,6 @@ class Channel(ABC):
         frame of 1,000 would reach 30 in this frame. A column that never varies gets a divisor so large that
         the column has no effect, because the network cannot learn what it means.
         """
-        import numpy as np
-
         length = float(np.sqrt(np.sum(std**2)))
         return np.where(std > CONSTANT_BELOW, max(self.highest / 10, length), SILENCING_STD)
 
@@ -139,8 +136,6 @@ class Channel(ABC):
 
         For spells see `find_spells`. Columns whose values are all 0 are left out.
         """
-        import numpy as np
-
         return {
             label: {
                 "seconds": float(np.sum(column > 0) / fps),
@@ -163,8 +158,6 @@ def find_spells(column: Array, fps: float, highest: float) -> list[list[float]]:
     A spell is a stretch of frames with values above 0 and without a jump. A value that rises or falls over
     many frames does not jump. highest: the channel's highest value.
     """
-    import numpy as np
-
     above = column > 0
     is_edge = (np.abs(np.diff(column)) > JUMP * highest) | (above[1:] != above[:-1])
     edges = np.concatenate([[0], np.flatnonzero(is_edge) + 1, [len(column)]])

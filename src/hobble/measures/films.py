@@ -26,7 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
-from hobble.channels.injury.shown import PARTS_WITH_SLIDER, PARTS_WITHOUT_SLIDER, links_between
+from hobble.channels.injury.shown import PARTS_WITH_SLIDER, PARTS_WITHOUT_SLIDER, link_of_part
 from hobble.core.errors import HobbleError
 from hobble.core.files import atomic_path, write_json, write_text
 from hobble.core.quat import Array
@@ -136,12 +136,12 @@ def part_links(network: Network, parts: Sequence[str]) -> list[str]:
     ends = {label: roles for label, *roles in (*PARTS_WITH_SLIDER, *PARTS_WITHOUT_SLIDER)}
     chosen = []
     for part in parts:
-        of_part = [link for link in links_between(network.skeleton, *ends[part]) if link in links]
-        if not of_part:
+        link = link_of_part(network.skeleton, ends[part], links, trained)
+        if link is None:
             raise HobbleError(
                 f"the skeleton of this network has no {part} that can hurt, but a film needs it"
             )
-        chosen.append(next((link for link in of_part if link in trained), of_part[0]))
+        chosen.append(link)
     return chosen
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from hobble.channels import ClipSource, channel
 from hobble.channels.clip_values import read_clip_values
-from hobble.channels.diagnosis.channel import read_table
+from hobble.channels.diagnosis import read_table
 from hobble.core.clip import Clip
 from hobble.core.errors import InputError
 from hobble.core.skeleton import Skeleton

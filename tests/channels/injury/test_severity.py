@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,15 +14,16 @@ from hypothesis import strategies as st
 
 from hobble.channels import ClipSource
 from hobble.channels.clip_values import load_values, save_values, write_report
-from hobble.channels.injury.channel import CHANNEL
-from hobble.channels.injury.severity import (
+from hobble.channels.injury import CHANNEL
+from hobble.channels.injury.status import (
+    InjurySpell,
+    Status,
     clip_severity,
-    mirror_severity,
     range_warnings,
+    read_status,
     severity_matrix,
     source_rows,
 )
-from hobble.channels.injury.status import InjurySpell, Status, read_status
 from hobble.core.clip import Clip
 from hobble.core.errors import InputError
 from hobble.core.skeleton import Skeleton
@@ -170,8 +172,8 @@ def test_mirroring_twice_gives_the_same_back(holden31, link, value):
     severity = np.zeros((3, 30), np.float32)
     severity[:, link] = value
     links = holden31.mirror_links
-    once = mirror_severity(severity, links)
-    assert (mirror_severity(once, links) == severity).all()
+    once = CHANNEL.mirror(severity, SimpleNamespace(mirror_links=links))
+    assert (CHANNEL.mirror(once, SimpleNamespace(mirror_links=links)) == severity).all()
     name = holden31.link_names[link]
     other = name.replace("Left", "#").replace("Right", "Left").replace("#", "Right")
     swap = {"LHipJoint": "RHipJoint", "RHipJoint": "LHipJoint", "LThumb": "RThumb", "RThumb": "LThumb"}

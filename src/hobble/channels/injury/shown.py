@@ -8,7 +8,6 @@ loop is a walk for a looping picture. A sweep is a walk in which the severity of
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from itertools import pairwise
 
 from hobble.channels.shown import ChannelDisplay, ChannelWords, SampleWalk
 from hobble.core.skeleton import Skeleton
@@ -119,22 +118,9 @@ def loops(skeleton: Skeleton, links: Sequence[str], trained: Collection[str]) ->
 
 
 def sweeps(skeleton: Skeleton, links: Sequence[str], trained: Collection[str]) -> dict[str, str]:
-    """Name of each sweep -> label of the link that hurts in it. links, trained: as in `shown`.
-
-    A part may consist of several links. The link of a sweep is the uppermost of them that was hurt in
-    training, or the uppermost of all if none was.
-    """
-    out = {}
-    for name, (upper, lower) in SWEPT_PARTS.items():
-        top = skeleton.role(upper)
-        path = [skeleton.role(lower)]  # joints from the lower end of the part to its upper end
-        while path[-1] != top and skeleton.parents[path[-1]] >= 0:
-            path.append(skeleton.parents[path[-1]])
-        of_part = [f"{skeleton.joints[p]}-{skeleton.joints[c]}" for c, p in pairwise(path)]
-        for candidates in (trained, links):
-            if name not in out and (found := [link for link in reversed(of_part) if link in candidates]):
-                out[name] = found[0]
-    return out
+    """Name of each sweep -> label of the link that hurts in it. links, trained: as in `shown`."""
+    found = {name: link_of_part(skeleton, ends, links, trained) for name, ends in SWEPT_PARTS.items()}
+    return {name: link for name, link in found.items() if link is not None}
 
 
 def link_index_by_part(
@@ -142,17 +128,24 @@ def link_index_by_part(
 ) -> dict[str, int]:
     """Label of each part in PARTS_WITH_SLIDER -> index in `links` of the link that its slider sets.
 
-    hurt: the links that were hurt in training. A part may consist of several links. Its slider sets the
-    uppermost of them that is in `hurt`, or the uppermost of all if none is; then the slider has no effect.
-    Parts without a link are left out.
+    hurt: the links that were hurt in training. If no link of a part was hurt, its slider has no effect. Parts
+    without a link are left out.
     """
-    indices = {}
-    for label, upper, lower in PARTS_WITH_SLIDER:
-        of_part = [name for name in links_between(skeleton, upper, lower) if name in links]
-        if of_part:
-            chosen = next((name for name in of_part if name in hurt), of_part[0])
-            indices[label] = list(links).index(chosen)
-    return indices
+    found = {label: link_of_part(skeleton, ends, links, hurt) for label, *ends in PARTS_WITH_SLIDER}
+    return {label: links.index(link) for label, link in found.items() if link is not None}
+
+
+def link_of_part(
+    skeleton: Skeleton, ends: Sequence[str], links: Sequence[str], hurt: Collection[str]
+) -> str | None:
+    """The link that stands for a part of the body, which may consist of several links.
+
+    It is the uppermost of them that was hurt in training, or the uppermost of all if none was; None if the
+    part has no link. ends: roles of the joints at the upper and the lower end. links: all links of the
+    channel. hurt: those hurt in training.
+    """
+    of_part = [link for link in links_between(skeleton, *ends) if link in links]
+    return next((link for link in of_part if link in hurt), of_part[0] if of_part else None)
 
 
 def links_between(skeleton: Skeleton, upper: str, lower: str) -> list[str]:
@@ -179,9 +172,14 @@ def spoken_link(skeleton: Skeleton, link: str) -> str:
             return label
     # The links below a wrist are the hand, and those below a toe joint the toes.
     ends = link_ends(skeleton.joints, [link])[0]
+    above = ends[0] if ends else -1  # index of a joint above the link; -1 above the root
+    ancestors = []
+    while above >= 0:
+        ancestors.append(skeleton.joints[above])
+        above = skeleton.parents[above]
     for side in ("left", "right"):
         for role, word in (("wrist", "hand"), ("toe", "toes")):
-            if ends and skeleton.roles.get(f"{side}_{role}") in _joint_and_ancestors(skeleton, ends[0]):
+            if skeleton.roles.get(f"{side}_{role}") in ancestors:
                 return f"{side} {word}"
     return link
 
@@ -193,12 +191,3 @@ def spoken_links(skeleton: Skeleton, links: Sequence[str]) -> list[str]:
         name if names.count(name) == 1 or name == link else f"{name} ({link})"
         for name, link in zip(names, links, strict=True)
     ]
-
-
-def _joint_and_ancestors(skeleton: Skeleton, joint: int) -> list[str]:
-    """Names of a joint and of all joints from it up to the root. joint: its index."""
-    names = [skeleton.joints[joint]]
-    while skeleton.parents[joint] >= 0:
-        joint = skeleton.parents[joint]
-        names.append(skeleton.joints[joint])
-    return names
