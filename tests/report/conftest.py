@@ -144,7 +144,7 @@ def page(
     return render_report(material, play, character, compared, script, hero)
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def tab(page: str, tools: ModuleType, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
-    """The example's page, open in a browser."""
+    """The example's page, open in a browser, for the tests of all modules."""
     yield from tools.opened(page, tmp_path_factory.mktemp("play"))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Iterator
 from pathlib import Path
 from types import ModuleType
@@ -13,16 +12,13 @@ import yaml
 
 from hobble.core.skeleton import Skeleton
 from hobble.measures import accuracy as of_accuracy
-from hobble.measures import responsivity as of_responsivity
 from hobble.measures.compare import ConfigurationResults, compare_configurations
-from hobble.measures.injury import injury_table
 from hobble.measures.measure import all_measures
 from hobble.models.load import load_network
 from hobble.report import compare_page
 from hobble.report.character import playable_data, round_weights
 from hobble.report.compare_page import render_comparison
 from hobble.report.gather import PUBLISHED, ReportMaterial
-from hobble.report.templates import compared_by
 
 
 @pytest.fixture(scope="module")
@@ -154,43 +150,6 @@ def test_published_figures_are_shown_with_ours(compared: dict[str, Any]) -> None
     assert cited["relative error, training clips", "ava"].endswith(", Table 5.2 (but 0.0311 in Appendix A.5)")
 
 
-def test_frame_times_are_medians_and_measures_have_names(
-    compared: dict[str, Any], material: ReportMaterial
-) -> None:
-    median = material.measurements["responsivity"]["milliseconds"]["spread"]["median"]
-    table = compare_page.configuration_table(
-        compared, [c for each in compared_by(all_measures(), "compared_columns", compared) for c in each]
-    )
-    column = [c.label for c in table.columns].index("ms per frame, median")
-    assert [row[column] for row in table.rows] == [median, median]
-    laps, fit = of_responsivity.lap_lines(compared), of_responsivity.fit_chart(compared)
-    assert laps is not None
-    assert fit is not None
-    first = material.measurements["responsivity"]["laps"][0]["milliseconds"]["spread"]["median"]
-    assert next(iter(laps.options.values()))[0]["y"][0] == first
-    assert fit.traces[0]["y"] == [median, median]
-
-
-def test_the_table_of_injuries_has_a_column_for_each_gait() -> None:
-    summary = {"walk": {"speed_share": 0.8, "after_healing_cm": 0.1}, "jog": {"speed_share": 0.7}}
-    recognition = [{"configuration": "a", "applies": True, "generated": {"right": 0.9}}]
-    table = injury_table(
-        {
-            "injury": [{"configuration": "a", "applies": True, "summary": summary}],
-            "recognition": recognition,
-        }
-    )
-    assert table is not None
-    assert [column.label for column in table.columns] == ["measure", "a, walk", "a, jog"]
-    assert [row[1:] for row in table.rows] == [[0.8, 0.7], [0.1, None], [0.9, None]]
-    labels = [row[0] for row in table.rows]
-    assert labels[:2] == [
-        "share of the healthy speed at severity 10",
-        "remaining distance after healing, cm per joint",
-    ]
-    assert "classifier" in labels[2]
-
-
 def test_networks_too_large_for_one_page_are_left_out(
     compared: dict[str, Any], pair: dict[str, Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -206,6 +165,7 @@ def test_networks_too_large_for_one_page_are_left_out(
     assert 'id="play-second"' not in page
 
 
+@pytest.mark.slow
 def test_two_figures_get_the_same_targets(tab: Any) -> None:
     tab.run("document.getElementById('play-view').scrollIntoView({ behavior: 'instant', block: 'center' })")
     tab.run("document.getElementById('play-stage').focus({ preventScroll: true })")
@@ -223,27 +183,7 @@ def test_two_figures_get_the_same_targets(tab: Any) -> None:
     assert "holden" in tab.run("document.getElementById('play-panel').textContent")
 
 
-def test_another_configuration_is_chosen_and_linked_to(tab: Any) -> None:
-    tab.run(
-        "(() => { const s = document.getElementById('play-first'); s.value = 'ava';"
-        " s.dispatchEvent(new Event('change')); })()"
-    )
-    assert tab.run("Hobble.player.actors.map(({ spec }) => spec.channels.length)") == [0, 0]
-    tab.run("document.getElementById('play-share').click()")
-    assert "of=ava%2Cava" in tab.run("location.hash")
-
-
-def test_axe_finds_no_accessibility_problem(tab: Any, modules: Path) -> None:
-    """In a wide and in a narrow window, in light and in dark."""
-    for width, theme in itertools.product((1440, 390), ("light", "dark")):
-        tab.size(width, 900)
-        tab.run(f"document.documentElement.dataset.theme = '{theme}'")
-        assert tab.violations(modules) == []
-        assert tab.until(f"document.documentElement.scrollWidth <= {width}")
-    tab.run("delete document.documentElement.dataset.theme")
-    tab.size(1280, 900)
-
-
+@pytest.mark.slow
 def test_charts_are_drawn_without_console_messages_or_requests(tab: Any, pictures: Path) -> None:
     tab.run("Hobble.drawAll()")
     undrawn = (

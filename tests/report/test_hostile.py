@@ -62,6 +62,7 @@ def hostile(
     yield from tools.opened(text, folder)
 
 
+@pytest.mark.slow
 def test_no_script_in_a_hostile_name_runs(hostile: Any) -> None:
     drawn = "document.querySelector('[data-chart=\"stage-bytes\"] .main-svg') !== null"
     assert hostile.until("typeof Hobble") != "undefined"

@@ -7,8 +7,6 @@ import pytest
 from hobble.measures import injury as injury_page
 from hobble.measures import responsivity as lap_charts
 from hobble.measures import responsivity as responsivity_page
-from hobble.measures.accuracy import caveat
-from hobble.measures.recognition import recognition_chart
 from hobble.report.gather import ReportMaterial
 from hobble.report.parts import ChartGroup, ChartPair, KeyFigure
 
@@ -29,16 +27,6 @@ def test_the_steps_of_a_frame_are_in_their_order(material: ReportMaterial) -> No
     times = material.measurements["responsivity"]["laps"][0]["milliseconds"]
     assert sum(trace["y"][0] for trace in traces[:-1]) == pytest.approx(times["total"])
     assert traces[-1]["y"][0] == times["spread"]["median"]
-
-
-def test_a_row_of_the_table_of_laps_reads_as_a_sentence(material: ReportMaterial) -> None:
-    table = responsivity_page.lap_table(material.results_of("responsivity"), "example")
-    assert table is not None
-    labels = [column.label for column in table.columns]
-    assert labels[:5] == ["lap", "finished", "waypoints reached", "seconds", "frames"]
-    assert not [label for label in labels if "_" in label]
-    assert [shown for *_, shown in table.cells[0][:5]] == ["1", "yes", "6", "113.3", "6,800"]
-    assert [shown for *_, shown in table.cells[3][:3]] == ["4", "no", "5"]
 
 
 def test_feet_with_little_contact_have_no_slide(material: ReportMaterial) -> None:
@@ -79,33 +67,6 @@ def test_links_never_hurt_in_training_are_told_from_the_others(material: ReportM
     assert names[-1] == "never hurt in training"
 
 
-def test_confusions_are_shares_of_each_injury() -> None:
-    confusion = {"knee": {"knee": 3, "back": 1}, "back": {"knee": 0, "back": 2}}
-    part = {"confusion": confusion, "right": 5 / 6}
-    found = {"applies": True, "classes": ["knee", "back"], "chance": 0.5, "people": 0.82}
-    chart = recognition_chart({**found, "generated": part, "captured": {}})
-    assert chart is not None
-    assert list(chart.options) == ["generated walks, by window: 83 % right"]
-    (trace,) = next(iter(chart.options.values()))
-    assert trace["z"] == [[0.75, 0.25], [None, 1.0]]
-    assert "50 %" in chart.caption
-    assert "82 %" in chart.caption
-    assert recognition_chart({"applies": False}) is None
-
-
-def test_every_pair_of_injuries_is_drawn_as_it_is_measured() -> None:
-    rows = [
-        {"first": "a-b", "second": "c-d", "from_first_cm": 2.0, "share": 0.5, "from_second_cm": 1.0},
-        {"first": "c-d", "second": "a-b", "from_first_cm": 0.0, "share": None, "from_second_cm": 0.0},
-    ]
-    chart = injury_page.second_chart(rows)
-    assert chart is not None
-    far, share = (traces[0] for traces in chart.options.values())
-    assert (far["y"], far["x"], far["z"]) == (["a-b", "c-d"], ["c-d", "a-b"], [[2.0, None], [None, 0.0]])
-    assert share["z"] == [[0.5, None], [None, None]]
-    assert injury_page.second_chart([]) is None
-
-
 def test_runs_are_drawn_over_the_track_in_red_where_they_left_it() -> None:
     track = {"x": [0.0, 10.0, 10.0], "z": [0.0, 0.0, 5.0], "gaits": ["walk", "jog", "crouch"]}
     near = {"lap": 1, "x": [0.0, 5.0], "z": [0.0, 0.1], "off_cm": [0.0, 10.0]}
@@ -122,8 +83,3 @@ def test_runs_are_drawn_over_the_track_in_red_where_they_left_it() -> None:
     assert kept is not None
     assert "On these laps, the largest distance from the track was 10 cm" in kept.caption
     assert lap_charts.track_chart({"track": {"waypoints": 6}}) is None
-
-
-def test_the_length_of_what_was_measured_is_that_of_the_measured_frames(material: ReportMaterial) -> None:
-    found = {"held_out": {"frames": 600}, "train": {"frames": 5400}}
-    assert "measured on 1 min 40 s of gait cycles" in caveat(found, material)

@@ -112,7 +112,9 @@ def test_the_page_moves_the_body_as_python_does(tab: Any, holden31: Skeleton) ->
       figure.places.set({places.ravel().tolist()});
       figure.turns.set({turns.ravel().tolist()});
       figure.pose(() => [1, 2, 3]);
-      return Array.from(figure.corners());
+      const {{ mesh }} = figure, corner = mesh.geometry.boundingSphere.center.clone();
+      return Array.from({{ length: mesh.geometry.attributes.position.count }}, (_, v) =>
+        mesh.getVertexPosition(v, corner).toArray());
     }})()"""
     found = np.reshape(tab.run(script), (-1, 3))
     assert np.abs(found - mesh.posed(places, turns)).max() < 0.3

@@ -45,17 +45,6 @@ def test_sections_with_one_name_are_joined_and_their_parts_sorted() -> None:
     assert [part.content.kind for part in second.parts] == ["words", "chart", "table"]
 
 
-def test_a_pair_without_charts_is_left_out() -> None:
-    assert (
-        join_sections(
-            [PageSection("s", [SectionPart(0, ChartPair([None, None])), SectionPart(5, None)], title="S")]
-        )
-        == []
-    )
-    [shown] = join_sections([PageSection("s", [SectionPart(0, ChartPair([None, chart("a")]))])])
-    assert [part.content.kind for part in shown.parts] == ["pair"]
-
-
 @pytest.mark.parametrize("found", [{}, {"applies": False, "reason": "no such input"}])
 def test_a_measurement_that_found_nothing_leaves_no_section(found: dict[str, Any], material: Any) -> None:
     nothing = replace(material, measurements={one.name: found for one in all_measures()})

@@ -87,14 +87,6 @@ def test_missing_files_are_listed(tmp_path: Path) -> None:
     assert found["stages"][0]["max_rss_mb"] is None
 
 
-def test_repeated_benchmarks_count_each_run(tmp_path: Path) -> None:
-    path = benchmark(tmp_path / "a.tsv", 1.0)
-    with path.open("a") as file:
-        file.write("2.0\t0:00:02\tNA\t1\t1\t1\t0\t0\t90\tNA\n")
-    assert [run["s"] for run in read_benchmark(path)] == [1.0, 2.0]
-    assert "max_rss" not in read_benchmark(path)[1]
-
-
 def test_a_table_that_is_no_benchmark_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "a.tsv"
     path.write_text("clip\tframes\nwalk\t3\n")

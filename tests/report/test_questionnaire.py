@@ -35,6 +35,7 @@ def made(
         return folder, write_questionnaire(network, folder, examples.RUNTIME, "example", SHORT, size=48)
 
 
+@pytest.mark.slow
 def test_films_drawn_at_once_are_those_drawn_one_by_one(
     made: tuple[Path, dict[str, Any]],
     network: Network,
@@ -116,6 +117,7 @@ def test_each_film_is_asked_about_once_and_the_answers_can_be_counted(
     assert all(url.startswith(("file:", "data:", "blob:", "about:")) for url in tab.requests)
 
 
+@pytest.mark.slow
 def test_orders_differ_and_a_reopened_page_continues(tab: Any) -> None:
     orders = set()
     for _ in range(12):
@@ -133,6 +135,7 @@ def test_orders_differ_and_a_reopened_page_continues(tab: Any) -> None:
     assert tab.run("Study.state.order") == order
 
 
+@pytest.mark.slow
 def test_axe_finds_no_accessibility_problem_in_any_of_the_three_parts(tab: Any, modules: Path) -> None:
     again(tab, forget=True)
     assert tab.violations(modules) == []

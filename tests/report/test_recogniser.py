@@ -14,11 +14,10 @@ from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 from hobble.gait.cycles import measure_cycles
 from hobble.gait.profile import healthy_profile, profile_of_walk, read_people
-from hobble.gait.recognise import grade_walk, grader_of_all_people
+from hobble.gait.recognise import grade_walk
 from hobble.models.network import Network
 from hobble.report.character import (
     healthy_walk,
-    kind_in_words,
     packed_statistics,
     playable_with_recogniser,
 )
@@ -89,13 +88,6 @@ def test_javascript_recognises_the_same_limps_as_python(tab: Any) -> None:
         assert answer["probabilities"] == pytest.approx(dict(expected.probabilities), abs=1e-6)
         assert answer["sides"] == pytest.approx(list(expected.probability_by_side.values()), abs=1e-6)
     assert len(labels) >= 4, "the cases are called different things"
-
-
-def test_every_kind_of_limp_has_its_own_text() -> None:
-    said = [kind_in_words(*kind) for kind in grader_of_all_people().kinds]
-    assert len(set(said)) == len(said)
-    assert kind_in_words("antalgic", "left") == "left thigh, shank or foot"
-    assert kind_in_words("leaning_trunk", "forward") == "back, leaning forward"
 
 
 def test_a_walk_is_compared_with_the_healthy_walk_of_the_same_figure(

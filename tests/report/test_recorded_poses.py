@@ -18,7 +18,7 @@ from hobble.runtime.animation import ProceduralAnimation
 
 SCRIPT = """
 import { readFileSync } from "fs";
-import { createCharacter } from "./character.js";
+import { createCharacter } from "./controller.js";
 const { spec, targets } = JSON.parse(readFileSync(process.argv[2]));
 const c = createCharacter(spec), flat = () => 0;
 console.log(JSON.stringify(targets.map((target) => {

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import base64
 import json
-from collections.abc import Iterator
 from dataclasses import replace
 from types import ModuleType
 from typing import Any
@@ -55,11 +54,6 @@ def test_a_rounded_weight_errs_by_at_most_half_a_step_of_its_group(
     assert np.all(np.abs(found - exact) <= 0.505 * factors + 1e-12)
     assert np.abs(found - exact).max() > 0
     assert len(layer["weights"]) < 0.51 * len(character["network"]["layers"][0]["weights"])
-
-
-@pytest.fixture(scope="module")
-def tab(page: str, tools: ModuleType, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
-    yield from tools.opened(page, tmp_path_factory.mktemp("rounded"))
 
 
 def test_the_page_moves_as_python_does_with_the_same_weights(

@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from hobble.channels.injury.shown import spoken_links
 from hobble.core import quat
 from hobble.core.skeleton import Skeleton
 from hobble.figure.mesh import body_mesh
@@ -73,12 +72,3 @@ def test_motion_without_rotations_is_fitted(
     apart = UNIT * np.abs(old - new)
     assert apart.max() < 5
     assert np.median(apart) <= 0.011
-
-
-def test_injuries_are_named_in_words(play: dict[str, Any], holden31: Skeleton) -> None:
-    assert play["scenarios"][-1]["description"] == "Walks while the left thigh hurts more and more"
-    words = spoken_links(holden31, holden31.link_names)
-    assert len(set(words)) == len(words)
-    assert words[:2] == ["left hip (Hips-LHipJoint)", "left hip (LHipJoint-LeftUpLeg)"]
-    assert {"left thigh", "right foot", "upper back", "head", "left forearm"} <= set(words)
-    assert spoken_links(Skeleton("x", ("a", "b"), (-1, 0), np.zeros((2, 3))), ("a-b",)) == ["a-b"]

@@ -82,16 +82,6 @@ def test_the_injured_part_is_coloured_if_requested(
     assert np.all(np.abs(columns - x[knee]) < 15)
 
 
-def test_the_ground_repeats_with_the_loop() -> None:
-    from hobble.report.raster import GRID, _ground
-
-    still = _ground(Camera(np.array([0.0, 82.0, 0.0]), size=80))
-    moved = _ground(Camera(np.array([0.0, 82.0, 3 * GRID]), size=80))
-    between = _ground(Camera(np.array([0.0, 82.0, 0.4 * GRID]), size=80))
-    assert np.abs(still - moved).max() < 1e-9
-    assert np.abs(still - between).max() > 0.01
-
-
 def test_a_walk_is_cut_where_it_repeats() -> None:
     time = np.arange(stimuli.SETTLED + 60 + stimuli.LONGEST + stimuli.BLEND)
     swing = np.stack([0 * time, 90 + np.sin(2 * np.pi * time / 67), 2.0 * time], axis=1)

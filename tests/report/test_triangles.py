@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hobble.report.raster import corner_normals, draw_triangles, fill_triangles, finish_picture
+from hobble.report.raster import draw_triangles, fill_triangles, finish_picture
 
 FACE = np.array([[0, 1, 2]])
 # Screen coordinates: y points down, and a front face has a negative area.
@@ -24,12 +24,6 @@ def test_a_triangle_covers_the_pixels_inside_it() -> None:
         assert np.array_equal(cover > 0, inside()), "seen from either side"
 
 
-def test_a_triangle_that_reaches_out_of_the_picture_is_cut_off() -> None:
-    cover = np.zeros((4, 3), np.float32)
-    fill_triangles(CORNER - [3, 2, 0], FACE, cover)
-    assert np.array_equal(cover > 0, inside()[2:6, 3:6])
-
-
 def test_the_nearer_triangle_is_seen_and_back_faces_are_not() -> None:
     picture, depth = np.zeros((9, 8, 3), np.float32), np.full((9, 8), np.inf, np.float32)
     near, far = np.tile([1.0, 0.0, 0.0], (3, 1)), np.tile([0.0, 1.0, 0.0], (3, 1))
@@ -41,22 +35,6 @@ def test_the_nearer_triangle_is_seen_and_back_faces_are_not() -> None:
     assert np.allclose(picture[inside()], [1, 0, 0], atol=1e-6)
     assert np.isinf(depth[~inside()]).all()
     assert not picture[~inside()].any()
-
-
-def test_colours_run_from_corner_to_corner() -> None:
-    picture, depth = np.zeros((9, 8, 3), np.float32), np.full((9, 8), np.inf, np.float32)
-    draw_triangles(CORNER, np.eye(3), FACE, picture, depth)
-    down, across = (3 - 0.5) / 5.8, (2 - 0.5) / 5.8
-    assert np.allclose(picture[3, 2], [1 - down - across, down, across], atol=1e-6)
-
-
-def test_normals_point_out_of_a_box_and_are_weighted_by_area() -> None:
-    corners = np.array([[0, 0, 0], [4, 0, 0], [0, 3, 0], [0, 0, 2]], float)
-    faces = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
-    found = corner_normals(corners, faces)
-    at_origin = -np.array([3 * 2, 4 * 2, 4 * 3], float)
-    assert np.allclose(found[0], at_origin / np.linalg.norm(at_origin))
-    assert np.allclose(np.linalg.norm(found, axis=1), 1)
 
 
 def test_a_pixel_is_the_mean_of_its_square_with_the_background_where_nothing_is() -> None:

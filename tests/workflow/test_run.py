@@ -100,7 +100,7 @@ def test_editing_a_comment_of_the_page_remakes_only_the_report(copied) -> None:
 
 
 def test_editing_a_script_of_the_page_bundles_again(copied) -> None:
-    script = copied.own_source() / "report/web/strips.js"
+    script = copied.own_source() / "report/web/charts.js"
     script.write_text(script.read_text() + "// a comment\n")
     assert set(copied.planned(TARGET)) == {"page_bundle", "report"}
 

@@ -3,7 +3,7 @@
 // The page contains weights as integers, with factors to multiply them by. 16-bit weights come from `packed_rows` of
 // `hobble.models.network`, with a factor for each row. 8-bit weights come from `hobble.report.rounded_weights`, with a factor for
 // each group of columns.
-import { bytes } from "../report/web/numbers.js";
+import { bytes } from "../report/web/math.js";
 
 // The float32 array in a base64 text.
 export const floats = (text) => new Float32Array(bytes(text));

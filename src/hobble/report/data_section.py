@@ -15,7 +15,7 @@ from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 from hobble.motion.retarget import MOST_DIFFERENCE, most_different
 from hobble.report.gather import ReportMaterial
-from hobble.report.parts import Chart, Column, Table, axis, bar_trace
+from hobble.report.parts import Chart, Column, Table, Trace, axis, bar_trace, line_trace
 from hobble.rows.clip_rows import Excerpt, cut_into_excerpts, load_excerpt, row_count, shuffle_key
 from hobble.rows.layout import GAITS
 
@@ -365,36 +365,81 @@ def _by_kind(rows: list[list[str]]) -> list[list[Any]]:
     return [[len({row[0] for row in kind}), kind[0][1], kind[0][0], kind[0][2]] for kind in frequent]
 
 
-def clip_strips(material: ReportMaterial, clips: frozenset[str]) -> list[dict[str, Any]]:
-    """Data for the strips. A strip is a chart of one clip over time: label curves and channel values.
+def label_chart(material: ReportMaterial, clips: frozenset[str]) -> Chart | None:
+    """The labels and channel values of each clip over time; a menu selects the clip. None without labels.
 
     clips: names of the clips to show. Clips without label curves are left out, and mirrored clips if the clip
-    that they mirror is in the data set. A strip has the keys of the label report's `curves`, and
-
-    - `clip`: its name. `length`: seconds
-    - `channels`: a dict for each column with a value above 0. Its keys are `name`; `spans`, the stretches
-      above 0 as [start in seconds, end in seconds, largest value]; `highest`, the largest value that the
-      channel allows, such as 10. Spans are read from `spells` of the column's entry in the channel report.
-      Without `spells` there is one span, the whole clip
+    that they mirror is in the data set.
     """
     shown_name = shown_names(material.network["skeleton"])
-    lengths = {report["clip"]: report.get("seconds") for report in material.motion}
-    out = []
+    options, layouts = {}, {}
     for report in _without_mirrors(material.labels):
-        curves, clip = report.get("curves"), report["clip"]
-        if clip not in clips or not curves or not curves.get("seconds"):
+        clip, curves = report["clip"], report.get("curves") or {}
+        if clip not in clips or not curves.get("seconds"):
             continue
-        length = lengths.get(clip) or curves["seconds"][-1]
-        # An entry's own `highest` is the largest value of the column in this clip.
-        values = [
-            {
-                "name": shown_name(column),
-                "spans": entry.get("spells") or [[0, length, entry["highest"]]],
-                "highest": of_channel.get("highest", 10.0),
-            }
-            for of_channel in material.channels
-            if of_channel["clip"] == clip
-            for column, entry in of_channel["values"].items()
-        ]
-        out.append({**curves, "clip": clip, "length": length, "channels": values})
-    return out
+        # Channel values, with their column: [start in seconds, end in seconds, share of the highest value].
+        spans: dict[str, list[tuple[float, float, float]]] = {}
+        for of_channel in material.channels:
+            for column, entry in of_channel["values"].items() if of_channel["clip"] == clip else ():
+                whole_clip = [[0, curves["seconds"][-1], entry["highest"]]]
+                spans[shown_name(column)] = [
+                    (a, b, most / of_channel.get("highest", 10.0))
+                    for a, b, most in entry.get("spells") or whole_clip
+                ]
+        options[clip] = _label_traces(curves, spans)
+        layouts[clip] = _label_layout(len(curves["contacts"]), len(spans))
+    caption = (
+        "The examples for training are made from the clips and these labels. Contacts: a bar marks the time "
+        "in which the heel or toe touches the ground. Phase: it should rise evenly from 0 to 1 in each gait "
+        "cycle. Gaits: their shares add up to 1. The darker a bar of a channel, the higher the value."
+    )
+    if not options:
+        return None
+    more: dict[str, Any] = {"choose": "Clip", "options": options, "option_layouts": layouts, "height": 420}
+    return Chart("clip-labels", "The labels of each clip over time", caption, **more)
+
+
+def _label_traces(
+    curves: Mapping[str, Any], spans: Mapping[str, Sequence[tuple[float, float, float]]]
+) -> list[Trace]:
+    """The traces of one clip. curves: of its label report. spans: channel column -> (from, to, share)."""
+    # The samples are at equal steps, so their times need not be stored.
+    times = {"x": None, "x0": 0, "dx": curves["seconds"][-1] / max(1, len(curves["seconds"]) - 1)}
+    traces = []
+    for name, contacts in curves["contacts"].items():
+        x = [time for a, b in contacts for time in (a, b, None)]
+        colour, words = "@accent" if name.startswith("left") else "@g2", name.replace("_", " ")
+        traces.append(line_trace(words, x, [words] * len(x), colour, width=9, showlegend=False))
+    for name, axis_name, colour in (("phase", "y2", "@ink"), ("speed", "y4", "@soft")):
+        curve = line_trace(name, [], curves[name], colour, width=1.4, yaxis=axis_name, showlegend=False)
+        traces.append(curve | times)
+    for name, shares in curves["gait"].items():
+        fill = f"@g{GAITS.index(name)}"
+        area = line_trace(name, (), shares, fill, width=0, yaxis="y3", stackgroup="gaits", fillcolor=fill)
+        traces.append(area | times)
+    for name, stretches in spans.items():
+        for a, b, share in stretches:
+            bar = line_trace(name, (a, b), (name, name), "@hurt-high", width=9, yaxis="y5", showlegend=False)
+            traces.append(bar | {"opacity": 0.15 + 0.85 * share})
+    return traces
+
+
+def _label_layout(contacts: int, columns: int) -> dict[str, Any]:
+    """The layout of the traces of one clip, from top to bottom. contacts, columns: numbers of bars."""
+    style = {"gridcolor": "@line", "zerolinecolor": "@line", "tickfont": {"size": 11.5, "color": "@soft"}}
+    bars = {"type": "category", "autorange": "reversed", "automargin": True}
+    rows: list[tuple[str, int, dict[str, Any]]] = [
+        ("yaxis", 18 * contacts, bars),
+        ("yaxis2", 60, {"title": {"text": "phase"}, "range": [0, 1]}),
+        ("yaxis3", 60, {"title": {"text": "gait"}, "range": [0, 1]}),
+        ("yaxis4", 60, {"title": {"text": "m/s"}, "rangemode": "tozero"}),
+        ("yaxis5", 18 * columns, bars),
+    ]
+    rows = [row for row in rows if row[1]]
+    total, top = sum(height + 16 for _, height, _ in rows), 1.0
+    layout: dict[str, Any] = {"height": total + 110, "hovermode": "x unified", "xaxis": axis("seconds")}
+    for name, height, more in rows:
+        bottom = top - height / total
+        layout[name] = {**style, **more, "domain": [max(0.0, bottom), top]}
+        top = bottom - 16 / total
+    return layout | {"xaxis": {**axis("seconds"), "anchor": "free", "position": 0}}

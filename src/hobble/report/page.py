@@ -61,14 +61,12 @@ def render_report(
     sections = _sections(material, counted, clips, terrain)
     measured_sections = join_sections(measured_by(material, "section"))
     scenes, playable, compared = dict(scenes or {}), playable or {}, captured_and_predicted or {}
-    strips = data.clip_strips(material, clips)
     grounds = ground_pictures(terrain, material.network["skeleton"])
     for_scripts = {
         "charts": chart_specs([sections, measured_sections]),
         "bodies": _bodies(material),
         "hero": hero or opening_slider(playable, material.measurements.values()),
         "scenes": scenes,
-        "strips": strips,
         "grounds": grounds,
         "name": material.name,
         "playable": {material.name: playable} if playable else {},
@@ -94,7 +92,6 @@ def render_report(
         playable=for_scripts["playable"],
         captured_and_predicted=[clip["name"] for clip in compared.get("clips", ())],
         grounds=[picture["name"] for picture in grounds["pictures"]],
-        strips=[strip["clip"] for strip in strips],
         configuration=yaml.safe_dump(resolved, sort_keys=False, allow_unicode=True),
         **sections,
     )
@@ -134,6 +131,7 @@ def _sections(
             "retarget": data.retarget_chart(material),
             "clips": data.clip_table(material, clips),
             "remarks": data.remarks_table(material),
+            "labels": data.label_chart(material, clips),
         },
     }
 

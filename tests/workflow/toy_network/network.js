@@ -1,5 +1,5 @@
 // y = W x + b on standardised x and y.
-import { bytes } from "../../report/web/numbers.js";
+import { bytes } from "../../report/web/math.js";
 
 export const createNetwork = (spec) => {
   const floats = (text) => new Float32Array(bytes(text)), [layer] = spec.network.layers;

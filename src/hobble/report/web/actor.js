@@ -1,16 +1,90 @@
-// One character that walks in Play or at the top of the page: its controller, its body, its footprints, and its motion of the last seconds.
-import { createCharacter } from "./character.js";
+// Writes the played motion as a BVH file.
+import { channelColour } from "./base.js";
+import { createCharacter } from "./controller.js";
+import { createRig } from "./feet.js";
 import { createFigure } from "./figure.js";
-import { drawInputs } from "./inputs.js";
-import { createLab } from "./lab.js";
-import { channelColour } from "./paint.js";
-import { createRig } from "./rig.js";
-import { bodyChannel, valueKey } from "./sliders.js";
+import { at4, conjugate, multiply } from "./math.js";
+import { createLab } from "./panel.js";
+import { bodyChannel, valueKey } from "./play.js";
+
+const FPS = 60;
+
+// The angles [z, x, y] of a rotation, in degrees: it is first turned about Y, then about X, then about Z (Rz Rx Ry).
+const angles = ([w, x, y, z]) => {
+  const degrees = 180 / Math.PI, sine = Math.min(1, Math.max(-1, 2 * (y * z + w * x)));
+  return [
+    Math.atan2(-2 * (x * y - w * z), 1 - 2 * (x * x + z * z)), Math.asin(sine),
+    Math.atan2(-2 * (x * z - w * y), 1 - 2 * (x * x + y * y)),
+  ].map((a) => a * degrees);
+};
+
+// The text of a BVH file. names, parents, offsets: of the joints. frames: an array for each frame. It has the position of the root (3
+// numbers, cm) and then the world rotations of all joints (4 numbers each).
+export const bvhText = ({ names, parents, offsets }, frames) => {
+  const children = names.map((_, j) => parents.flatMap((p, k) => (p === j ? [k] : []))), header = [], joints = [];
+  const addJoint = (j, indent) => {
+    const pad = "\t".repeat(indent), root = parents[j] < 0;
+    joints.push(j);
+    header.push(`${pad}${root ? "ROOT" : "JOINT"} ${names[j]}`, `${pad}{`, `${pad}\tOFFSET ${(root ? [0, 0, 0] : offsets[j]).map((v) => v.toFixed(6)).join(" ")}`);
+    header.push(`${pad}\tCHANNELS ${root ? "6 Xposition Yposition Zposition" : "3"} Zrotation Xrotation Yrotation`);
+    children[j].forEach((k) => addJoint(k, indent + 1));
+    if (!children[j].length) header.push(`${pad}\tEnd Site`, `${pad}\t{`, `${pad}\t\tOFFSET 0 0 0`, `${pad}\t}`);
+    header.push(`${pad}}`);
+  };
+  addJoint(parents.findIndex((p) => p < 0), 0);
+  const lines = frames.map((frame) => {
+    const rotations = frame.slice(3), numbers = Array.from(frame.slice(0, 3), (v) => v.toFixed(4));
+    for (const j of joints) {
+      const world = at4(rotations, j), local = parents[j] < 0 ? world : multiply(conjugate(at4(rotations, parents[j])), world);
+      numbers.push(...angles(local).map((v) => v.toFixed(4)));
+    }
+    return numbers.join(" ");
+  });
+  return `HIERARCHY\n${header.join("\n")}\nMOTION\nFrames: ${frames.length}\nFrame Time: ${(1 / FPS).toFixed(7)}\n${lines.join("\n")}\n`;
+};
+
+// Draws inputs of the network in Play: ground heights and joint velocities.
+const NEEDLE_FRAMES = 8; // a needle is as long as the movement of the joint in this many frames
+const LEAST_SPEED = .15; // cm a frame: slower joints have no needle
+
+// The heights of the ground that are inputs of the network. They are sampled along the past and future path, and to both sides of it. place:
+// [x, y, z] of a sample. above: its height above the mean height of the path, cm. c: the state of the character.
+export const groundSamples = (c, spec) => {
+  const { step, constants: { side } } = spec, out = [];
+  for (let s = 0; s < c.ground.length / 3; s++) {
+    const i = s * step, a = side * c.dz[i], b = side * c.dx[i];
+    [[a, -b], [0, 0], [-a, b]].forEach(([x, z], k) => {
+      out.push({ place: [c.px[i] + x, c.ground[3 * s + k], c.pz[i] + z], above: c.ground[3 * s + k] - c.rootHeight });
+    });
+  }
+  return out;
+};
+
+// Needles {from, to}, from where a joint is to where it would be in NEEDLE_FRAMES frames.
+export const jointVelocities = (c) => {
+  const out = [];
+  for (let j = 0; j < c.jointVelocity.length; j += 3) {
+    const v = [c.jointVelocity[j], c.jointVelocity[j + 1], c.jointVelocity[j + 2]], from = [c.posePosition[j], c.posePosition[j + 1], c.posePosition[j + 2]];
+    if (Math.hypot(...v) >= LEAST_SPEED) out.push({ from, to: from.map((p, i) => p + NEEDLE_FRAMES * v[i]) });
+  }
+  return out;
+};
+
+// Draws the ground heights as squares, red above the mean height of the path and blue below it, and the joint velocities as needles.
+export const drawInputs = ({ marks, marksInFront, paint }, c, spec) => {
+  for (const { place: [x, y, z], above } of groundSamples(c, spec)) {
+    const rgb = Math.abs(above) < 1 ? paint.ink : above > 0 ? paint.high : paint.predicted, r = 3;
+    marks.addQuad([[x - r, y + .6, z - r], [x + r, y + .6, z - r], [x + r, y + .6, z + r], [x - r, y + .6, z + r]], rgb, .8);
+  }
+  for (const { from, to } of jointVelocities(c)) marksInFront.addNeedle(from, to, 1.6, paint.predicted, .9);
+};
+
+// One character that walks in Play or at the top of the page: its controller, its body, its footprints, and its motion of the last seconds.
 
 const MOST_FRAMES = 1200; // the last 20 seconds of motion are kept, so that the user can save them
 
-// view: where the character is drawn, see view.js. spec: its data, from `hobble.report.playable`. place: [x, z] in cm where it starts.
-// tint: name of a colour in paint.js for its body, or null. ghost: whether the body is transparent.
+// view: where the character is drawn, see view.js. spec: its data, from `hobble.report.character`. place: [x, z] in cm where it starts.
+// tint: name of a colour in the palette for its body, or null. ghost: whether the body is transparent.
 export const createActor = (view, spec, { place = [0, 0], tint = null, ghost = false } = {}) => {
   const figure = createFigure(view, spec.body, bodyChannel(spec)?.regions || [], { ghost }), rig = createRig(spec), wasDown = [false, false];
   const lab = createLab(spec.legs), actor = { spec, figure, rig, lab, place, watch: null, falls: 0, milliseconds: 0, frames: [] };
@@ -28,7 +102,7 @@ export const createActor = (view, spec, { place = [0, 0], tint = null, ghost = f
   // The point on the ground under joint j.
   const groundUnder = (j) => { const [x, z] = [rig.places[3 * j], rig.places[3 * j + 2]]; return [x, groundHeight(x, z), z]; };
 
-  // Runs one frame toward a target (see targets.js). values: Map from `valueKey(channel, column)` to the value of the column. A missing
+  // Runs one frame toward a target. values: Map from `valueKey(channel, column)` to the value of the column. A missing
   // column has the value 0.
   actor.frame = ({ velocity, facing, gait }, values) => {
     const character = actor.character, before = performance.now();

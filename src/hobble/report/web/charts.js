@@ -1,7 +1,7 @@
 // Draws charts in the page's colours when they scroll into view, and again when the theme changes.
 import library from "plotly.js-cartesian-dist-min"; // as text, see bundle.py
 import { colour, material, onTheme } from "./base.js";
-import { openClip } from "./captured.js";
+import { openClip } from "./recorded.js";
 
 // Parsing and running plotly.js takes long, so it is done only when the first chart is drawn.
 const plotly = () => {
@@ -88,3 +88,5 @@ export const startCharts = () => {
   document.querySelectorAll("[data-chart]").forEach((element) => near.observe(element));
   onTheme.push(() => { for (const element of chosenOptions.keys()) draw(element); });
 };
+
+// Draws label strips: the contacts, phase, gait, speed and channel values of one clip over time.

@@ -1,9 +1,22 @@
-// A figure: a body in a view. It is one surface. In each frame, its bones move it, and each bone gives its part of the body a colour.
+// The bodies that the page contains. Each is unpacked when it is first used.
 import {
-  Bone, Color, DetachedBindMode, Matrix4, MeshBasicMaterial, MeshStandardMaterial, Quaternion, Skeleton, SkinnedMesh, Sphere, Vector3,
+  Bone, BufferAttribute, BufferGeometry, Color, DetachedBindMode, Matrix4, MeshBasicMaterial,
+  MeshStandardMaterial, Quaternion, Skeleton, SkinnedMesh, Sphere, Vector3,
 } from "three";
-import { bodyOf } from "./bodies.js";
-import { linear } from "./paint.js";
+import { linear, material } from "./base.js";
+import { unpackBody } from "./module.js";
+
+const unpacked = new Map();
+
+// The unpacked body with a name, see `unpackBody`.
+export const bodyOf = (name) => {
+  if (!unpacked.has(name)) {
+    unpacked.set(name, unpackBody({ BufferAttribute, BufferGeometry, Matrix4, Quaternion, Sphere, Vector3 }, material.bodies[name]));
+  }
+  return unpacked.get(name);
+};
+
+// A figure: a body in a view. It is one surface. In each frame, its bones move it, and each bone gives its part of the body a colour.
 
 // The material of the surface: solid, or a ghost that is transparent except at its outline. tints: the colour of each bone. The colour of a
 // corner is the mean of the colours of its bones, with the weights of the skin. The attribute `shade` is 0 for a corner that the body hides
@@ -92,42 +105,15 @@ export const createFigure = (view, body, regions = [], { ghost = false } = {}) =
   };
   figure.remove = () => { for (const each of meshes) { view.scene.remove(each); each.material.dispose(); } };
 
-  // World positions of all corners, three numbers each, computed as the graphics card does.
-  figure.corners = () => {
-    const moved = inverses.map((inverse, b) => new Matrix4().multiplyMatrices(bones[b].matrixWorld, inverse).elements);
-    const { position, skinIndex, skinWeight } = geometry.attributes, out = new Float64Array(position.array.length);
-    for (let v = 0; v < position.count; v++) {
-      const x = position.array[3 * v], y = position.array[3 * v + 1], z = position.array[3 * v + 2];
-      for (let k = 0; k < 4; k++) {
-        const w = skinWeight.array[4 * v + k] / 255;
-        if (!w) continue;
-        const m = moved[skinIndex.array[4 * v + k]];
-        for (let i = 0; i < 3; i++) out[3 * v + i] += w * (m[i] * x + m[4 + i] * y + m[8 + i] * z + m[12 + i]);
-      }
-    }
-    return out;
-  };
-  // What is at the point (x, y) of the canvas, in pixels; null if it is not on the body. links: the channel columns of the bone. deep: the
-  // distance from the camera, cm. Each triangle is tested, with the barycentric coordinates u, w of the point.
+  // What is at the point (x, y) of the canvas, in pixels; null if it is not on the body. links: the channel columns of the bone that has most
+  // weight there. deep: the distance from the camera, cm.
   figure.under = (x, y) => {
-    const corners = figure.corners(), n = corners.length / 3, index = geometry.index.array, seen = new Float64Array(3 * n);
-    for (let v = 0; v < n; v++) seen.set(view.project([corners[3 * v], corners[3 * v + 1], corners[3 * v + 2]]), 3 * v);
-    let best = null;
-    for (let f = 0; f < index.length; f += 3) {
-      const [a, b, c] = [3 * index[f], 3 * index[f + 1], 3 * index[f + 2]];
-      const area = (seen[b] - seen[a]) * (seen[c + 1] - seen[a + 1]) - (seen[b + 1] - seen[a + 1]) * (seen[c] - seen[a]);
-      if (!area) continue;
-      const u = ((seen[b] - x) * (seen[c + 1] - y) - (seen[b + 1] - y) * (seen[c] - x)) / area;
-      const w = ((seen[c] - x) * (seen[a + 1] - y) - (seen[c + 1] - y) * (seen[a] - x)) / area;
-      if (u < 0 || w < 0 || u + w > 1) continue;
-      const deep = u * seen[a + 2] + w * seen[b + 2] + (1 - u - w) * seen[c + 2];
-      if (!best || deep < best.deep) best = { deep, corner: index[f] };
-    }
-    if (!best) return null;
-    const { skinIndex, skinWeight } = geometry.attributes;
-    let most = 0;
-    for (let k = 1; k < 4; k++) if (skinWeight.array[4 * best.corner + k] > skinWeight.array[4 * best.corner + most]) most = k;
-    return { links: regions[skinIndex.array[4 * best.corner + most]] || [], deep: best.deep };
+    mesh.boundingSphere = mesh.boundingBox = null; // of an earlier pose; three.js computes them again
+    const [hit] = view.rayThrough(x, y).intersectObject(mesh);
+    if (!hit) return null;
+    const { skinIndex, skinWeight } = geometry.attributes, corner = hit.face.a, weight = (k) => skinWeight.getComponent(corner, k);
+    const most = [0, 1, 2, 3].reduce((best, k) => (weight(k) > weight(best) ? k : best));
+    return { links: regions[skinIndex.getComponent(corner, most)] || [], deep: hit.distance };
   };
   return figure;
 };

@@ -1,22 +1,16 @@
 // Starts the parts of the page. `Hobble` gives access to them from the browser's console and from the tests.
+import { bvhText, groundSamples, jointVelocities } from "./actor.js";
 import { colour, material } from "./base.js";
-import { bvhText } from "./bvh.js";
-import { openClip, startCaptured } from "./captured.js";
-import { createCharacter } from "./character.js";
 import { drawAll, startCharts } from "./charts.js";
-import { createChase } from "./chase.js";
-import { measureWalk, profile } from "./cycles.js";
-import { startFits } from "./fits.js";
+import { createCharacter } from "./controller.js";
+import { createRig } from "./feet.js";
+import { createGrader, createWatch, measureWalk, profile } from "./gait.js";
 import { hero, startHero } from "./hero.js";
-import { groundSamples, jointVelocities } from "./inputs.js";
-import { createLab } from "./lab.js";
-import { startPage } from "./page.js";
+import { csv, startPage, startTables } from "./page.js";
+import { createLab } from "./panel.js";
 import { player, startPlay } from "./play.js";
-import { createGrader, createWatch } from "./recogniser.js";
-import { createRig } from "./rig.js";
-import { startStrips } from "./strips.js";
-import { csv, startTables } from "./tables.js";
-import { startWalks } from "./walking.js";
+import { openClip, startCaptured, startFits, startWalks } from "./recorded.js";
+import { createChase } from "./view.js";
 
 globalThis.Hobble = {
   bvh: bvhText, character: createCharacter, chase: createChase, colour, csv, grader: createGrader, groundSamples, jointVelocities, lab: createLab,
@@ -27,7 +21,7 @@ globalThis.Hobble = {
   get player() { return player; },
 };
 
-const atOnce = [startPage, startTables, startCharts, startPlay], later = [startWalks, startCaptured, startStrips, startFits];
+const atOnce = [startPage, startTables, startCharts, startPlay], later = [startWalks, startCaptured, startFits];
 const startNext = () => {
   const start = later.shift();
   if (start) { setTimeout(startNext); start(); } else Hobble.ready = true;

@@ -1,15 +1,227 @@
-// Play, the section in which the networks run. A report has one character; a comparison has two on the same ground.
-import { createActor } from "./actor.js";
-import { readAddress, readCamera, readPairs } from "./address.js";
-import { bvhText } from "./bvh.js";
+// Reads the state of Play from a link. Anybody can write a link, so every part is checked.
+import { bvhText, createActor } from "./actor.js";
 import { find, material, save } from "./base.js";
-import { createChase } from "./chase.js";
-import { addRecorder } from "./film.js";
-import { GROUNDS } from "./grounds.js";
+import { GROUNDS } from "./ground.js";
 import { createPanel } from "./panel.js";
-import { createSteering } from "./steering.js";
-import { bodyChannel, createSliders } from "./sliders.js";
-import { createView } from "./view.js";
+import { createChase, createView } from "./view.js";
+
+// The values after "#play?" in an address. null if the address has no "#play?".
+export const readAddress = (hash) => {
+  const [, text = null] = hash.match(/^#play\?(.*)$/s) || [];
+  return text === null ? null : new URLSearchParams(text);
+};
+// Reads a camera from the text "yaw,pitch,distance": {yaw, pitch} in radians and {distance} in cm, moved into the limits of the camera.
+// null if the text is not three numbers.
+export const readCamera = (text, { nearest = 140, furthest = 1500 } = {}) => {
+  const parts = (text || "").split(",");
+  if (parts.length !== 3 || !parts.every((part) => /^-?\d+(\.\d+)?$/.test(part.trim()))) return null;
+  const [yaw, pitch, distance] = parts.map(Number);
+  return {
+    yaw: yaw % (2 * Math.PI), pitch: Math.min(1.45, Math.max(.02, pitch)), distance: Math.min(furthest, Math.max(nearest, distance)),
+  };
+};
+// Reads [column, value] pairs from the text "column:value,column:value". Values that are not numbers from 0 to `highest` are left out.
+export const readPairs = (text, highest) => (text || "").split(",").flatMap((pair) => {
+  const cut = pair.lastIndexOf(":"), value = pair.slice(cut + 1);
+  return cut > 0 && /^\d+(\.\d+)?$/.test(value) && Number(value) <= highest ? [[pair.slice(0, cut), Number(value)]] : [];
+});
+
+// The channel values in Play. Each column of each channel has a value. Users set values with sliders, presets and keys.
+
+// The key of a column in the Map of values.
+export const valueKey = (channel, column) => `${channel.name}/${column}`;
+// The channel whose columns stand for parts of the body; undefined if there is none.
+export const bodyChannel = (spec) => spec.channels.find((channel) => channel.regions.length);
+// The channel that the top of the page shows. It is one with parts of the body and a slider, or else the first one with a slider.
+export const firstShown = (spec) => {
+  const some = spec.channels.filter((channel) => Object.keys(channel.sliders).length);
+  return some.find((channel) => channel.regions.length) || some[0];
+};
+
+// specs: data of the played characters, which may have different channels. changed(): called after every change.
+export const createSliders = (specs, changed) => {
+  const channels = [];
+  // Of channels with the same name, the one with most trained columns is taken.
+  for (const channel of specs.flatMap((spec) => spec.channels)) {
+    const at = channels.findIndex(({ name }) => name === channel.name);
+    if (at < 0) channels.push(channel);
+    else if (channel.trained.length > channels[at].trained.length) channels[at] = channel;
+  }
+  // The trained columns of a channel in all characters. Other columns were always 0 in training and have no effect, so they are left out.
+  const trainedColumns = (name) => specs.flatMap((spec) => spec.channels.filter((channel) => channel.name === name).flatMap((channel) => channel.trained));
+  const values = new Map(channels.flatMap((channel) => trainedColumns(channel.name).map((column) => [valueKey(channel, column), 0])));
+  const rows = [], panel = { values, channels }, columns = (channel) => [...new Set(trainedColumns(channel.name))];
+  // The words for a column.
+  panel.word = ({ name }, column) => specs.flatMap((spec) => spec.channels.filter((channel) => channel.name === name))
+    .map((channel) => channel.spoken[channel.columns.indexOf(column)]).find(Boolean) || column;
+  panel.say = (text) => { const note = find("play-note"); if (note) note.textContent = text; };
+
+  const addSlider = (channel, column, label) => {
+    const row = document.createElement("label"), name = document.createElement("span");
+    const input = document.createElement("input"), output = document.createElement("output"), number = rows.length + 1;
+    name.textContent = label;
+    if (number < 10) {
+      const key = document.createElement("kbd");
+      key.textContent = number;
+      name.append(" ", key);
+    }
+    Object.assign(input, { type: "range", min: 0, max: channel.highest, step: channel.sliderStep, value: 0 });
+    input.dataset.channel = channel.name;
+    input.addEventListener("input", () => { values.set(valueKey(channel, column), Number(input.value)); showValues(); });
+    row.append(name, input, output);
+    find("play-sliders").append(row);
+    rows.push({ input, output, channel, column });
+  };
+  const hasSlider = (channel, column) => rows.some((row) => row.channel.name === channel.name && row.column === column);
+  const setValue = (channel, column, value) => {
+    if (!hasSlider(channel, column)) addSlider(channel, column, panel.word(channel, column));
+    values.set(valueKey(channel, column), Math.min(channel.highest, Math.max(0, value)));
+  };
+  const showValues = () => {
+    panel.say("");
+    rows.forEach(({ input, output, channel, column }) => {
+      const value = values.get(valueKey(channel, column));
+      input.value = value;
+      output.value = channel.highest < 5 ? value.toFixed(2) : value;
+    });
+    changed();
+  };
+  // Sets columns to values, and other columns to 0. triples: [channel, column, value]. only: if it is a channel, other channels stay as they are.
+  panel.set = (triples, only = null) => {
+    channels.filter((channel) => !only || channel === only).forEach((channel) => columns(channel).forEach((column) => values.set(valueKey(channel, column), 0)));
+    triples.forEach(([channel, column, value]) => { if (values.has(valueKey(channel, column)) && value) setValue(channel, column, value); });
+    showValues();
+  };
+  // Changes a value by a fifth of the highest value, after a click or a key. by: 1 or -1.
+  panel.change = (channel, column, by) => {
+    if (!values.has(valueKey(channel, column))) return;
+    setValue(channel, column, Math.round(1e6 * (values.get(valueKey(channel, column)) + by * channel.highest / 5)) / 1e6);
+    showValues();
+  };
+  // Changes the value of a slider after one of the keys 1 to 9. Returns whether the key has a slider.
+  panel.key = (event) => {
+    const digit = event.code.match(/^Digit([1-9])$/), slider = digit && rows[digit[1] - 1];
+    if (slider) panel.change(slider.channel, slider.column, event.shiftKey ? -1 : 1);
+    return Boolean(slider);
+  };
+  // The values for a link, with an entry for each channel that has values above 0: its key -> "column:value,column:value".
+  panel.state = () => Object.fromEntries(channels.flatMap((channel) => {
+    const some = columns(channel).map((column) => [column, values.get(valueKey(channel, column))]).filter(([, value]) => value > 0);
+    return some.length ? [[channel.key, some.map(([column, value]) => `${column}:${value}`).join(",")]] : [];
+  }));
+
+  const addButton = (text, onClick) => {
+    const made = document.createElement("button");
+    made.type = "button";
+    made.textContent = text;
+    made.addEventListener("click", onClick);
+    find("play-presets").append(made);
+  };
+  for (const channel of channels) {
+    Object.entries(channel.sliders).forEach(([label, index]) => addSlider(channel, channel.columns[index], label));
+    channel.presets.forEach(({ name, values: some }) => addButton(name, () => (
+      panel.set(some.map(([index, value]) => [channel, channel.columns[index], value]), channel))));
+    if (columns(channel).length) addButton(channel.rest, () => panel.set([], channel));
+  }
+  showValues();
+  return panel;
+};
+
+// Computes the target of the character from keys, a gamepad, or a thumb on the disc in the corner of the view.
+
+// Keys are named by their place on the keyboard, not by letter, so that WASD is in the same place on every layout.
+// key -> its direction [right, ahead], as the camera sees it
+const DIRECTIONS = {
+  KeyW: [0, 1], KeyS: [0, -1], KeyA: [-1, 0], KeyD: [1, 0],
+  ArrowUp: [0, 1], ArrowDown: [0, -1], ArrowLeft: [-1, 0], ArrowRight: [1, 0],
+};
+const SPEED = { crouch: 2, walk: 2.5, jog: 7 }; // cm a frame
+
+export const createSteering = (stage, orbit) => {
+  // pressed: codes of the keys that are down. stick: where the thumb is on the disc, -1 to 1. on: which buttons are on.
+  const pressed = new Set(), stick = { x: 0, y: 0 }, on = { crouch: false, jog: false, strafe: false };
+  const steering = { on };
+
+  steering.toggle = (name, value = !on[name]) => {
+    on[name] = value;
+    if (value && name === "crouch" && on.jog) steering.toggle("jog", false);
+    if (value && name === "jog" && on.crouch) steering.toggle("crouch", false);
+    find(`play-${name}`).setAttribute("aria-pressed", String(value));
+  };
+  for (const name of Object.keys(on)) find(`play-${name}`).addEventListener("click", () => steering.toggle(name));
+
+  // The target now: velocity [x, z], facing [x, z] or null, gait or null, in the world. Keys and sticks are relative to the camera.
+  steering.target = () => {
+    let [right, ahead] = [stick.x, -stick.y], fast = on.jog || pressed.has("ShiftLeft") || pressed.has("ShiftRight"), keepsFacing = on.strafe;
+    for (const code of pressed) if (DIRECTIONS[code]) { right += DIRECTIONS[code][0]; ahead += DIRECTIONS[code][1]; }
+    const pad = [...(navigator.getGamepads ? navigator.getGamepads() : [])].find((p) => p && p.connected);
+    if (pad) {
+      const dead = (v) => (Math.abs(v) < .15 ? 0 : v);
+      right += dead(pad.axes[0]);
+      ahead -= dead(pad.axes[1]);
+      fast = fast || pad.buttons[0]?.pressed;
+      keepsFacing = keepsFacing || pad.buttons[4]?.pressed;
+      orbit.yaw -= .04 * dead(pad.axes[2] || 0);
+    }
+    const size = Math.hypot(right, ahead);
+    if (size > 1) { right /= size; ahead /= size; }
+    const gait = on.crouch ? "crouch" : fast ? "jog" : "walk", { yaw } = orbit;
+    const forward = [-Math.sin(yaw), -Math.cos(yaw)], side = [-forward[1], forward[0]];
+    const velocity = [0, 1].map((i) => SPEED[gait] * (ahead * forward[i] + right * side[i]));
+    return { velocity, facing: keepsFacing ? forward : null, gait: gait === "walk" && !size ? null : gait };
+  };
+  steering.release = () => pressed.clear();
+
+  // Listens to the keys. onKey(event): called for a key that steering does not use; it returns whether the key had an effect.
+  steering.listen = (onKey) => {
+    stage.addEventListener("keydown", (event) => {
+      if (event.target !== stage || event.ctrlKey || event.metaKey || event.altKey) return;
+      if (event.code === "KeyC") { if (!event.repeat) steering.toggle("crouch"); }
+      else if (event.code === "KeyF") { if (!event.repeat) steering.toggle("strafe"); }
+      else if (event.code === "KeyQ") orbit.turn(.08, 0);
+      else if (event.code === "KeyE") orbit.turn(-.08, 0);
+      else if (event.code === "Equal") orbit.nearer(.9);
+      else if (event.code === "Minus") orbit.nearer(1.1);
+      else if (DIRECTIONS[event.code] || event.code.startsWith("Shift")) pressed.add(event.code);
+      else if (!onKey(event)) return;
+      event.preventDefault();
+    });
+    stage.addEventListener("keyup", (event) => pressed.delete(event.code));
+    stage.addEventListener("blur", () => pressed.clear());
+  };
+
+  const pad = find("play-pad");
+  const steer = (event) => {
+    const box = pad.getBoundingClientRect(), r = box.width / 2;
+    const [x, y] = [(event.clientX - box.x - r) / r, (event.clientY - box.y - r) / r], n = Math.max(1, Math.hypot(x, y));
+    Object.assign(stick, { x: x / n, y: y / n });
+    pad.firstElementChild.style.translate = `${stick.x * r * .6}px ${stick.y * r * .6}px`;
+  };
+  const release = () => { Object.assign(stick, { x: 0, y: 0 }); pad.firstElementChild.style.translate = ""; };
+  pad.addEventListener("pointerdown", (event) => { pad.setPointerCapture(event.pointerId); steer(event); });
+  pad.addEventListener("pointermove", (event) => { if (pad.hasPointerCapture(event.pointerId)) steer(event); });
+  for (const name of ["pointerup", "pointercancel"]) pad.addEventListener(name, release);
+  return steering;
+};
+
+// Makes a button record a canvas as a film, until it is pressed again. Then the film is saved. name(): the file's name without its ending.
+
+export const addRecorder = (button, canvas, name) => {
+  if (!canvas.captureStream || !globalThis.MediaRecorder) { button.hidden = true; return; }
+  let recorder = null;
+  button.addEventListener("click", () => {
+    if (recorder) { recorder.stop(); recorder = null; button.textContent = "Record film"; return; }
+    const type = ["video/webm;codecs=vp8", "video/webm", "video/mp4"].find((format) => MediaRecorder.isTypeSupported(format));
+    const chunks = [], newRecorder = new MediaRecorder(canvas.captureStream(60), { mimeType: type, videoBitsPerSecond: 8e6 });
+    newRecorder.addEventListener("dataavailable", ({ data }) => chunks.push(data));
+    newRecorder.addEventListener("stop", () => save(new Blob(chunks, { type }), `${name()}.${type.includes("mp4") ? "mp4" : "webm"}`));
+    newRecorder.start();
+    recorder = newRecorder;
+    button.textContent = "Stop and save";
+  });
+};
+
+// Play, the section in which the networks run. A report has one character; a comparison has two on the same ground.
 
 const START = { yaw: 3.9, pitch: .2, distance: 430 };
 const SIDE = 95; // cm between two figures

@@ -1,14 +1,101 @@
+// A camera that moves around its target. The user moves it by dragging, pinching, pressing keys, or turning the wheel with Ctrl.
+import {
+  DirectionalLight, HemisphereLight, PerspectiveCamera, Raycaster, Scene, Vector2, Vector3, VSMShadowMap, WebGLRenderer,
+} from "three";
+import { onTheme, palette } from "./base.js";
+import { createLand, createMarks } from "./ground.js";
+import { wrap } from "./math.js";
+
+// home: where it starts and returns to: {yaw, pitch} in radians, {distance} in cm, and the limits {nearest, furthest} of the distance.
+// changed(): called after every movement.
+export const createOrbit = (canvas, home, changed) => {
+  const orbit = { ...home };
+  const { nearest = 140, furthest = 1500 } = home;
+
+  orbit.turn = (yaw, pitch) => {
+    orbit.yaw += yaw;
+    orbit.pitch = Math.min(1.45, Math.max(.02, orbit.pitch + pitch));
+    changed();
+  };
+  orbit.nearer = (factor) => {
+    orbit.distance = Math.min(furthest, Math.max(nearest, orbit.distance * factor));
+    changed();
+  };
+  orbit.reset = () => { Object.assign(orbit, home); changed(); };
+  // key -> what it does
+  orbit.keys = {
+    ArrowLeft: () => orbit.turn(-.1, 0), ArrowRight: () => orbit.turn(.1, 0), ArrowUp: () => orbit.turn(0, .07),
+    ArrowDown: () => orbit.turn(0, -.07), "+": () => orbit.nearer(.9), "=": () => orbit.nearer(.9),
+    "-": () => orbit.nearer(1.1),
+  };
+  // Listens to the keys while `element` has the focus.
+  orbit.listen = (element) => element.addEventListener("keydown", (event) => {
+    const action = orbit.keys[event.key.length === 1 ? event.key.toLowerCase() : event.key];
+    if (!action || event.target !== element || event.ctrlKey || event.metaKey || event.altKey) return;
+    event.preventDefault();
+    action();
+  });
+
+  const touches = new Map(); // pointer -> where it is, [x, y] in pixels
+  const fingerDistance = () => { const [p, q] = [...touches.values()]; return Math.max(1, Math.hypot(p[0] - q[0], p[1] - q[1])); };
+  canvas.addEventListener("pointerdown", (event) => {
+    canvas.setPointerCapture(event.pointerId);
+    touches.set(event.pointerId, [event.clientX, event.clientY]);
+  });
+  canvas.addEventListener("pointermove", (event) => {
+    const before = touches.get(event.pointerId);
+    if (!before) return;
+    const was = touches.size === 2 ? fingerDistance() : 0;
+    touches.set(event.pointerId, [event.clientX, event.clientY]);
+    if (touches.size === 2) orbit.nearer(was / fingerDistance());
+    else orbit.turn(-(event.clientX - before[0]) / 160, (event.clientY - before[1]) / 220);
+  });
+  for (const name of ["pointerup", "pointercancel"]) canvas.addEventListener(name, (event) => touches.delete(event.pointerId));
+  canvas.addEventListener("wheel", (event) => {
+    if (!event.ctrlKey) return; // without Ctrl the page scrolls
+    event.preventDefault();
+    orbit.nearer(Math.exp(event.deltaY / 300));
+  }, { passive: false });
+  return orbit;
+};
+
+// A camera that follows the character and turns behind it. Its movement depends on time, not on the number of pictures that are drawn.
+
+const FOLLOW = 8, COME_ROUND = .9; // rates: in a second the camera moves by 1 - exp(-rate) of the remaining distance or angle
+const REST = 2500; // ms: if the user has turned the camera, it turns behind the character again after this time
+
+export const createChase = (orbit, canvas) => {
+  // target: the point that the camera looks at. last: time of the last picture. touched: when the user last turned the camera. Both in ms.
+  let target = null, last = null, touched = -Infinity;
+  for (const name of ["pointerdown", "pointermove"]) {
+    canvas.addEventListener(name, (event) => { if (event.buttons) touched = performance.now(); });
+  }
+  return {
+    // Forgets where the camera was, because the character starts again somewhere else.
+    reset() { target = null; last = null; },
+    // Tells that no pictures are drawn for a while.
+    rest() { last = null; },
+    // Tells that the camera was set, so that it stays for a while.
+    touch() { touched = performance.now(); },
+    // Moves the camera, and returns the point that it looks at. now: ms. middle: the point [x, y, z] to follow, cm. going: the direction
+    // [x, z] in which the character wants to go, or null if it stands or strafes.
+    follow(now, middle, going) {
+      const passed = last === null ? 0 : Math.min(.25, (now - last) / 1000);
+      last = now;
+      if (!target || Math.hypot(target[0] - middle[0], target[2] - middle[2]) > 250) target = [...middle];
+      target = target.map((v, i) => v + (1 - Math.exp(-passed * (i === 1 ? .5 * FOLLOW : FOLLOW))) * (middle[i] - v));
+      if (going && now - touched > REST) {
+        const off = wrap(Math.atan2(going[0], going[1]) + Math.PI - orbit.yaw);
+        // If the character walks toward the camera, the user wants to see it from the front.
+        if (Math.abs(off) < 2.4) orbit.yaw += (1 - Math.exp(-passed * COME_ROUND)) * off;
+      }
+      return target;
+    },
+  };
+};
+
 // A view: a 3D scene with lights on a canvas. All views of the page share one WebGL context, whose picture each view copies to its own canvas.
 // There it can be printed and saved. Units are centimetres, Y is up.
-import {
-  DirectionalLight, HemisphereLight, PerspectiveCamera, Scene, VSMShadowMap, WebGLRenderer,
-} from "three";
-import { onTheme } from "./base.js";
-import { createLand } from "./land.js";
-import { createMarks } from "./marks.js";
-import { cross, dot, minus, unit } from "./numbers.js";
-import { createOrbit } from "./orbit.js";
-import { palette } from "./paint.js";
 
 // A function for each view that draws it, even if the user never scrolled to it. They are called before printing.
 export const views = [];
@@ -77,16 +164,16 @@ const createLights = (scene) => {
   };
 };
 
-// home: where the camera starts, see orbit.js. draw(now, view): sets up the scene for a picture at time `now`, ms. It is called after
+// home: where the camera starts, see createOrbit. draw(now, view): sets up the scene for a picture at time `now`, ms. It is called after
 // `view.requestDraw()`, if the canvas is on the screen.
 export const createView = (canvas, home, draw) => {
   const context = canvas.getContext("2d"), scene = new Scene(), camera = new PerspectiveCamera(30, 1, 10, 6000);
   const lights = createLights(scene);
-  // eye: position of the camera. right, up, ahead: its axes. seen: whether the canvas is on the screen. waiting: whether a picture was requested.
+  // seen: whether the canvas is on the screen. waiting: whether a picture was requested.
   // drawnAt: time of the last picture, ms. drawnFor: level of quality for which the size was set, or -1.
-  let scale = 1, eye = [0, 0, 1], right, up, ahead, seen = false, waiting = false, drawnAt = 0, drawnFor = -1;
+  let scale = 1, seen = false, waiting = false, drawnAt = 0, drawnFor = -1;
   // framing: size of the body in the picture, and its shift as a share of the picture's width (aside) and height (up).
-  const view = { scene, W: 0, H: 0, zoom: 1, paint: {}, milliseconds: 0, framing: { size: 1.75, aside: 0, up: 0 }, balls: 12, inputs: false, onHidden: () => {} };
+  const view = { scene, W: 0, H: 0, paint: {}, milliseconds: 0, framing: { size: 1.75, aside: 0, up: 0 }, balls: 12, inputs: false, onHidden: () => {} };
   view.land = createLand(scene);
   view.marks = createMarks(scene);
   view.marksInFront = createMarks(scene, { most: 400, over: true });
@@ -134,24 +221,26 @@ export const createView = (canvas, home, draw) => {
   view.aim = (target) => {
     const { yaw, pitch, distance } = view.orbit, c = Math.cos(pitch);
     const away = [c * Math.sin(yaw), Math.sin(pitch), c * Math.cos(yaw)];
-    eye = away.map((v, i) => target[i] + distance * v);
-    ahead = away.map((v) => -v);
-    right = unit(cross(ahead, [0, 1, 0]));
-    up = cross(right, ahead);
-    view.zoom = view.framing.size * Math.min(view.H, view.W * 1.15);
+    const zoom = view.framing.size * Math.min(view.H, view.W * 1.15);
     camera.setViewOffset(view.W, view.H, -view.framing.aside * view.W, view.framing.up * view.H, view.W, view.H);
-    camera.fov = 2 * Math.atan(view.H / 2 / view.zoom) * 180 / Math.PI;
+    camera.fov = 2 * Math.atan(view.H / 2 / zoom) * 180 / Math.PI;
     camera.aspect = view.W / view.H;
-    camera.position.set(...eye);
+    camera.position.set(...away.map((v, i) => target[i] + distance * v));
     camera.lookAt(...target);
     camera.updateProjectionMatrix();
+    camera.updateMatrixWorld();
     lights.aim(target, yaw);
   };
-  // Returns [x, y, distance]: where a point is on the canvas, in pixels, and its distance from the camera along the view, cm.
-  view.project = (p) => {
-    const d = minus(p, eye), z = Math.max(1, dot(d, ahead));
-    const { aside, up: raised } = view.framing;
-    return [view.W * (.5 + aside) + view.zoom * dot(d, right) / z, view.H * (.5 - raised) - view.zoom * dot(d, up) / z, z];
+  // Returns [x, y]: where a point is on the canvas, in pixels.
+  view.project = (point) => {
+    const { x, y } = new Vector3(...point).project(camera);
+    return [view.W * (1 + x) / 2, view.H * (1 - y) / 2];
+  };
+  // The ray from the camera through the point (x, y) of the canvas, in pixels.
+  view.rayThrough = (x, y) => {
+    const ray = new Raycaster();
+    ray.setFromCamera(new Vector2(2 * x / view.W - 1, 1 - 2 * y / view.H), camera);
+    return ray;
   };
 
   const recolour = () => {
