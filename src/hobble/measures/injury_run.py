@@ -72,6 +72,7 @@ SUMMARISED = (
 )
 Rows = list[dict[str, Any]]
 Injury = Mapping[str, float]  # link -> severity
+Stretch = tuple[float, Sequence[Injury]]  # length as a share of the time, and the injury of each figure
 
 
 @dataclass(frozen=True)
@@ -106,14 +107,11 @@ class Crowd:
 def walk_crowd(
     network: Network,
     gaits: Sequence[str],
-    stretches: Iterable[tuple[float, Sequence[Injury]]],
+    stretches: Iterable[Stretch],
     seconds: float,
     runtime: Runtime,
 ) -> Crowd:
-    """Let a crowd walk. gaits: of each figure.
-
-    stretches: for each stretch, its length as a share of `seconds`, and the injury of each figure.
-    """
+    """Let a crowd walk. gaits: of each figure. seconds: the time of a stretch of length 1."""
     assert network.skeleton is not None
     script = [
         CrowdTarget(_frames(share, seconds), gaits, channel_values(network, INJURY, injuries))
@@ -313,7 +311,10 @@ def second_injuries(network: Network, links: Sequence[str], seconds: float, runt
     def with_second_at(severity: float) -> list[Injury]:
         return [{**({a: FIRST_SEVERITY} if a else {}), b: severity} for a, b in pairs]
 
-    stretches = [(WALK_IN, [{}] * len(pairs)), *((1, with_second_at(s)) for s in SECOND_SEVERITIES)]
+    stretches: list[Stretch] = [
+        (WALK_IN, [{}] * len(pairs)),
+        *((1, with_second_at(s)) for s in SECOND_SEVERITIES),
+    ]
     crowd = walk_crowd(network, ["walk"] * len(pairs), stretches, seconds, runtime)
     last = len(SECOND_SEVERITIES)  # number of the last stretch, because stretch 0 is only the beginning
     alone: dict[str, tuple[Array, float, float]] = {}  # second link -> its cycle, spread and effect alone
@@ -399,7 +400,7 @@ def divided_severities(network: Network, links: Sequence[str], seconds: float, r
 
     from_healthy_cm: distance from the healthy walk. speed_share: speed, divided by the healthy speed.
     """
-    stretches = [
+    stretches: list[Stretch] = [
         (WALK_IN, [{}] * len(links)),
         *((1, [{link: severity} for link in links]) for severity in SEVERITIES_TO_DIVIDE),
     ]

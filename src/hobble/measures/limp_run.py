@@ -453,7 +453,11 @@ def compare_held_out(
     out = []
     for clip, figure in zip(limps, hurt, strict=True):
         healthy, whose = healthy_reference(clip, captured)
-        row = {"clip": clip.clip, "hurt_links": dict(clip.severity_by_link), "compared_with": whose}
+        row: dict[str, Any] = {
+            "clip": clip.clip,
+            "hurt_links": dict(clip.severity_by_link),
+            "compared_with": whose,
+        }
         if healthy_figure.profile is None or figure.profile is None:
             out.append({**row, "healthy": None, "hurt": None, "nearer": False})
             continue

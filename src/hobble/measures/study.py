@@ -148,7 +148,7 @@ def _checked_answer(path: str | Path, where: str, row: Any, study: Study) -> Fil
     film, parts, fluid = row.get("film"), row.get("parts"), row.get("fluid")
     if film not in [shown.number for shown in study.films] or isinstance(film, bool):
         raise InputError(path, f"{where}: there is no film {printable(film, 40)}", fix=USE_SAVED_FILE)
-    ticked = parts if isinstance(parts, list) else [parts]
+    ticked: list[Any] = parts if isinstance(parts, list) else [parts]
     if unknown := [part for part in ticked if part not in study.parts]:
         problem = f"{where}: no such part: {printable(unknown[0], 40)}"
         raise InputError(path, problem, fix=f"The parts are {', '.join(study.parts)}.")
