@@ -8,7 +8,7 @@ ifneq ($(shell test -w "$$HOME" && echo writable),writable)
 export HOME := $(CURDIR)/.home
 endif
 
-.PHONY: help env report test test-all faults browser cluster-test check docs format clean
+.PHONY: help env report test test-all test-slow faults browser cluster-test check docs format clean
 
 help:            ## list these targets
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/'
@@ -27,7 +27,9 @@ report: env      ## train a character that can be hurt and make its report
 test: env browser  ## run the tests of everything that a change can break
 	$(BIN)/python -m pytest -n $(CORES) --dist loadfile --durations=10 -m "not slow"
 
-test-all: test   ## run these tests, then the slow ones: killed trainings, random faults, long play in a browser
+test-all: test test-slow  ## run these tests, then the slow ones: killed trainings, random faults, long play in a browser
+
+test-slow: env browser
 	$(BIN)/python -m pytest -n $(CORES) --dist loadfile --durations=10 -m slow
 
 faults: env      ## test the workflow with N random faults (make faults N=200 SEED=7), see docs/faults.md

@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-# .made has links to the artefacts, and notes of how long each took.
+# .made has notes of how long each clip took.
 OF_THE_RUN = {"logs", "benchmarks", "checkpoints", "page", "checksums", ".made"}
 ACCOUNTS = {"pipeline.json", "report.html", "checkpoint.npz"}
 

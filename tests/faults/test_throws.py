@@ -16,7 +16,7 @@ from .judging import FAULT, REFUSED, UNHARMED
 from .lab import ROOT, Lab
 from .same import same
 
-pytestmark = pytest.mark.workflow
+pytestmark = [pytest.mark.workflow, pytest.mark.slow]
 SEED = 20
 CLIPS = ("walk-straight-1_hurt1", "uneven-1")
 TARGETS = [f"results/datasets/tiny/database/clips/{clip}.npz" for clip in CLIPS]

@@ -7,11 +7,13 @@ import re
 import shutil
 import subprocess
 import sys
+import time
 from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
 
+from tests.conftest import ROOT
 from tests.workflow.small_project import DATASET
 
 
@@ -99,32 +101,60 @@ def workflow(root: Path, tmp_path: Path) -> Workflow:
     return copy_of(root, tmp_path)
 
 
+RUN = "results/test/report.html"
+LIMIT = 1200  # seconds that the shared run may take
+
+
+def shared_folder(config: pytest.Config) -> Path:
+    """A folder that all processes of this session of pytest share."""
+    base = config._tmp_path_factory.getbasetemp()  # type: ignore[attr-defined]
+    return (base.parent if hasattr(config, "workerinput") else base) / "shared"
+
+
+def pytest_collection_finish(session: pytest.Session) -> None:
+    """Start the run of `test` that many tests look at, once for all processes, while other tests run."""
+    worker = getattr(session.config, "workerinput", {}).get("workerid", "gw0")
+    wanted = {"finished", "copied", "clips"}
+    if worker != "gw0" or not any(wanted & set(getattr(i, "fixturenames", ())) for i in session.items):
+        return
+    folder = shared_folder(session.config)
+    made = copy_of(ROOT, folder)
+    script = '"$@" > said 2>&1; echo $? > status.part; mv status.part status'
+    command = ["sh", "-c", script, "sh", *made.command("-c2", RUN, "-d", str(made.checkout))]
+    command += ["-s", str(made.checkout / "Snakefile")]
+    subprocess.Popen(command, cwd=folder, env=made.environment())
+
+
 @pytest.fixture(scope="session")
-def finished(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Workflow:
+def finished(request: pytest.FixtureRequest) -> Workflow:
     """The finished run of configuration `test`. Tests must not change it."""
-    made = copy_of(root, tmp_path_factory.mktemp("finished"))
-    made.run("-c2", "results/test/report.html")
-    return made
+    folder, began = shared_folder(request.config), time.monotonic()
+    while not (folder / "status").exists():
+        assert time.monotonic() < began + LIMIT, (folder / "said").read_text()
+        time.sleep(0.2)
+    assert (folder / "status").read_text() == "0\n", (folder / "said").read_text()
+    return Workflow(folder / "checkout")
 
 
 @pytest.fixture
 def copied(finished: Workflow, tmp_path: Path) -> Workflow:
     """A copy of the finished run that a test may change. File times are kept, so nothing is out of date."""
     target = tmp_path / "copy"
-    shutil.copytree(finished.checkout.parent, target, symlinks=True)
+    shutil.copytree(finished.checkout, target / "checkout", symlinks=True)
     return Workflow(target / "checkout")
 
 
 @pytest.fixture(scope="session")
-def clips(root: Path, tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
+def clips(finished: Workflow, tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
     """Two good clips with their label and status files."""
-    made = copy_of(root, tmp_path_factory.mktemp("clips"))
+    folder = tmp_path_factory.mktemp("clips")
     names = ("uneven-1", "walk-straight-1")
-    paths = [f"results/datasets/tiny/synthetic/{name}.bvh" for name in names]
-    made.run("-c2", *paths)
-    status = made.folder / "results/datasets/tiny/synthetic/uneven-1_injuries.txt"
-    status.write_text("frames:786\n100-400 LeftLeg-LeftFoot[3];\n401-786 LeftLeg-LeftFoot[10];\n")
-    return [made.folder / path for path in paths]
+    for name in names:
+        for file in (finished.folder / "results/datasets/tiny/synthetic").glob(f"{name}[._]*"):
+            shutil.copy(file, folder)
+    status = "frames:786\n100-400 LeftLeg-LeftFoot[3];\n401-786 LeftLeg-LeftFoot[10];\n"
+    (folder / "uneven-1_injuries.txt").write_text(status)
+    return [folder / f"{name}.bvh" for name in names]
 
 
 @pytest.fixture

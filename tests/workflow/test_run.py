@@ -64,6 +64,7 @@ def test_a_second_call_has_nothing_to_do(finished) -> None:
     assert "Nothing to be done" in finished.run("-n", TARGET)
 
 
+@pytest.mark.slow
 def test_two_runs_give_the_same_bytes(finished, workflow) -> None:
     workflow.run("-c2", TARGET)
     first, second = artefacts(finished.folder), artefacts(workflow.folder)
@@ -116,6 +117,7 @@ def test_writing_a_default_into_the_configuration_reruns_nothing(copied) -> None
     assert "Nothing to be done" in copied.run("-n", TARGET)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("moment", ["database", "training"])
 def test_killed_half_way_the_same_command_ends_with_the_same_bytes(finished, workflow, moment: str) -> None:
     process = workflow.start("-c2", TARGET)

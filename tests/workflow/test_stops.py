@@ -60,8 +60,11 @@ def same_network(one: Path, other: Path) -> bool:
 
 @pytest.mark.parametrize(
     ("number", "to_all"),
-    [(signal.SIGINT, True), (signal.SIGINT, False), (signal.SIGTERM, False)],
-    ids=["Ctrl-C", "SIGINT", "SIGTERM"],
+    [
+        pytest.param(signal.SIGINT, True, id="Ctrl-C"),
+        pytest.param(signal.SIGINT, False, id="SIGINT", marks=pytest.mark.slow),
+        pytest.param(signal.SIGTERM, False, id="SIGTERM", marks=pytest.mark.slow),
+    ],
 )
 def test_a_signal_ends_all_jobs_and_leaves_no_lock(
     finished, copied, number: signal.Signals, to_all: bool
@@ -80,6 +83,7 @@ def test_a_signal_ends_all_jobs_and_leaves_no_lock(
     assert not list(copied.folder.rglob("*.part"))
 
 
+@pytest.mark.slow
 def test_a_training_ends_soon_after_the_snakemake_that_was_killed(finished, copied) -> None:
     process = started(copied, "-c2", WEIGHTS, until=without_network(copied))
     jobs = jobs_of(process)
@@ -90,6 +94,7 @@ def test_a_training_ends_soon_after_the_snakemake_that_was_killed(finished, copi
     assert same_network(finished.folder, copied.folder)
 
 
+@pytest.mark.slow
 def test_after_a_kill_in_the_merge_the_same_command_continues(finished, copied) -> None:
     shutil.rmtree(copied.folder / DATABASE)
     there = copied.folder / DATABASE / "injury"
@@ -102,6 +107,7 @@ def test_after_a_kill_in_the_merge_the_same_command_continues(finished, copied) 
     assert manifests[0] == manifests[1]
 
 
+@pytest.mark.slow
 def test_a_second_run_is_refused_while_the_first_runs(copied) -> None:
     process = started(copied, "-c2", WEIGHTS, until=without_network(copied))
     jobs = jobs_of(process)

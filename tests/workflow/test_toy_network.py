@@ -14,6 +14,7 @@ TOY = Path(__file__).parent / "toy_network"
 
 
 @pytest.mark.workflow
+@pytest.mark.slow
 def test_a_linear_network_goes_from_training_to_the_page(copied: Workflow) -> None:
     shutil.copytree(TOY, copied.own_source() / "models" / "toy")
     (copied.checkout / "config" / "toy.yaml").write_text("extends: test\nnetwork:\n  kind: toy\n")
