@@ -331,7 +331,8 @@ def _check_bones(path: Path, rig: Skeleton, positions: Array, name: str) -> None
                 raise InputError(
                     path,
                     f"{rig.joints[b]} ({roles[1]}) is {low:.3g} to {high:.3g} units from {rig.joints[a]} "
-                    f"({roles[0]}), so a joint between them bends, or one of them has not the right role",
+                    f"({roles[0]}), so a joint between them bends, or one of them is not the joint of its "
+                    "role",
                     fix=f"Correct the roles in the skeleton file {name}.yaml.",
                 )
 
