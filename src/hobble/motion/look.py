@@ -6,7 +6,7 @@ import html
 import json
 import re
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from pathlib import Path
@@ -59,8 +59,7 @@ class ClipDigest:
 def clip_digest(clip: Clip, sha256: str) -> ClipDigest:
     """The data by which a clip is compared with others. sha256: checksum of its file."""
     sampled = np.linspace(0, len(clip) - 1, POSES).round().astype(int)
-    moved = None if clip.translations is None else clip.translations[sampled]
-    sample = replace(clip, rotations=clip.rotations[sampled], root=clip.root[sampled], translations=moved)
+    sample = clip.part(sampled)
     poses = sample.positions - sample.positions[:, :1] * [1.0, 0.0, 1.0]
     ahead = facing_directions(clip.skeleton, sample.positions[:1], 0.0)[0]
     # Turn about the vertical axis, so that the facing direction (x, z) becomes (0, 1).
@@ -331,16 +330,18 @@ def rate_warnings(
     fps, found = report["source_fps"], times_too_fast(clip, steps, report["scale"])
     impossible = not (SLOWEST <= cadence <= FASTEST and 0.45 < cadence / usual < 2.2)
     # How many times too fast the clip probably plays.
-    likely = found.likely if found and found.likely > HIDDEN else float(cadence / usual)
-    rate = _usual_rate(fps / likely, fps)
+    least, likely = found or (1.0, 0.0)
+    likely = likely if likely > HIDDEN else float(cadence / usual)
+    # The usual rate nearest to the one that explains the motion, but never the file's own.
+    rate = min((r for r in RATES if r != fps), key=lambda r: abs(np.log(r * likely / fps)))
     # The accelerations, if they can be measured, must confirm that the clip plays too fast or too slow.
-    confirmed = found is None or (found.least > AGREES if cadence > usual else found.least < 1 / AGREES)
+    confirmed = found is None or (least > AGREES if cadence > usual else least < 1 / AGREES)
     if impossible and confirmed:
         return [
             f"{cadence:.0f} steps a minute of {step_length:.0f} cm are impossible; at {rate} fps there would "
             f"be {cadence * rate / fps:.0f} a minute (source_fps: {rate})"
         ]
-    if found is None or 1 / MOST_OFF < found.least < MOST_OFF:
+    if found is None or 1 / MOST_OFF < least < MOST_OFF:
         return []
     # Accelerations grow with the square of the speed.
     strength = f"{likely**2:.{1 if likely > 1 else 2}f}"
@@ -348,11 +349,6 @@ def rate_warnings(
         f"The body's accelerations are {strength} times those of people in steps of {step_length:.0f} cm; at "
         f"{rate} fps they would be usual (source_fps: {rate})"
     ]
-
-
-def _usual_rate(ideal: float, fps: float) -> int:
-    """The rate of RATES that is nearest to `ideal`. It is never the file's own rate `fps`."""
-    return min((rate for rate in RATES if rate != fps), key=lambda rate: abs(np.log(rate / ideal)))
 
 
 def duplicate_notes(clips: Sequence[ClipSummary]) -> list[str]:
@@ -671,53 +667,41 @@ def _draw_figures(clip: Clip, frames: Array, part: str, view: str) -> list[str]:
     A figure's lowest point is at y = 0, and its hips are at x = 0. part: the joint or limb in red. view:
     "side" or "front".
     """
-    at = {role: clip.positions[frames, clip.skeleton.role(role)] for role in clip.skeleton.roles}
+    at = clip.part(frames).at_roles()
     ahead = facing_directions(clip.skeleton, clip.positions[frames], 0.0)
-    across = np.cross([0.0, 1.0, 0.0], ahead)
-    rightward = ahead if view == "side" else across  # what points to the right in the picture
-    places = {  # role -> (PICTURES, 2) distance to the right of the hips, and height; cm
-        role: np.stack([np.sum((p - at["hips"]) * rightward, axis=-1), p[:, 1]], axis=-1)
+    rightward = ahead if view == "side" else np.cross([0.0, 1.0, 0.0], ahead)  # to the right in the picture
+    heights = np.stack(list(at.values()))[..., 1]
+    scale = (HIGH - 50) / max(float(np.median(np.ptp(heights, axis=0))), 1e-9)  # pixels a cm
+    lowest = heights.min(axis=0)
+    # Role -> (PICTURES, 2) pixels to the right of the hips and, as y points down in an SVG, below the floor.
+    pixels = {
+        role: scale * np.stack([np.sum((p - at["hips"]) * rightward, axis=-1), lowest - p[:, 1]], axis=-1)
         for role, p in at.items()
     }
-    heights = np.stack(list(places.values()))[..., 1]
-    lowest = heights.min(axis=0)
-    scale = (HIGH - 50) / max(float(np.median(np.ptp(heights, axis=0))), 1e-9)  # pixels a cm
-    return [
-        "".join(
-            _draw_bone(places[a][k], places[b][k], lowest[k], scale, WRONG if wrong else COLOURS[side])
-            for a, b, side, wrong in _bones_to_draw(places, part)
-        )
-        for k in range(len(frames))
-    ]
+    lines = [""] * len(frames)
+    for a, b, colour, thick in _bones_to_draw(pixels, part):
+        for k in range(len(frames)):
+            (x1, y1), (x2, y2) = pixels[a][k], pixels[b][k]
+            lines[k] += (
+                f'<line x1="{x1:.1f}" y1="{y1:.1f}" x2="{x2:.1f}" y2="{y2:.1f}" stroke="{colour}" '
+                f'stroke-width="{thick}" stroke-linecap="round"/>'
+            )
+    return lines
 
 
-def _bones_to_draw(places: Mapping[str, Array], part: str) -> list[tuple[str, str, str, bool]]:
-    """For each bone to draw: the roles of its start and end, its side, and whether it belongs to `part`.
+def _bones_to_draw(roles: Collection[str], part: str) -> list[tuple[str, str, str, int]]:
+    """For each bone to draw: the roles of its start and end, its colour, and its width in pixels.
 
-    The side of trunk and head is "". places: its keys are the roles that the figure has.
+    roles: those that the figure has. part: the joint or limb in red.
     """
     side, _, name = part.partition(" ")
-    roles = ANGLES.get(name) or BONES.get(name) or ()
-    in_part = set(pairwise(role if role == "head" else f"{side}_{role}" for role in roles))
-    chains: list[tuple[str, tuple[str, ...]]] = [("", TRUNK)]
-    for limb_side in SIDES:
-        for first, *rest in LIMBS:
-            chains.append((limb_side, (first, *(f"{limb_side}_{role}" for role in rest))))
-    return [
-        (a, b, bone_side, (a, b) in in_part)
-        for bone_side, chain in chains
-        for a, b in pairwise(role for role in chain if role in places)
+    ends = ANGLES.get(name) or BONES.get(name) or ()
+    in_part = set(pairwise(role if role == "head" else f"{side}_{role}" for role in ends))
+    chains = [("", TRUNK)] + [
+        (side, (first, *(f"{side}_{role}" for role in rest))) for side in SIDES for first, *rest in LIMBS
     ]
-
-
-def _draw_bone(a: Array, b: Array, lowest: float, scale: float, colour: str) -> str:
-    """The SVG line from `a` to `b`, each (2,) x and height in cm. In an SVG, y points down.
-
-    lowest: the height in cm at y = 0. scale: pixels a cm.
-    """
-    x1, y1, x2, y2 = a[0] * scale, (lowest - a[1]) * scale, b[0] * scale, (lowest - b[1]) * scale
-    thick = 6 if colour == WRONG else 3
-    return (
-        f'<line x1="{x1:.1f}" y1="{y1:.1f}" x2="{x2:.1f}" y2="{y2:.1f}" stroke="{colour}" '
-        f'stroke-width="{thick}" stroke-linecap="round"/>'
-    )
+    return [
+        (a, b, *((WRONG, 6) if (a, b) in in_part else (COLOURS[side], 3)))
+        for side, chain in chains
+        for a, b in pairwise(role for role in chain if role in roles)
+    ]

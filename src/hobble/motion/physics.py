@@ -1,16 +1,15 @@
-"""Finds which way is down from how a body balances on its feet.
+"""Checks a clip by physics: which way is down, whether it plays at its true speed, whether its feet stand.
 
-While only one foot stands, the force of the ground acts at a point under this foot, the zero moment point,
-and points to the body's centre of mass (Vukobratovic and Borovac 2004). The force has two parts: one holds
-the body against gravity, and one accelerates it. So the standing feet and the accelerations in a few steps
-show the direction of gravity, even if the body leans or the ground slopes.
+Balance shows which way is down. While only one foot stands, the force of the ground acts at a point under
+this foot, the zero moment point, and points to the body's centre of mass (Vukobratovic and Borovac 2004). The
+force has two parts: one holds the body against gravity, and one accelerates it. So the standing feet and the
+accelerations in a few steps show the direction of gravity, even if the body leans or the ground slopes.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -75,34 +74,20 @@ class Balance:
         return float(np.degrees(np.arcsin(np.clip(self.up @ self.left, -1.0, 1.0))))
 
 
-class _BodyMotion(NamedTuple):
-    """What the balance of a body depends on, in F frames.
-
-    at: role -> (F, 3) positions, cm. ahead: (F, 3) unit vectors along which the body faces. speed: (F,)
-    forward speed, divided by the square root of gravity times leg length. centre: (F, 3) centre of mass, cm.
-    push: (F, 3) acceleration of this centre, divided by the sum of gravity and vertical acceleration.
-    """
-
-    at: dict[str, Array]
-    ahead: Array
-    speed: Array
-    centre: Array
-    push: Array
-
-
 def find_balance(clip: Clip) -> Balance | None:
     """The direction against gravity, or None if the body does not stand long enough on each foot alone."""
     fps, leg = clip.fps, leg_length(clip.skeleton)
     reach = max(1, round(fps / 20))  # frames: speeds of feet are measured over 50 ms before and after
     if len(clip) < 4 * reach + 3:  # no frame would be left without its ends, where speeds are not reliable
         return None
-    at = {role: clip.positions[:, clip.skeleton.role(role)] for role in clip.skeleton.roles}
+    at = clip.at_roles()
     ahead, centre = facing_directions(clip.skeleton, clip.positions, fps / 3), centre_of_mass(at)
     velocity = np.gradient(gaussian(at["hips"], 0.1 * fps), axis=0) * fps
     acceleration = np.gradient(np.gradient(gaussian(centre, SMOOTH * fps), axis=0), axis=0) * fps * fps
-    forward_speed = np.sum(velocity * ahead, axis=-1) / np.sqrt(GRAVITY * leg)
+    # Forward speed, divided by the square root of gravity times leg length.
+    speed = np.sum(velocity * ahead, axis=-1) / np.sqrt(GRAVITY * leg)
+    lean = np.radians(np.interp(speed, RUN_SPEEDS, LEAN))[:, None] * ahead
     push = acceleration / (GRAVITY + acceleration[:, 1:2])
-    motion = _BodyMotion(at, ahead, forward_speed, centre, push)
     slow = {  # role of a foot's joint -> (F,) whether the joint is slow
         f"{side}_{part}": _speed(at[f"{side}_{part}"], reach) * fps < SLOW_FOOT * leg
         for side in SIDES
@@ -117,7 +102,11 @@ def find_balance(clip: Clip) -> Balance | None:
         seconds.append(float(alone.sum() / fps))
         if seconds[-1] < SHORTEST_STANCE:
             return None
-        ups.append(_trimmed_mean(_up(motion, side)[alone]))
+        # The force points from the foot to the centre of mass. Without its part that accelerates the body
+        # (`push`), it points against gravity.
+        arm = centre - _pressed_point(at, side, ahead, speed)
+        up = (arm / np.maximum(arm[:, 1:2], 1.0) - push - lean)[:, [0, 2]]
+        ups.append(_trimmed_mean(up[alone]))
     left = np.cross([0.0, 1.0, 0.0], ahead).mean(axis=0)[[0, 2]]
     return Balance(0.5 * (ups[0] + ups[1]), left / max(float(np.linalg.norm(left)), 1e-9), min(seconds))
 
@@ -139,23 +128,16 @@ def centre_of_mass(at: dict[str, Array]) -> Array:
     return np.asarray(total / mass)
 
 
-def _up(motion: _BodyMotion, side: str) -> Array:
-    """(F, 2) x and z of the direction against gravity, scaled to y = 1.
+def _pressed_point(at: dict[str, Array], side: str, ahead: Array, speed: Array) -> Array:
+    """(F, 3) the point under a foot at which the force of the ground acts while this foot stands alone.
 
-    side: "left" or "right". The result is only valid in frames in which the foot of this side stands alone.
+    Along the direction `ahead` (F, 3) in which the body faces, it is at the share PRESSED of the way from
+    ankle to ball. Sideways, it is at the share `middle`. speed: (F,), as for SPEEDS.
     """
-    heel, bone = motion.at[f"{side}_heel"], motion.at[f"{side}_toe"] - motion.at[f"{side}_heel"]
-    pressed = np.interp(motion.speed, SPEEDS, PRESSED)[:, None]
+    heel, bone, middle = at[f"{side}_heel"], at[f"{side}_toe"] - at[f"{side}_heel"], 0.6
+    pressed = np.interp(speed, SPEEDS, PRESSED)[:, None]
     level = np.linalg.norm(bone * [1, 0, 1], axis=-1, keepdims=True)
-    # `foot` is the point at which the force acts. Along the direction in which the body faces, it is at the
-    # share `pressed` of the way from ankle to ball. Sideways, it is at the share `middle`.
-    middle = 0.6
-    foot = heel + middle * bone + (pressed - middle) * level * motion.ahead
-    # The force points from `foot` to the centre of mass. Without its part that accelerates the body (`push`),
-    # it points against gravity.
-    arm = motion.centre - foot
-    lean = np.radians(np.interp(motion.speed, RUN_SPEEDS, LEAN))[:, None] * motion.ahead
-    return np.asarray((arm / np.maximum(arm[:, 1:2], 1.0) - motion.push - lean)[:, [0, 2]])
+    return np.asarray(heel + middle * bone + (pressed - middle) * level * ahead)
 
 
 def _trimmed_mean(values: Array) -> Array:
@@ -218,22 +200,12 @@ class Accelerations:
     runs: bool
 
 
-@dataclass(frozen=True)
-class TooFast:
-    """How many times too fast a clip plays, from three estimates.
+def times_too_fast(clip: Clip, steps: int, scale: float = 1.0) -> tuple[float, float] | None:
+    """How many times too fast a clip plays, from three estimates. None if accelerations cannot be measured.
 
-    Values below 1 mean that it plays too slowly. least: the estimate nearest to 1, or 1 if some estimates are
-    above 1 and others below. likely: the median of the estimates.
-    """
-
-    least: float
-    likely: float
-
-
-def times_too_fast(clip: Clip, steps: int, scale: float = 1.0) -> TooFast | None:
-    """How many times too fast a clip plays. None if its accelerations cannot be measured.
-
-    steps: the number of steps in the clip. scale: size of the clip's figure / size of the captured person.
+    Values below 1 mean that it plays too slowly. Returns the estimate nearest to 1, or 1 if some estimates
+    are above 1 and others below; and the median of the estimates. steps: the number of steps in the clip.
+    scale: size of the clip's figure / size of the captured person.
     """
     accelerations = measure_accelerations(clip, steps, GRAVITY * scale)
     if accelerations is None:
@@ -247,7 +219,7 @@ def times_too_fast(clip: Clip, steps: int, scale: float = 1.0) -> TooFast | None
         estimates.append(0.5 * (value - (a + b * s + c * s * s)))
     low, likely, high = sorted(estimates)
     least = low if low > 0 else min(high, 0.0)
-    return TooFast(float(2.0**least), float(2.0**likely))
+    return float(2.0**least), float(2.0**likely)
 
 
 def measure_accelerations(clip: Clip, steps: int, gravity: float = GRAVITY) -> Accelerations | None:
@@ -255,7 +227,7 @@ def measure_accelerations(clip: Clip, steps: int, gravity: float = GRAVITY) -> A
 
     steps: the number of steps in the clip. gravity: the acceleration g for the size of the figure, cm / s2.
     """
-    at = {role: clip.positions[:, clip.skeleton.role(role)] for role in clip.skeleton.roles}
+    at = clip.at_roles()
     if steps < FEWEST_STEPS or len(clip) < FEWEST_STEPS * BRIEFEST:
         return None
     speed = np.linalg.norm(np.gradient(gaussian(at["hips"][:, [0, 2]], 2.0), axis=0), axis=-1)

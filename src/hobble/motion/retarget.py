@@ -24,7 +24,8 @@ from hobble.core.errors import HobbleError, InputError
 from hobble.core.ik import aim_bone, two_bone_knee
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton, local_rotations, rest_positions
-from hobble.motion.axes import rest_frame
+from hobble.core.smooth import smoothstep
+from hobble.motion.axes import rest_frame, unit
 from hobble.motion.body import SIDES
 from hobble.motion.ground import steady_heels
 from hobble.motion.rig import leg_length, missing_bone
@@ -294,7 +295,7 @@ class _Leg:
         level_squared = np.minimum(from_ankle[..., 0] ** 2 + from_ankle[..., 2] ** 2, reach**2)
         need = np.maximum(from_ankle[..., 1] - np.sqrt(reach**2 - level_squared), 0.0)
         share = np.clip((self.stretch - BENT) / (NEARLY_STRAIGHT - BENT), 0.0, 1.0)
-        return np.minimum(need, MOST_DROP) * share * share * (3 - 2 * share)  # smooth step from 0 to 1
+        return np.minimum(need, MOST_DROP) * smoothstep(share)
 
     def bend(self, start: Array) -> None:
         """Turn thigh and shank so that the ankle reaches its position. The foot keeps its rotation.
@@ -382,7 +383,9 @@ def compare_motions(source: Clip, result: Clip, scale: float) -> dict[str, Any]:
     faces, or None for a knee that hardly bends.
     """
     frames = min(len(source), len(result))
-    source_at, result_at = (_positions_by_role(clip, frames) for clip in (source, result))
+    source_at, result_at = (
+        {role: place[:frames] for role, place in clip.at_roles().items()} for clip in (source, result)
+    )
     return {
         "angles": {
             f"{s} {name}": _compare_angle(source_at, result_at, s, name) for s in SIDES for name in ANGLES
@@ -418,7 +421,7 @@ def check_difference(path: Path, differences: dict[str, Any], rig: str) -> None:
 
 def check_knees(path: Path, clip: Clip, leave: bool) -> None:
     """Raise InputError if a bent knee does not point forward. leave: accept the clip even so."""
-    at = _positions_by_role(clip, len(clip))
+    at = clip.at_roles()
     for side in SIDES:
         cosine = _knee_cosine(at, side, at["head"] - at["hips"])
         if cosine is not None and cosine < KNEE_AHEAD and not leave:
@@ -438,11 +441,6 @@ def most_different(differences: dict[str, Any]) -> tuple[str, float]:
     apart = {name: each["apart"] for name, each in differences["angles"].items()} | differences["directions"]
     name = max(apart, key=lambda part: apart[part])
     return name, apart[name]
-
-
-def _positions_by_role(clip: Clip, frames: int) -> dict[str, Array]:
-    """Role -> (frames, 3) positions of its joint, in the first frames of a clip."""
-    return {role: clip.positions[:frames, clip.skeleton.role(role)] for role in clip.skeleton.roles}
 
 
 def _compare_angle(
@@ -470,7 +468,7 @@ def _bend(at: dict[str, Array], side: str, parts: tuple[str, ...]) -> Array:
     at: role -> (F, 3) positions. parts: the joints' roles without the side.
     """
     a, b, c = (at[part] if part == "head" else at[f"{side}_{part}"] for part in parts)
-    return np.degrees(np.arccos(np.clip(np.sum(_unit(b - a) * _unit(c - b), axis=-1), -1.0, 1.0)))
+    return np.degrees(np.arccos(np.clip(np.sum(unit(b - a) * unit(c - b), axis=-1), -1.0, 1.0)))
 
 
 def _compare_direction(
@@ -478,7 +476,7 @@ def _compare_direction(
 ) -> float:
     """Mean angle, degrees, between the directions of a limb in source and result."""
     start, end = (f"{side}_{part}" for part in BONES[name])
-    source, result = (_unit(at[end] - at[start]) for at in (source_at, result_at))
+    source, result = (unit(at[end] - at[start]) for at in (source_at, result_at))
     cosines = np.clip(np.sum(source * result, axis=-1), -1.0, 1.0)
     return round(float(np.degrees(np.arccos(cosines)).mean()), 2)
 
@@ -507,17 +505,12 @@ def _knee_cosine(
     (F, 3), the direction up along the body.
     """
     # The body's left times its up gives its forward.
-    ahead = _unit(np.cross(at["left_hip"] - at["right_hip"], up))
+    ahead = unit(np.cross(at["left_hip"] - at["right_hip"], up))
     hip, knee, heel = (at[f"{side}_{part}"] for part in ("hip", "knee", "heel"))
     bent = _bend(at, side, ANGLES["knee"]) > BENT_KNEE
     if bent.mean() < 0.1:
         return None
     # How far the knee lies out from the straight line between hip and heel: where it points.
-    leg_line = _unit(heel - hip)
+    leg_line = unit(heel - hip)
     outward = knee - hip - leg_line * np.sum((knee - hip) * leg_line, axis=-1, keepdims=True)
-    return round(float(np.mean(np.sum(_unit(outward[bent]) * ahead[bent], axis=-1))), 2)
-
-
-def _unit(v: Array) -> Array:
-    """Vectors (..., 3) of length 1."""
-    return v / np.maximum(np.linalg.norm(v, axis=-1, keepdims=True), 1e-9)
+    return round(float(np.mean(np.sum(unit(outward[bent]) * ahead[bent], axis=-1))), 2)
