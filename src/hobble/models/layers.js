@@ -41,6 +41,7 @@ const applyLayer = ({ points, rows, columns, w, b, out }, shares, x, last) => {
   out.fill(0);
   for (let k = 0; k < points; k++) {
     const share = shares ? shares[k] : 1;
+    if (share === 0) continue;
     for (let r = 0, i = k * rows; r < rows; r++, i++) out[r] += share * (b[i] + dotProduct(w, i * columns, x, columns));
   }
   if (!last) for (let r = 0; r < rows; r++) if (out[r] < 0) out[r] = Math.exp(out[r]) - 1;

@@ -62,7 +62,9 @@ class Plain(BlendedNetwork):
     def extended(self, z: Array, phase: Array) -> Array:
         """As in `BlendedNetwork`."""
         angle = 2 * np.pi * np.asarray(phase, float)
-        return np.concatenate([z, np.stack([np.sin(angle), np.cos(angle)], axis=1)], axis=1, dtype=np.float32)
+        extended = np.empty((len(z), z.shape[1] + PHASE_INPUTS), np.float32)
+        extended[:, :-2], extended[:, -2], extended[:, -1] = z, np.sin(angle), np.cos(angle)
+        return extended
 
     def prepare(self, mode: str) -> tuple[tuple[Array, ...], tuple[Array, ...], Shares]:
         """As in `BlendedNetwork`."""
