@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from hobble.workflow.terminal import Terminal
+from snakemake_logger_plugin_hobble import Terminal
 
 CALLED = (
     "RuleException:\nCalledProcessError in file x.smk, line 3:\nCommand 'set -euo pipefail;  python s.py'"

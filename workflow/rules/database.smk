@@ -1,5 +1,5 @@
 from hobble.database.options import Merging, RowOptions
-from hobble.workflow.channel_sources import channels_of_folder
+from hobble.workflow.clips import channels_of_folder
 
 
 rule database_clips:

@@ -1,8 +1,9 @@
-"""Finds the clips of each data set, and the files that they come from.
+"""Finds the clips of each data set, the files that they come from, and the values of their channels.
 
 Besides the clips that the user gives, a data set can have two kinds of clips that Hobble makes from them. A
 mirror is the mirror image of a clip. A hurt version is a copy of a healthy clip in which some links of the
-body are injured. The clip from which they are made is their original.
+body are injured. The clip from which they are made is their original. A channel is an input of the network
+besides motion and ground; its values are 0 or more.
 """
 
 from __future__ import annotations
@@ -11,10 +12,12 @@ import functools
 import math
 import os
 import re
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 from urllib.parse import quote
 
+from hobble.channels import CHANNEL_NAMES, channel
 from hobble.config.load_configuration import Catalogue
 from hobble.config.models import ClipEntry
 from hobble.core.clip_files import (
@@ -25,11 +28,54 @@ from hobble.core.clip_files import (
     unused_file_notes,
 )
 from hobble.core.errors import HobbleError, InputError
-from hobble.core.untrusted import check_regular
+from hobble.core.untrusted import check_regular, read_text
 from hobble.hurt.options import HURT_CHANNEL, Hurt
 from hobble.synthetic.options import WRITTEN_LABEL_SUFFIXES
-from hobble.workflow.channel_sources import ChannelSources
-from hobble.workflow.sources import joint_names, nearest_rig, read_checksums
+
+HEADER_BYTES = 1 << 18  # enough for the joints of a BVH file; 191 joints take 40 kB
+# The line of a joint in a BVH file, with its name. The `{` that should follow may be on the same line.
+JOINT = re.compile(r"^\s*(?:ROOT|JOINT)\s+(.*?)\s*\{?\s*$", re.MULTILINE | re.IGNORECASE)
+CHECKSUM_LINE = re.compile(r"([0-9a-fA-F]{64}) [ *](\S+)\.bvh")
+
+
+def joint_names(path: Path) -> set[str]:
+    """The names of a BVH file's joints, without prefixes such as `mixamorig:`; empty if it cannot be read."""
+    try:
+        with open(path, "rb") as file:
+            header = file.read(HEADER_BYTES).partition(b"MOTION")[0].decode("latin-1")
+    except OSError:
+        return set()
+    return {name.rpartition(":")[2].strip() for name in JOINT.findall(header)}
+
+
+def nearest_rig(joints: set[str], known: Mapping[str, Collection[str]], target: str) -> str | None:
+    """The name of the known skeleton that has the most of `joints`; None if no one has more than `target`.
+
+    joints: names of a clip's joints. known: name of a skeleton -> names of its joints. target: name of the
+    data set's skeleton.
+    """
+    most, nearest = len(joints & set(known[target])), None
+    for name in sorted(known):
+        if len(joints & set(known[name])) > most:
+            most, nearest = len(joints & set(known[name])), name
+    return nearest
+
+
+def read_checksums(path: Path) -> dict[str, str]:
+    """Clip -> SHA-256, from a file with lines `<hash>  <clip>.bvh`, as `sha256sum *.bvh` writes them.
+
+    Raises InputError with the line's number if a line has another form.
+    """
+    checksums: dict[str, str] = {}
+    for number, line in enumerate(read_text(path).splitlines(), 1):
+        if not line.strip():
+            continue
+        match = CHECKSUM_LINE.fullmatch(line.strip())
+        if match is None:
+            raise InputError(path, "expected a SHA-256, two spaces and the name of a .bvh file", line=number)
+        checksums[match[2]] = match[1].lower()
+    return checksums
+
 
 DATASETS = "results/datasets"
 MIRROR_SUFFIX = "_mirror"
@@ -311,3 +357,106 @@ class Clips:
         """Clip -> its BVH files in the user's folder."""
         folder = self.folder(dataset)
         return find_clips(folder) if folder.is_dir() else {}
+
+
+NO_CHANNEL = "plain"  # name of the folder of a database without channels
+
+
+class ChannelSources:
+    """The channels of a project's data sets, and the sources of their values."""
+
+    def __init__(self, catalogue: Catalogue, clips: Clips) -> None:
+        self.catalogue, self.clips = catalogue, clips
+
+    def channels(self, dataset: str) -> tuple[str, ...]:
+        """The channels of a data set: those with a section in its file, and those that need no section."""
+        sections = self.catalogue.dataset(dataset).channels
+        return tuple(name for name in CHANNEL_NAMES if name in sections or channel(name).Options is None)
+
+    def files(self, dataset: str, clip: str, name: str) -> list[str]:
+        """The files that channel `name` reads for a clip.
+
+        They are the file beside the clip, and the tables of all clips that the channel's options name. The
+        file beside the clip is left out if the clip's entry in the data set has a value for the channel.
+        """
+        suffix, has_value = channel(name).suffix, self._value(dataset, clip, name) is not None
+        files = self.clips.side_files(dataset, clip, (suffix,)) if suffix and not has_value else []
+        return [*files, *self._tables(dataset, name)]
+
+    def source(self, dataset: str, clip: str, name: str) -> dict[str, Any]:
+        """What the data set says about the values of channel `name` in a clip, as plain data.
+
+        The keys are the fields of `hobble.channels.channel.ClipSource`, without `files`.
+        """
+        return {
+            "clip": self.clips.original(clip),
+            "entry": self.clips.entry(dataset, clip).model_dump(
+                mode="json", exclude={"channels", "hurt", "person"}
+            ),
+            "value": self._value(dataset, clip, name),
+            "options": self.catalogue.dataset(dataset).channels.get(name, {}),
+        }
+
+    @functools.cache  # noqa: B019 - one project lives as long as the process
+    def is_neutral(self, dataset: str, clip: str, name: str) -> bool:
+        """Whether all values of channel `name` are 0 in a clip."""
+        if self.clips.is_hurt_version(clip) and name == self.clips.hurt_channel:
+            return False
+        # The file beside a synthetic clip is not read, because it need not exist yet.
+        synthetic = self.catalogue.dataset(dataset).synthetic is not None
+        files = self._tables(dataset, name) if synthetic else self.files(dataset, clip, name)
+        definition = channel(name)
+        return definition.is_neutral(definition.make_source(self.source(dataset, clip, name), files))
+
+    def check(self, dataset: str) -> None:
+        """Raise HobbleError if the data set's clip entries or options are wrong about channels."""
+        settings = self.catalogue.dataset(dataset)
+        rig = self.catalogue.skeleton(settings.skeleton)
+        for clip, entry in self.clips.listed_entries(dataset).items():
+            if unknown := set(entry.channels) - set(self.channels(dataset)):
+                raise HobbleError(
+                    f"data set {dataset}: clips.{clip}.channels: the data set has no channel "
+                    f"{', '.join(sorted(unknown))}; it has {', '.join(self.channels(dataset)) or 'none'}"
+                )
+            for name in self.channels(dataset):
+                # Error messages show "clip", so it names the place in the data set's file.
+                fields = self.source(dataset, clip, name) | {"clip": f"data set {dataset}: clips.{clip}"}
+                definition = channel(name)
+                definition.check(definition.make_source(fields, self._tables(dataset, name)), rig)
+
+    def _value(self, dataset: str, clip: str, name: str) -> Any:
+        """The value of channel `name` in the clip's entry, or None."""
+        return self.clips.entry(dataset, clip).channels.get(name)
+
+    def _tables(self, dataset: str, name: str) -> list[str]:
+        """Paths of the tables in the options of channel `name`. Raises InputError if a table is missing."""
+        definition, section = channel(name), self.catalogue.dataset(dataset).channels.get(name, {})
+        tables = definition.table_files(definition.options_of(section))
+        files = [self.clips.mocap / file for file in tables]
+        for file in files:
+            if not file.is_file():
+                fix = "Put it there, or name the folder that holds it with --config mocap=FOLDER."
+                raise InputError(file, f"no such file, but data set {dataset} reads it", fix=fix)
+        return [str(file) for file in files]
+
+
+def database_folder(channels: Sequence[str]) -> str:
+    """The name of the folder that holds the database with these channels."""
+    return "+".join(channels) or NO_CHANNEL
+
+
+def channels_of_folder(folder_name: str) -> tuple[str, ...]:
+    """The channels of the database in a folder, from the folder's name: the inverse of `database_folder`.
+
+    Raises HobbleError for a name that no database can have.
+    """
+    names = () if folder_name == NO_CHANNEL else tuple(folder_name.split("+"))
+    if any(name not in CHANNEL_NAMES for name in names) or list(names) != sorted(
+        set(names), key=CHANNEL_NAMES.index
+    ):
+        raise HobbleError(
+            f"no database can be called {folder_name}. A database without channels is called `{NO_CHANNEL}`. "
+            f"Any other is called by its channels with + between them, in the order "
+            f"{', '.join(CHANNEL_NAMES)}"
+        )
+    return names

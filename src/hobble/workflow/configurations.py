@@ -1,4 +1,4 @@
-"""Tells Snakemake's rules about configurations: their sections, their clips, and paths of their inputs."""
+"""Tells the rules about configurations: their sections, clips, measurements, and paths of inputs."""
 
 from __future__ import annotations
 
@@ -7,11 +7,14 @@ import json
 from typing import Any
 
 from hobble.config.load_configuration import Catalogue
+from hobble.core.errors import HobbleError
+from hobble.measures.measure import all_measures, measure_named
 from hobble.models.model import BuiltOptions, Options
+from hobble.runtime.options import Runtime
 from hobble.workflow.batches import Batches
-from hobble.workflow.channel_sources import database_folder
-from hobble.workflow.clips import DATASETS
+from hobble.workflow.clips import DATASETS, Clips, database_folder, original
 from hobble.workflow.datasets import Datasets
+from hobble.workflow.fingerprint import Package
 from hobble.workflow.job import RECORDS
 
 # Stage of a data set -> its rules that have a job for each batch of clips.
@@ -128,3 +131,154 @@ class Configurations:
         for stage in ("runtime", "evaluation"):
             out[stage] = {"benchmarks": [f"{results}/benchmarks/{stage}"], "files": [f"{results}/{stage}"]}
         return out
+
+
+OF_CLIPS = ("clips", "summaries")  # inputs with a file for each clip
+NAMES = tuple(each.name for each in all_measures())  # the names of all measurements
+
+
+def piece_file(configuration: str, name: str, piece: str) -> str:
+    """Path of the JSON file with the result of one piece of the measurement `name`."""
+    return f"results/{configuration}/evaluation/pieces/{name}/{piece}.json"
+
+
+def result_file(configuration: str, name: str) -> str:
+    """Path of the JSON file with the result of the measurement `name`."""
+    return f"results/{configuration}/evaluation/{name}.json"
+
+
+class Measurements:
+    """The measurements of a project's configurations.
+
+    Arguments of the methods: configuration: name of a configuration. name: name of a measurement.
+    """
+
+    def __init__(self, configurations: Configurations, clips: Clips, package: Package) -> None:
+        self.configurations, self.clips, self.package = configurations, clips, package
+
+    def result_files(self, configuration: str) -> list[str]:
+        """Paths of the JSON files of all measurements that are made for the configuration."""
+        channels = ("", *self.configurations.channels(configuration))
+        return [result_file(configuration, one.name) for one in all_measures() if one.channel in channels]
+
+    def shown_modules(self) -> list[str]:
+        """Full names of the modules that show and compare measurements."""
+        return [one.module for one in all_measures()]
+
+    def inputs(self, configuration: str, name: str) -> dict[str, str | list[str]]:
+        """Name of each input of the measurement -> its file; `batches` -> the folders with rows of clips."""
+        wanted = measure_named(name).inputs
+        files: dict[str, str | list[str]] = {
+            item: self._input(configuration, item) for item in wanted if item not in OF_CLIPS
+        }
+        if set(OF_CLIPS) & set(wanted):
+            files["batches"] = self.configurations.batch_folders(configuration, "database")
+        return files
+
+    def pieces(self, configuration: str, name: str) -> list[str]:
+        """Paths of the JSON files of the measurement's pieces; [] if there are fewer than two pieces."""
+        chosen = measure_named(name)
+        if chosen.pieces is None:
+            return []
+        options = chosen.options.model_validate(self.options(configuration, name))
+        runtime = Runtime.model_validate(self.runtime(configuration, name))
+        pieces = chosen.pieces(options, runtime, self.configurations.network_options(configuration).modes)
+        return [piece_file(configuration, name, piece) for piece in pieces] if len(pieces) > 1 else []
+
+    def _input(self, configuration: str, item: str) -> str:
+        """The file of one input.
+
+        item: the input's name. If it is the name of another measurement, the input is this one's result.
+        """
+        configurations = self.configurations
+        if item == "weights":
+            return configurations.network(configuration, "weights.npz")
+        if item == "skeleton":
+            return self.clips.skeleton_file(configurations.dataset(configuration))
+        if item == "published":
+            return self.package.published_file()
+        return result_file(configuration, measure_named(item).name)
+
+    def splits(self, configuration: str, name: str) -> dict[str, str]:
+        """Clip -> "train" or "held_out"; {} if the measurement does not read clips."""
+        return self.configurations.splits(configuration) if "clips" in measure_named(name).inputs else {}
+
+    def summaries(self, configuration: str, name: str) -> list[str]:
+        """The clips whose summaries of rows the measurement reads."""
+        return (
+            list(self.configurations.splits(configuration))
+            if "summaries" in measure_named(name).inputs
+            else []
+        )
+
+    def people(self, configuration: str, name: str) -> dict[str, str]:
+        """Clip -> the person who walks in it; {} if the measurement does not need this.
+
+        If the data set does not name the person in a clip, the clip's name stands for one more person. The
+        mirror and the hurt versions of a clip have the clip's person.
+        """
+        if not measure_named(name).people:
+            return {}
+        dataset = self.configurations.dataset(configuration)
+        splits = self.configurations.splits(configuration)
+        return {clip: self.clips.entry(dataset, clip).person or original(clip) for clip in splits}
+
+    def options(self, configuration: str, name: str) -> dict[str, Any]:
+        """Key -> value of the section `evaluation`, for the keys that the measurement uses."""
+        keys = measure_named(name).options.model_fields
+        return self.configurations.section(configuration, "evaluation", *keys) if keys else {}
+
+    def runtime(self, configuration: str, name: str) -> dict[str, Any]:
+        """Key -> value of the section `runtime`, for the keys that the measurement uses."""
+        keys = measure_named(name).runtime
+        return self.configurations.section(configuration, "runtime", *keys) if keys else {}
+
+    def module_of(self, name: str) -> str:
+        """Full name of the Python module that holds the measurement."""
+        return measure_named(name).module
+
+    def code(self, name: str, *modules: str, script: str = "measure") -> str:
+        """Hash of the code of the measurement `name`.
+
+        modules: full names of modules that the code imports dynamically. script: name of the rule's script,
+        without .py.
+        """
+        return self.package.code(script, measure_named(name).run_module, *modules)
+
+
+COMPARE = "compare"  # name of a folder in results/, and of a key of --config
+
+
+class ComparedConfigurations:
+    """The configurations that `--config compare='[holden,injured]'` names.
+
+    value: what the command line says after `compare=`, not yet checked.
+    """
+
+    def __init__(self, configurations: Configurations, measurements: Measurements, value: Any) -> None:
+        self.configurations, self.measurements, self._value = configurations, measurements, value
+
+    def names(self) -> list[str]:
+        """The names of the configurations. Raises HobbleError if the value is not a list of names."""
+        names = self._value.split(",") if isinstance(self._value, str) else self._value
+        if not isinstance(names, list) or not all(isinstance(name, str) and name for name in names):
+            raise HobbleError(f"compare: must be a list of names, as in '[holden,injured]', not {names!r}")
+        if not names or len(set(names)) < len(names):
+            raise HobbleError(
+                f"compare: must name at least one configuration, each once, not {', '.join(names) or 'none'}"
+            )
+        return list(names)
+
+    def input_files(self) -> dict[str, list[str]]:
+        """Input files of the comparison: kind of file -> paths.
+
+        Each list has one path for each compared configuration, in the order of `names`. Only "measurements"
+        has all results of all of them.
+        """
+        names = self.names()
+        return {
+            "configuration": [f"results/{name}/configuration.yaml" for name in names],
+            "pipeline": [f"results/{name}/pipeline.json" for name in names],
+            "history": [self.configurations.network(name, "history.csv") for name in names],
+            "measurements": [file for name in names for file in self.measurements.result_files(name)],
+        }

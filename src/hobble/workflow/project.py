@@ -11,11 +11,9 @@ from hobble.config.sections import COMPARED
 from hobble.core.errors import HobbleError
 from hobble.workflow.batches import Batches
 from hobble.workflow.clips import Clips
-from hobble.workflow.comparison import COMPARE, ComparedConfigurations
-from hobble.workflow.configurations import Configurations
+from hobble.workflow.configurations import COMPARE, ComparedConfigurations, Configurations, Measurements
 from hobble.workflow.datasets import Datasets
-from hobble.workflow.measurements import Measurements
-from hobble.workflow.package import Package
+from hobble.workflow.fingerprint import Package
 
 MOCAP = "mocap"  # key of --config for the folder with the user's clips
 RESERVED = (COMPARE, "datasets", "page")  # folders in results/ that do not belong to one configuration

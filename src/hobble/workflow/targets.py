@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, get_args
 from hobble.channels import all_channels
 from hobble.config.sections import PhaseMode
 from hobble.core.errors import HobbleError, InputError
-from hobble.workflow.comparison import COMPARE
+from hobble.workflow.configurations import COMPARE
 from hobble.workflow.project import Project
 
 if TYPE_CHECKING:

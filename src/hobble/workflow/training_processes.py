@@ -1,9 +1,14 @@
-"""Starts a training in several processes with torchrun. On several machines, SLURM's srun starts torchrun."""
+"""Trains in several processes, which torchrun starts. On several machines, SLURM's srun starts torchrun.
+
+A process is `python -m hobble.workflow.training_processes JOB.json`. JOB.json holds the arguments of
+`hobble.training.train.train`, the number of threads and the path of the log file, as plain data.
+"""
 
 from __future__ import annotations
 
 import contextlib
 import json
+import logging
 import os
 import platform
 import socket
@@ -13,12 +18,13 @@ import tempfile
 import uuid
 from collections.abc import Mapping
 from pathlib import Path
-from typing import IO
+from typing import IO, Any
 
 from hobble.core.errors import HobbleError
 from hobble.models.model import Options
 from hobble.training.options import Machines, Training
-from hobble.workflow import lifetime, training_process
+from hobble.workflow import lifetime
+from hobble.workflow.lifetime import ends_with_run
 
 SLURM_VARIABLE = "SLURM_JOB_ID"  # environment variable that SLURM sets in a job
 GRACE_SECONDS = 10.0  # time for torchrun to end its processes
@@ -84,7 +90,7 @@ def train_together(
 
 
 def command(machines: Machines, job_file: Path) -> list[str]:
-    """The command that starts the processes. job_file: see `hobble.workflow.training_process`.
+    """The command that starts the processes. job_file: the arguments of `train` as JSON.
 
     Raises HobbleError for several machines without SLURM.
     """
@@ -94,7 +100,7 @@ def command(machines: Machines, job_file: Path) -> list[str]:
         "torch.distributed.run",
         f"--nproc-per-node={machines.processes_per_node}",
     ]
-    program = ["-m", training_process.__name__, str(job_file)]
+    program = ["-m", "hobble.workflow.training_processes", str(job_file)]
     if machines.nodes == 1:
         return [*torchrun, "--standalone", *program]
     if SLURM_VARIABLE not in os.environ:
@@ -146,3 +152,57 @@ def _free_port() -> int:
     with socket.socket() as probe:
         probe.bind(("", 0))
         return int(probe.getsockname()[1])
+
+
+LOG_FORMAT = "%(asctime)s %(levelname)s %(message)s"
+
+
+def main(job_file: Path) -> int:
+    """Train together with the other processes. Returns the exit status.
+
+    job_file: path of JOB.json. After a HobbleError the status is 1, and the message is in the file
+    error-<rank> beside `job_file`, where the rank is the number of this process, from 0.
+    """
+    rank = int(os.environ["RANK"])  # torchrun sets it
+    job = json.loads(job_file.read_text(encoding="utf-8"))
+    logger = logging.getLogger("hobble")
+    logger.setLevel(logging.INFO if rank == 0 else logging.ERROR)  # one process logs for all
+    file_handler = logging.FileHandler(job["log"], encoding="utf-8")
+    file_handler.setFormatter(logging.Formatter(LOG_FORMAT))
+    logger.addHandler(file_handler)
+    try:
+        # If the training has only one machine, this process ends when the job that started torchrun ends.
+        with ends_with_run():
+            _train(job)
+    except HobbleError as error:
+        # If several processes fail, the user sees the message of the lowest rank. Five digits keep the file
+        # names in the order of the ranks.
+        (job_file.parent / f"error-{rank:05d}").write_text(str(error), encoding="utf-8")
+        return 1
+    return 0
+
+
+def _train(job: dict[str, Any]) -> None:
+    """Train together with the other processes. job: the content of JOB.json."""
+    from hobble.database.reader import Database
+    from hobble.models import network_options
+    from hobble.training.options import Training
+    from hobble.training.processes import join_processes
+    from hobble.training.train import train
+
+    training = Training.model_validate(job["training"])
+    with join_processes(training.device == "cuda") as processes:
+        train(
+            Database.open(job["database"], training.memory_mb),
+            network=network_options(job["network"]),
+            training=training,
+            checkpoints=Path(job["checkpoints"]),
+            threads=job["threads"],
+            start=Path(job["start"]) if job["start"] else None,
+            code=job["code"],  # hash of the source code
+            processes=processes,
+        )
+
+
+if __name__ == "__main__":
+    sys.exit(main(Path(sys.argv[1])))
