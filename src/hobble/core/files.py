@@ -5,6 +5,7 @@ A file is written under a temporary name and then renamed.
 
 from __future__ import annotations
 
+import base64
 import contextlib
 import errno
 import glob
@@ -311,3 +312,9 @@ def _number(path: str | Path, column: str, text: Any) -> float | None:
         problem = f"column {column} holds {text!r:.80}, which is not a number"
         raise InputError(path, problem, fix="Delete the file and run again.") from None
     return value if abs(value) < float("inf") else None
+
+
+def to_base64(array: np.ndarray) -> str:
+    """The little-endian bytes of an array as base64."""
+    array = np.ascontiguousarray(array)
+    return base64.b64encode(array.astype(array.dtype.newbyteorder("<")).tobytes()).decode("ascii")

@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hobble.core import quat
+from hobble.core.files import to_base64
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 from hobble.figure.mesh import Mesh, body_mesh
-from hobble.models.network import to_base64
 
 UNIT = 0.01  # cm; positions of corners are stored as multiples of this
 TURN = 32767  # the integer that stands for 1 in packed rotations

@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from hobble.channels.speed_limits import SUM_NORM
 from hobble.core.quat import Array
-from hobble.core.several_effects import SUM_NORM
 from hobble.core.skeleton import Skeleton
 from hobble.core.smooth import gaussian
 from hobble.hurt.amounts import changes_of_hurt_part

@@ -5,7 +5,6 @@ Also facts about the training data, which a network carries with it, and the pac
 
 from __future__ import annotations
 
-import base64
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
@@ -17,6 +16,7 @@ from numpy.typing import NDArray
 
 from hobble.channels.speed_limits import Limits
 from hobble.core.errors import HobbleError
+from hobble.core.files import to_base64
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 from hobble.rows.layout import GAITS, RowLayout, compose
@@ -304,12 +304,6 @@ def standardise_inputs(network: Network, x: Array) -> Array:
 def inverse_or_0(std: Array) -> Array:
     """1 / std, and 0 for a column that never varied, to avoid a division by 0."""
     return np.where(std > 0, 1 / np.maximum(std, 1e-30), 0)
-
-
-def to_base64(array: NDArray[Any]) -> str:
-    """The little-endian bytes of an array as base64."""
-    array = np.ascontiguousarray(array)
-    return base64.b64encode(array.astype(array.dtype.newbyteorder("<")).tobytes()).decode("ascii")
 
 
 def pack_layer(weights: Array, biases: Array) -> dict[str, Any]:

@@ -11,15 +11,15 @@ from numpy.typing import ArrayLike, NDArray
 
 from hobble.channels import channel
 from hobble.channels.shown import channel_display, channel_words
-from hobble.channels.speed_limits import SLOWEST
+from hobble.channels.speed_limits import SLOWEST, SUM_NORM
+from hobble.core.files import to_base64
 from hobble.core.quat import Array
-from hobble.core.several_effects import SUM_NORM
 from hobble.core.skeleton import Skeleton
 from hobble.figure.mesh import body_mesh, mesh_key
 from hobble.gait.cycles import measure_cycles
 from hobble.gait.profile import Profile, features, healthy_profile, profile_of_walk
 from hobble.gait.recognise import LEANING, PARTS, SIDES, STRENGTHS, Grader, grader_of_all_people
-from hobble.models.network import Network, inverse_or_0, to_base64
+from hobble.models.network import Network, inverse_or_0
 from hobble.runtime import (
     bounds,
     caller_targets,

@@ -12,13 +12,13 @@ from hobble.channels import channel
 from hobble.channels.shown import ChannelDisplay, channel_display, channel_words
 from hobble.core import quat
 from hobble.core.array_parts import ArrayParts
-from hobble.core.files import load_npz
+from hobble.core.files import load_npz, to_base64
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 from hobble.figure.gltf import fitted_rotations
 from hobble.figure.mesh import body_mesh, mesh_key
 from hobble.figure.pack import packed_turns
-from hobble.models.network import Network, to_base64
+from hobble.models.network import Network
 from hobble.rows.captured import headings, root_path, rotate_by_yaw, unbroken_stretches
 from hobble.rows.clip_rows import ClipRows, compose_pairs, load_clip_rows
 from hobble.runtime.export import restore_bone_lengths

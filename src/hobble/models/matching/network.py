@@ -24,6 +24,7 @@ from scipy.spatial import cKDTree
 
 from hobble.core.compiled import njit
 from hobble.core.errors import InputError
+from hobble.core.files import to_base64
 from hobble.core.quat import Array
 from hobble.models.load import (
     LARGEST_MEAN,
@@ -31,7 +32,7 @@ from hobble.models.load import (
     require_number_in_range,
     require_whole_number,
 )
-from hobble.models.network import STORAGES, Network, inverse_or_0, pack_table, standardise_inputs, to_base64
+from hobble.models.network import STORAGES, Network, inverse_or_0, pack_table, standardise_inputs
 from hobble.models.predict import standardise_columns
 
 # Largest number of rows of the tables. The page keeps row numbers in float32, which is exact up to here.
