@@ -1,7 +1,6 @@
 from __future__ import annotations
 
 import base64
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,7 +10,7 @@ from hobble.core import quat
 from hobble.core.skeleton import Skeleton
 from hobble.figure.mesh import body_mesh
 from hobble.figure.pack import TURN
-from hobble.report.recorded_motion import UNIT, pack_positions, packed_scenes
+from hobble.report.recorded_motion import UNIT, pack_positions
 
 
 def unpacked(text: str, kind: str) -> np.ndarray:
@@ -59,16 +58,3 @@ def test_packed_rotations_give_the_bones_and_their_lengths(play: dict[str, Any],
         assert np.abs(np.linalg.norm(reach, axis=-1) - np.linalg.norm(holden31.offsets[b])).max() < 0.03
         there = quat.rotate(turn[:, keep.index(a)], holden31.offsets[b])
         assert np.abs(there - reach).max() < 0.05
-
-
-def test_motion_without_rotations_is_fitted(
-    inputs: dict[str, Any], material: Any, play: dict[str, Any], tmp_path: Path
-) -> None:
-    """Files without rotations: the bones are at the same places, but their twist is unknown."""
-    data = {name: value for name, value in np.load(inputs["scenarios"]).items() if "/rotations" not in name}
-    np.savez(tmp_path / "old.npz", **data)
-    made = packed_scenes(tmp_path / "old.npz", material.network["skeleton"], material.network["channels"])
-    old, new = (unpacked(one["scenarios"][0]["pose"], "<i2").astype(int) for one in (made, play))
-    apart = UNIT * np.abs(old - new)
-    assert apart.max() < 5
-    assert np.median(apart) <= 0.011

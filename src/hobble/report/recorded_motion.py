@@ -46,8 +46,9 @@ def packed_scenes(
 ) -> dict[str, Any]:
     """The scripted walks of the page; {} without a skeleton.
 
-    path: `runtime/scenarios.npz`, the motion that the network generated. skeleton: the network's, as a dict;
-    empty if it has none. channels: channel (group of inputs of the network) -> labels of its columns.
+    path: `runtime/scenarios.npz`, from `hobble.runtime.scenarios.generate_scenarios`. skeleton: the
+    network's, as a dict; empty if it has none. channels: channel (group of inputs of the network) -> labels
+    of its columns.
 
     The motion is stored at 30 Hz, for the joints that move the drawn body. Their positions are relative to
     the root joint, as 16-bit integers in steps of 0.1 mm. Rotations have 16 bits, too.
@@ -59,10 +60,23 @@ def packed_scenes(
     displays = {
         name: channel_display(name, figure, columns, columns) for name, columns in (channels or {}).items()
     }
-    frame_step = max(1, round(float(data["fps"]) / FPS))
-    names = [str(name) for name in data["names"]]
     bones = body_mesh(figure).bones.tolist()  # the joints that move the drawn body
     feet = [figure.role(role) if figure.roles.get(role) in figure.joints else -1 for role in FEET]
+    frame_step = max(1, round(float(data["fps"]) / FPS))
+    walks = []
+    for name in map(str, data["names"]):
+        # Arrays of the walk, of every frame_step-th frame.
+        motion = {key.removeprefix(f"{name}/"): v for key, v in data.items() if key.startswith(f"{name}/")}
+        swept_channel, column = map(str, motion.pop("swept"))
+        motion = {key: values[::frame_step] for key, values in motion.items()}
+        walk: dict[str, Any] = {"name": title_of(name), "description": DESCRIPTIONS.get(name, "")}
+        walk |= _packed_walk(motion, figure, bones)
+        if column in (channels or {}).get(swept_channel, ()):
+            index, display = list((channels or {})[swept_channel]).index(column), displays[swept_channel]
+            walk["swept"] = _packed_sweep(motion, channel(swept_channel).highest, index, column, display)
+            words = channel_words(swept_channel).sweep_description
+            walk["description"] = words.format(walk["swept"]["spoken"])
+        walks.append(walk)
     return {
         "fps": float(data["fps"]) / frame_step,
         "joints": len(bones),
@@ -70,67 +84,39 @@ def packed_scenes(
         "feet": [bones.index(j) for j in feet] if all(j in bones for j in feet) else [],
         "body": mesh_key(figure),
         "regions": next((list(display.regions) for display in displays.values() if display.regions), []),
-        "scenarios": [
-            _packed_walk(data, name, frame_step, channels or {}, displays, figure, bones) for name in names
-        ],
+        "scenarios": walks,
     }
 
 
-def _packed_walk(
-    data: Mapping[str, Array],
-    name: str,
-    frame_step: int,
-    channels: Mapping[str, Sequence[str]],
-    displays: Mapping[str, ChannelDisplay],
-    figure: Skeleton,
-    keep: list[int],
-) -> dict[str, Any]:
-    """One scripted walk, packed for the page.
-
-    data: arrays of the file, called <name>/positions and so on. frame_step: every frame_step-th frame is
-    stored. channels: as in `packed_scenes`. displays: channel -> how it is shown. keep: joints to store.
-    """
-    positions = np.asarray(data[f"{name}/positions"], float)[::frame_step]
-    rotations = data.get(f"{name}/rotations")
-    rotations = (
-        fitted_rotations(figure, positions)
-        if rotations is None
-        else np.asarray(rotations, float)[::frame_step]
-    )
-    out: dict[str, Any] = {
-        "name": title_of(name),
-        "description": DESCRIPTIONS.get(name, ""),
-        "frames": len(positions),
-        **packed_motion(figure, positions, rotations, keep),
-    }
-    contacts, phase = data.get(f"{name}/contacts"), data.get(f"{name}/phase")
-    if contacts is not None:
-        # One byte for each frame: bit 0 is the contact of FEET[0], bit 3 that of FEET[3].
-        bits = (np.asarray(contacts)[::frame_step, :4] > CONTACT) @ (1 << np.arange(4))
-        out["contacts"] = to_base64(bits.astype(np.uint8))
-    if phase is not None:
+def _packed_walk(motion: Mapping[str, Array], figure: Skeleton, keep: list[int]) -> dict[str, Any]:
+    """One scripted walk, packed for the page. motion: its arrays. keep: joints to store."""
+    # One byte for each frame: bit 0 is the contact of FEET[0], bit 3 that of FEET[3].
+    contacts = (motion["contacts"][:, :4] > CONTACT) @ (1 << np.arange(4))
+    return {
+        "frames": len(motion["positions"]),
+        **packed_motion(figure, motion["positions"].astype(float), motion["rotations"].astype(float), keep),
+        "contacts": to_base64(contacts.astype(np.uint8)),
         # 0 to 255 stands for phase 0 to 1.
-        out["phase"] = to_base64(np.round(255 * (np.asarray(phase)[::frame_step] % 1.0)).astype(np.uint8))
-    # In some walks the value of one column rises from 0 to the highest.
-    swept_channel, column = (str(v) for v in data.get(f"{name}/swept", ("", "")))
-    if column in channels.get(swept_channel, ()):
-        index, highest = list(channels[swept_channel]).index(column), channel(swept_channel).highest
-        display = displays[swept_channel]
-        # The column's name for readers.
-        word = next(
-            (label for label, c in display.sliders.items() if c == column), display.spoken_names[index]
-        )
-        share = np.asarray(data[f"{name}/swept_values"])[::frame_step] / highest
-        out["swept"] = {
-            "column": index,
-            "spoken": word,
-            "highest": highest,
-            "placed": bool(display.regions),  # whether the value belongs to a part of the body
-            # 0 to 250 stands for 0 to the highest value.
-            "values": to_base64(np.clip(np.round(250 * share), 0, 250).astype(np.uint8)),
-        }
-        out["description"] = channel_words(swept_channel).sweep_description.format(word)
-    return out
+        "phase": to_base64(np.round(255 * (motion["phase"] % 1.0)).astype(np.uint8)),
+    }
+
+
+def _packed_sweep(
+    motion: Mapping[str, Array], highest: float, index: int, column: str, display: ChannelDisplay
+) -> dict[str, Any]:
+    """The value of a column that rises from 0 to `highest` during a walk. index: of the column."""
+    # The column's name for readers.
+    word = next((label for label, c in display.sliders.items() if c == column), display.spoken_names[index])
+    return {
+        "column": index,
+        "spoken": word,
+        "highest": highest,
+        "placed": bool(display.regions),  # whether the value belongs to a part of the body
+        # 0 to 250 stands for 0 to the highest value.
+        "values": to_base64(
+            np.clip(np.round(250 * (motion["swept_values"] / highest)), 0, 250).astype(np.uint8)
+        ),
+    }
 
 
 def packed_motion(

@@ -4,7 +4,7 @@ import {
   MeshStandardMaterial, Quaternion, Skeleton, SkinnedMesh, Sphere, Vector3,
 } from "three";
 import { linear, material } from "./base.js";
-import { unpackBody } from "./module.js";
+import { unpackBody } from "./math.js";
 
 const unpacked = new Map();
 
