@@ -15,7 +15,6 @@ from hobble.core.errors import HobbleError, InputError
 from hobble.core.files import write_csv
 from hobble.measures.accuracy_run import (
     QUANTILES,
-    Errors,
     clip_errors,
     clips_table,
     joint_errors,
@@ -25,7 +24,7 @@ from hobble.measures.accuracy_run import (
     predict_function,
 )
 from hobble.measures.measure import JointOptions, MeasureInputs
-from hobble.models.forward import phase_shares, weights_at
+from hobble.models.forward import weights_at
 from hobble.models.load import NEEDED_ROLES, load_network
 from hobble.models.network import Network
 from hobble.rows.clip_rows import ClipRows, pair_batches, save_clip_rows
@@ -98,7 +97,7 @@ def test_the_released_network_on_the_original_rows(shared):
     network = load_network(shared / "reference" / "pfnn_release_network.npz")
     with np.load(shared / "reference" / "original_rows_LocomotionFlat09_000.npz") as file:
         x, y, p, released = (file[name] for name in ("X", "Y", "P", "Y_release"))
-    predicted = network.predict(x, p, constant=True)
+    predicted = network.predictor("constant", "float32").predict(x, p.astype(float))
     np.testing.assert_allclose(predicted, released, atol=1e-3)
     errors = joint_errors(RowLayout(31), y, predicted, range(31))
     assert round(float(errors[..., 0].mean()), 4) == 0.0438
@@ -118,15 +117,6 @@ def test_a_batched_prediction_equals_rows_predicted_with_blended_weights(tmp_pat
     phase = np.r_[0.0, 1.0, 0.25, 0.5, rng.random(16)]
     expected = np.stack([slow(network, row, p) for row, p in zip(x, phase, strict=True)])
     np.testing.assert_allclose(network.predict(x, phase), expected, atol=1e-4)
-
-
-def test_phase_shares_hit_the_control_points_and_sum_to_one():
-    np.testing.assert_allclose(
-        phase_shares(np.array([0, 0.25, 0.5, 0.75, 1.0]), np.arange(4)), np.eye(4)[[0, 1, 2, 3, 0]]
-    )
-    shares = phase_shares(np.linspace(0, 1, 101), np.arange(5))
-    np.testing.assert_allclose(shares.sum(axis=1), 1)
-    np.testing.assert_allclose(shares[0], shares[-1], atol=1e-12)
 
 
 def test_an_error_of_a_tenth_in_one_joint_gives_the_documented_error():
@@ -169,15 +159,6 @@ def test_the_errors_of_the_fast_prediction_are_those_of_the_reference(weights):
     assert fast != reference  # it is another way to compute them
 
 
-def test_errors_do_not_depend_on_the_batch_size(weights, monkeypatch):
-    network, rows = load_network(weights), make_rows("a", 50, 10, 5)
-    whole = clip_errors(network, rows, [0, 1, 2]).to_dict()
-    monkeypatch.setattr(
-        "hobble.measures.accuracy_run.pair_batches", lambda rows, layout: pair_batches(rows, layout, batch=7)
-    )
-    assert clip_errors(network, rows, [0, 1, 2]).to_dict() == pytest.approx(whole)
-
-
 def test_accuracy_per_clip_and_split(weights, tmp_path):
     clips = {}
     for i, (name, n, fits) in enumerate((("b", 20, 1), ("a", 40, 10), ("c", 30, 1), ("none", 0, 1))):
@@ -204,10 +185,6 @@ def test_accuracy_per_clip_and_split(weights, tmp_path):
     assert [row["clip"] for row in table] == ["a", "b", "c", "none"]
     assert float(table[2]["mean"]) == c["mean"]
     assert result == measure_accuracy(weights, clips, splits, "injured")
-
-
-def test_without_held_out_clips_their_error_is_none():
-    assert Errors().to_dict() == {"frames": 0, "mean": None, "sd": None, "position_error_cm": None}
 
 
 def test_equivalent_joints_leave_out_joints_of_larger_skeletons(weights, tmp_path):

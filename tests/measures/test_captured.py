@@ -7,7 +7,7 @@ import pytest
 
 from hobble.measures.sample import Sample, Stratum, captured_motion
 from hobble.measures.walks import acceleration, in_root_coordinates
-from hobble.rows.captured import captured_stretches, root_path, unbroken_stretches
+from hobble.rows.captured import captured_stretches
 from hobble.rows.clip_rows import ClipRows, Excerpt, save_clip_rows
 from hobble.rows.layout import GAITS, RowLayout
 
@@ -82,8 +82,3 @@ def test_a_gap_in_the_frames_separates_two_stretches(rows, tmp_path) -> None:
     assert [len(c) for c in captured_motion(paths, None)] == [30, 20, 30, 20]
     part = Sample((Stratum("train", 2, 100, (Excerpt("a", 20, 15, 50),)),), 2)
     assert [len(c) for c in captured_motion(paths, part)] == [10, 5]
-
-
-def test_no_rows_give_no_motion() -> None:
-    assert unbroken_stretches(np.zeros(0, int)) == []
-    assert root_path(np.zeros((1, 2)), np.zeros(1)).tolist() == [[0, 0, 0]]

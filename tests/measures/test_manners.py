@@ -16,7 +16,6 @@ from hobble.measures import manners_run as module
 from hobble.measures.manners_run import (
     EFFECTS,
     NONE,
-    SHRINKAGES,
     STEP,
     USED,
     WINDOW,
@@ -107,21 +106,6 @@ def test_whole_people_are_left_out() -> None:
     assert by_person["people_of"] == {NONE: 6, "sad": 6}
     assert by_clip["windows"] == by_person["windows"] == 480
     assert by_clip["right"] > by_person["right"] + 0.2
-
-
-def test_features_are_tabled_once_and_the_best_shrinkage_is_chosen(monkeypatch: pytest.MonkeyPatch) -> None:
-    rng = np.random.default_rng(4)
-    windows = [window(f"{k}", "sad" if k % 2 else NONE, *rng.normal(k % 2, 1, 4)) for k in range(30)]
-    people = {w.clip: w.clip for w in windows}
-    counted: list[int] = []
-    plain = module.feature_table
-    monkeypatch.setattr(module, "feature_table", lambda some: counted.append(len(some)) or plain(some))
-    best = recognise_left_out(windows, people)
-    assert counted == [30]
-    alone = [recognise_left_out(windows, people, [shrinkage]) for shrinkage in SHRINKAGES]
-    assert best in alone
-    assert best["right"] == max(one["right"] for one in alone)
-    assert min(one["right"] for one in alone) < best["right"]
 
 
 def test_a_manner_of_a_single_person_is_never_named_when_that_person_is_left_out() -> None:

@@ -8,7 +8,6 @@ import pytest
 from hobble.core import quat
 from hobble.core.skeleton import Skeleton, forward_kinematics
 from hobble.measures.walks import (
-    acceleration,
     asymmetry,
     bend,
     feet_in_stance,
@@ -66,12 +65,6 @@ def test_bend_and_asymmetry_of_known_poses_are_exact() -> None:
     assert asymmetry(0.0, 0.0) is None
 
 
-def test_the_acceleration_of_a_parabola_is_constant() -> None:
-    t = np.arange(5.0)
-    positions = np.stack([0.5 * t**2, t, 0 * t], axis=-1)[:, None]
-    np.testing.assert_allclose(acceleration(positions), 1.0)
-
-
 def test_poses_in_the_root_frame_do_not_depend_on_place_and_heading() -> None:
     yaw = np.array([0.0, 0.9])
     root = np.array([[0, 0, 0], [5.0, 0, -3]])
@@ -113,12 +106,3 @@ def test_cadence_stance_and_step_length_of_a_known_walk_are_exact(holden31: Skel
     heels = positions[:, [holden31.role("left_heel"), holden31.role("right_heel")], 2]
     assert found["step_left"] == pytest.approx((heels[5::60, 0] - heels[5::60, 1]).mean())
     assert found["step_right"] == pytest.approx((heels[35::60, 1] - heels[35::60, 0]).mean())
-
-
-def test_a_figure_that_never_steps_has_no_step_length(holden31: Skeleton) -> None:
-    rest = np.tile([1.0, 0, 0, 0], (30, len(holden31.joints), 1))
-    positions = forward_kinematics(holden31, rest, np.zeros((30, 3)))[1]
-    found = gait_measures(holden31, positions, np.ones((30, 4)), np.zeros((30, 3)))
-    assert found["step_left"] is None
-    assert found["step_asymmetry"] is None
-    assert found["speed"] == 0

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from hobble.core.errors import InputError
 from hobble.measures.measure import Measure, MeasureInputs, all_measures
 from hobble.measures.rollouts_run import RollOutInputs, inputs_of_clip, measure_roll_outs, roll_out_rows
 from hobble.measures.walks import in_root_coordinates
@@ -174,23 +173,6 @@ def test_results_of_splits_are_means_of_their_clips_and_reproducible(
     assert measure_roll_outs(weights, clips, splits, "injured", lengths=(1, 30)) == result
     monkeypatch.setattr("hobble.measures.rollouts_run.AT_ONCE", 1)
     assert measure_roll_outs(weights, clips, splits, "injured", lengths=(1, 30)) == result
-
-
-def test_rows_of_another_layout_are_refused(hurtable: Network, network: Network, tmp_path: Path) -> None:
-    save(tmp_path / "weights.npz", hurtable)
-    rows = clip_rows(hurtable, 0, 0)
-    layout = RowLayout(4, channels=(("injury", 30),))
-    other = ClipRows(
-        **{
-            **vars(rows),
-            "layout": layout,
-            "x": np.zeros((0, layout.x_terrain.start)),
-            "y": np.zeros((0, layout.y_size)),
-        }
-    )
-    save_clip_rows(tmp_path / "a.npz", other)
-    with pytest.raises(InputError, match=r"a\.npz: its rows"):
-        measure_roll_outs(tmp_path / "weights.npz", {"a": tmp_path / "a.npz"}, {"a": "train"}, "x")
 
 
 @pytest.mark.parametrize("measure", [m for m in all_measures() if m.channel])

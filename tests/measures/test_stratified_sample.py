@@ -138,18 +138,6 @@ def whole(name: str, rows: int) -> Excerpt:
     return Excerpt(name, 0, rows, rows)
 
 
-def test_excerpts_that_are_all_drawn_leave_no_doubt():
-    a, b, c = (whole(name, 10 * (i + 1)) for i, name in enumerate("abc"))
-    sample = Sample((Stratum("train", 3, 60, (a, b, c)),), 3)
-    assert sample.confidence_half_width("train", {a: 1.0, b: 5.0, c: 9.0}) == 0
-    assert set(sample.weights.values()) == {1.0}
-    a, b = whole("a", 10), whole("b", 10)
-    half = Sample((Stratum("train", 4, 40, (a, b)),), 4)
-    assert half.weights == {a: 2.0, b: 2.0}
-    # Variance of the mean of 2 of 4: (1 - 2/4) * 8 / 2.
-    assert half.confidence_half_width("train", {a: 1.0, b: 5.0}) == pytest.approx(1.96 * 2**0.5)
-
-
 def test_excerpts_cover_a_clip_once_and_are_read_as_they_are(tmp_path):
     rows = make_rows("a", 2500, 2, 5)
     rows.fits[::3] = 1
