@@ -12,7 +12,7 @@ floor is the time of the matrix products alone, at their best, with the same fac
 - fused, float32: `hobble.models.step.FusedStep`, the default below batch 256;
 - fused, bfloat16: the same with factors rounded to bfloat16, the default from there on.
 
-`training_cuda.py` measures a GPU.
+There is no benchmark for GPUs.
 """
 
 from __future__ import annotations

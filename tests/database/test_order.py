@@ -41,38 +41,11 @@ def test_each_row_has_its_own_order_of_fits():
 
 
 def test_every_layer_has_every_chunk_once_in_a_new_order():
-    one_shard = np.zeros(37, int)
-    groups = order.chunk_groups(one_shard, 8, seed=1, pass_index=0, layer=0)
+    groups = order.chunk_groups(37, 8, seed=1, pass_index=0, layer=0)
     assert [len(g) for g in groups] == [1, 2, 4, 8, 8, 8, 6]  # the first is soon read
     np.testing.assert_array_equal(np.sort(np.concatenate(groups)), np.arange(37))
-    other = order.chunk_groups(one_shard, 8, seed=1, pass_index=0, layer=1)
+    other = order.chunk_groups(37, 8, seed=1, pass_index=0, layer=1)
     assert not np.array_equal(np.concatenate(groups), np.concatenate(other))
-
-
-@given(st.lists(st.integers(0, 40), min_size=2, max_size=9), st.integers(0, 99), st.integers(1, 30))
-@settings(max_examples=60, deadline=None)
-def test_a_window_has_chunks_of_all_shards_in_proportion(of_each, seed, window):
-    """Each chunk comes once, and a group has the share of each shard, up to two chunks."""
-    shards = np.repeat(np.arange(len(of_each)), of_each)
-    groups = order.chunk_groups(shards, window, seed, pass_index=0, layer=0)
-    found = np.concatenate([[], *groups]).astype(int)
-    np.testing.assert_array_equal(np.sort(found), np.arange(len(shards)))
-    assert [len(g) for g in groups[:1]] == [min(np.count_nonzero(of_each), window, len(shards))][
-        : len(groups)
-    ]
-    for group in groups:
-        expected = len(group) * np.array(of_each) / max(len(shards), 1)
-        assert np.abs(np.bincount(shards[group], minlength=len(of_each)) - expected).max() <= 2
-
-
-def test_chunks_of_a_shard_come_in_another_order_each_layer():
-    shards = np.repeat([0, 1, 2], [30, 50, 20])
-    layers = [np.concatenate(order.chunk_groups(shards, 16, 1, 0, layer)) for layer in range(2)]
-    assert (layers[0] == layers[1]).mean() < 0.1
-    for number in range(3):
-        own = [layer[shards[layer] == number] for layer in layers]
-        assert not np.array_equal(*own)
-        assert abs(np.corrcoef(own[0], np.arange(len(own[0])))[0, 1]) < 0.6
 
 
 def test_the_order_depends_on_seed_pass_layer_and_chunk_only():

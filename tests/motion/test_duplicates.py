@@ -11,7 +11,7 @@ from hobble.core.errors import HobbleError
 from hobble.database.split_check import refuse_split_pairs
 from hobble.motion.axes import turned_about_vertical
 from hobble.motion.edit import mirror_clip
-from hobble.motion.look import clip_digest, duplicate_pairs, load_digests, save_digests
+from hobble.motion.look import clip_digest, duplicate_pairs
 
 
 def test_turned_shortened_and_mirrored_copies_are_found(walker, holden31):
@@ -50,22 +50,6 @@ def test_a_mirrored_file_of_the_original_release_is_found(shared, make):
     assert duplicate_pairs([clip_digest(clip, clip.name) for clip in clips]) == [
         (*names, "mirrors of each other")
     ]
-
-
-def test_the_data_for_comparing_clips_survives_its_file(walker, holden31, tmp_path):
-    clip = walker(holden31, 120, 60.0)
-    found = [clip_digest(replace(clip, name=name), name) for name in "ab"]
-    found.append(replace(found[0], name="c", mirrored=None))
-    save_digests(tmp_path / "some.npz", found)
-    back = load_digests(tmp_path / "some.npz")
-    assert [(one.name, one.sha256, one.seconds) for one in back] == [
-        (one.name, one.sha256, one.seconds) for one in found
-    ]
-    for one, other in zip(back, found, strict=True):
-        np.testing.assert_array_equal(one.poses, other.poses)
-    np.testing.assert_array_equal(back[1].mirrored, found[1].mirrored)
-    assert back[2].mirrored is None
-    assert duplicate_pairs(back) == duplicate_pairs(found)
 
 
 def test_files_with_one_digest_are_the_same_file(walker, holden31):

@@ -12,7 +12,7 @@ import torch
 
 from hobble.core.skeleton import Skeleton
 from hobble.database.reader import Database
-from hobble.database.write import merge_shards, write_shard
+from hobble.database.write import write_database
 from hobble.models.pfnn import PfnnOptions
 from hobble.rows.clip_rows import ClipRows
 from hobble.rows.layout import RowLayout
@@ -60,13 +60,11 @@ def clip_rows(name: str, rows: int, fits: int, seed: int) -> ClipRows:
 
 @pytest.fixture(scope="session")
 def small_database(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Two shards with 230 rows to train on and 70 held out, ten fits each or one: 2,300 samples a pass."""
+    """230 rows to train on and 70 held out, ten fits each or one: 2,300 samples a pass."""
     path = tmp_path_factory.mktemp("database") / "all"
     walk, turn = clip_rows("walk", 150, 1, 1), clip_rows("turn", 70, 1, 3)
-    shards = {"0": {"walk": walk, "turn": turn}, "1": {"hop": clip_rows("hop", 80, 10, 2)}}
-    for name, clips in shards.items():
-        write_shard(path.parent / name, clips, SPLITS, channels=["injury"], joint_weight=0.1)
-    merge_shards(path, [path.parent / name for name in shards], joint_weight=0.1)
+    clips = {"walk": walk, "turn": turn, "hop": clip_rows("hop", 80, 10, 2)}
+    write_database(path, clips, SPLITS, channels=["injury"], joint_weight=0.1)
     return path
 
 

@@ -21,7 +21,6 @@ from hobble.models.model import Trainable
 from hobble.training import train as module
 from hobble.training.augment import OtherPoses, RollOut
 from hobble.training.batches import HostRows, SampleBatch
-from hobble.training.device_rows import DeviceRows
 from hobble.training.options import Training
 from hobble.training.processes import ALONE, Processes, join_processes
 
@@ -41,7 +40,6 @@ def widen(kind: Any) -> None:
 def in_double() -> None:
     """Make networks, batches and carried errors use float64."""
     widen(HostRows)
-    widen(DeviceRows)
     to = Trainable.to
     Trainable.to = lambda self, device, dtype=None: to(self, device, torch.float64)  # type: ignore[method-assign]
 
@@ -73,8 +71,7 @@ def main(jobs: list[dict[str, Any]]) -> None:
 
 
 def one(job: dict[str, Any], processes: Processes) -> None:
-    """on_device: rows shuffled as on an accelerator. window: chunks held at a time, 0 for all."""
-    module.rows_on_device_or_host = DeviceRows if job["on_device"] else HostRows  # type: ignore[assignment]
+    """window: chunks held at a time, 0 for all."""
     window = job["window"]
     Database.chunks_per_window = (lambda *_: window) if window else WINDOW  # type: ignore[method-assign]
     training = Training.model_validate(job["training"])

@@ -44,7 +44,7 @@ HARD = {
     "memory_mb": 64,
     "device": "cpu",
 }
-Ends = dict[tuple[int, int, tuple[bool, int]], dict[str, np.ndarray]]
+Ends = dict[tuple[int, int, int], dict[str, np.ndarray]]
 
 
 @pytest.fixture(scope="module")
@@ -56,8 +56,7 @@ def database(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-# How the rows are read: (shuffled as on an accelerator, chunks held at a time or 0 for all).
-WAYS = [(False, 0), (False, 3), (True, 0)]
+WAYS = [0, 3]  # chunks held at a time, 0 for all
 
 
 @pytest.fixture(scope="module")
@@ -76,8 +75,7 @@ def ends(database: Path, tmp_path_factory: pytest.TempPathFactory) -> Ends:
                     "training": HARD | {"stretches": cut if cut != processes else None},
                     "checkpoints": str(folder / name),
                     "out": str(folder / f"{name}.npz"),
-                    "on_device": way[0],
-                    "window": way[1],
+                    "window": way,
                 }
             )
         job_file = folder / f"{processes}.json"
@@ -98,7 +96,7 @@ def furthest(one: dict[str, np.ndarray], other: dict[str, np.ndarray]) -> float:
 
 @pytest.mark.parametrize("way", WAYS)
 @pytest.mark.parametrize("processes", [2, 3])
-def test_several_processes_train_like_one(ends: Ends, processes: int, way: tuple[bool, int]) -> None:
+def test_several_processes_train_like_one(ends: Ends, processes: int, way: int) -> None:
     """With batches of consecutive samples, and with a stretch for each process."""
     assert furthest(ends[1, 1, way], ends[processes, 1, way]) < 1e-10
     assert furthest(ends[1, processes, way], ends[processes, processes, way]) < 1e-10

@@ -14,7 +14,6 @@ from hobble.config.sections import Training
 from hobble.database.reader import Database
 from hobble.training.batches import HostRows
 from hobble.training.optimiser import Adam
-from hobble.training.schedule import learning_rate_share
 from hobble.training.train import train
 
 Settings = dict[str, Any]
@@ -23,7 +22,7 @@ FAST = {"schedule": "cosine", "warm_up": 0.5, "rollout": 4, "batch": 300}
 
 def test_a_cosine_falls_from_one_to_nothing() -> None:
     recipe = Training(schedule="cosine", passes=10)
-    shares = [learning_rate_share(recipe, passes) for passes in np.linspace(0, 10, 101)]
+    shares = [recipe.learning_rate_share(passes) for passes in np.linspace(0, 10, 101)]
     assert shares[0] == 1
     assert shares[50] == pytest.approx(0.5)
     assert shares[-1] == pytest.approx(0, abs=1e-12)
@@ -33,14 +32,14 @@ def test_a_cosine_falls_from_one_to_nothing() -> None:
 
 def test_a_cosine_of_half_a_pass_ends_after_half_a_pass() -> None:
     recipe = Training(schedule="cosine", passes=0.5, sections=4)
-    shares = [learning_rate_share(recipe, passes) for passes in (0, 0.25, 0.5)]
+    shares = [recipe.learning_rate_share(passes) for passes in (0, 0.25, 0.5)]
     assert shares == pytest.approx([1, 0.5, 0])
     assert recipe.all_sections == 2
 
 
 def test_a_constant_rate_rises_and_stays() -> None:
     recipe = Training(warm_up=2.0, passes=10)
-    shares = [learning_rate_share(recipe, passes) for passes in (0, 0.5, 1, 2, 5, 10)]
+    shares = [recipe.learning_rate_share(passes) for passes in (0, 0.5, 1, 2, 5, 10)]
     assert shares == [0, 0.25, 0.5, 1, 1, 1]
 
 
@@ -63,7 +62,7 @@ def test_each_batch_has_the_rate_of_its_place(
         train(data, network=network, training=settings, checkpoints=tmp_path, threads=1)
     sizes = [300, 300, 166, 300, 300, 167, 300, 300, 167] * 2
     seen = np.cumsum([0, *sizes])[: len(sizes)]
-    wanted = [learning_rate_share(settings, samples / 2300) for samples in seen]
+    wanted = [settings.learning_rate_share(samples / 2300) for samples in seen]
     assert rates == pytest.approx(wanted[:10])
     del rates[9:]  # the section that was cut short is done again
     rates += [np.nan] * 3

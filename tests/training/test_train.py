@@ -15,14 +15,10 @@ import torch
 from hobble.core import files
 from hobble.core.errors import HobbleError, InputError
 from hobble.database.reader import Block, Database
-from hobble.database.write import write_database
 from hobble.training import checkpoint, train
 from hobble.training.batches import HeldOutErrors, HostRows
 from hobble.training.checkpoint import State, columns, write_history
-from hobble.training.device_rows import DeviceRows, gpu_has_room, rows_on_device_or_host
 from tests.models.definition import fresh
-
-from .conftest import SPLITS, clip_rows
 
 Settings = dict[str, Any]
 Run = Callable[..., State]
@@ -53,10 +49,9 @@ def test_a_training_lowers_the_error_on_held_out_rows(run: Run) -> None:
     assert state.best_mse == min(row[5] for row in state.history)
 
 
-@pytest.mark.parametrize("kind", [HostRows, DeviceRows])
 @pytest.mark.parametrize("size", [32, 300])
-def test_batches_are_the_sections_samples_in_order(data: Database, kind: type[HostRows], size: int) -> None:
-    seen = list(kind(data, torch.device("cpu")).batches(1, 2, 3, seed=5, size=size))
+def test_batches_are_the_sections_samples_in_order(data: Database, size: int) -> None:
+    seen = list(HostRows(data, torch.device("cpu")).batches(1, 2, 3, seed=5, size=size))
     blocks = list(data.blocks("train", 1, 2, 3, 5))
     assert [len(batch.p) for batch in seen[:-1]] == [size] * (len(seen) - 1)
     assert 0 < len(seen[-1].p) <= size
@@ -64,36 +59,6 @@ def test_batches_are_the_sections_samples_in_order(data: Database, kind: type[Ho
     for mine, theirs in zip(columns, zip(*blocks, strict=True), strict=True):
         assert np.array_equal(np.concatenate(mine), np.concatenate(theirs))
     assert sum(len(batch.p) for batch in seen) == sum(whole) == data.section_sample_count("train", 2, 3)
-
-
-@pytest.mark.parametrize("dtype", ["float32", "float16", "bfloat16"])
-def test_rows_on_a_device_are_those_of_the_reader(tmp_path: Path, dtype: str) -> None:
-    """With several chunks, in every number type of a database."""
-    clips = {"walk": clip_rows("walk", 150, 1, 1), "hop": clip_rows("hop", 80, 10, 2)}
-    write_database(
-        tmp_path,
-        clips,
-        SPLITS,
-        channels=["injury"],
-        joint_weight=0.1,
-        dtype=dtype,
-        chunk_bytes=30_000,
-        seed=1,
-    )
-    data = Database.open(tmp_path, 64)
-    assert len(data.manifest.chunks["train"]) > 2
-    rows = DeviceRows(data, torch.device("cpu"))
-    for turn in range(4):
-        place = (*divmod(turn, 3), 3)
-        mine = rows.batches(*place, seed=2, size=2000)
-        theirs = data.blocks("train", *place, 2)
-        for batch, block in zip(mine, theirs, strict=True):
-            for ours, wanted in zip(batch[:5], block, strict=True):
-                assert np.array_equal(ours, wanted)
-
-
-def test_rows_stay_with_the_host_where_there_is_no_accelerator(data: Database) -> None:
-    assert type(rows_on_device_or_host(data, torch.device("cpu"))) is HostRows
 
 
 def test_training_twice_gives_the_same_bits(run: Run) -> None:
@@ -240,20 +205,6 @@ def test_bfloat16_is_chosen_where_a_device_has_it(
     network = fresh((4, 3, 2)).to("meta")
     monkeypatch.setattr(type(network), "step", lambda self, dropout, half: half)
     assert checkpoint.step_for(network, training | {"batch": 256}) is half
-
-
-def test_where_rows_are_kept_does_not_depend_on_free_memory(
-    data: Database, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """The order of the rows depends on where they are stored, and a run may be resumed while other programs
-    run.
-    """
-    device = torch.device("cuda")
-    for free in (0, 1 << 34):
-        monkeypatch.setattr(torch.cuda, "mem_get_info", lambda _, free=free: (free, 1 << 34))
-        assert gpu_has_room(device, data.manifest)
-    monkeypatch.setattr(torch.cuda, "mem_get_info", lambda _: (1 << 18, 1 << 18))
-    assert not gpu_has_room(device, data.manifest)
 
 
 def test_each_section_is_logged_with_speed_and_time_left(run: Run, caplog: pytest.LogCaptureFixture) -> None:

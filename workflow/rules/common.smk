@@ -17,7 +17,6 @@ wildcard_constraints:
     channels=r"plain|[a-z_+]+(?<!clips)",
     measure="|".join(each.name for each in all_measures()),
     piece="[a-z]+",
-    shard=r"\d+",
 
 
 def keep_local(files):

@@ -1,4 +1,4 @@
-"""Creates the database from the rows of all clips, or from its shards.
+"""Creates the database from the rows of all clips.
 
 It is refused if a clip in training and a held-out clip show the same motion.
 """
@@ -9,39 +9,33 @@ from hobble.core.clip import load_clip
 from hobble.core.files import read_json
 from hobble.database.options import Merging
 from hobble.database.split_check import refuse_split_pairs
-from hobble.database.write import merge_shards, write_database
-from hobble.motion.look import clip_digest, duplicate_pairs, load_digests
+from hobble.database.write import write_database
+from hobble.motion.look import clip_digest, duplicate_pairs
 from hobble.workflow.job import Inputs, job
 
 with job(snakemake) as log:
     options = Merging.model_validate(snakemake.params.options)
     database = Path(snakemake.output.database)
-    shards = [Path(folder) for folder in snakemake.input.get("shards", [])]
     # A digest holds what is compared of a clip: a few poses and the checksum of its file.
-    files = Inputs(snakemake.input.get("batches", []))
+    files = Inputs(snakemake.input.batches)
     digests = [
         clip_digest(load_clip(files(f"motion/{clip}.npz")), read_json(files(f"motion/{clip}.json"))["sha256"])
         for clip in snakemake.params.compared
     ]
-    for shard in shards:
-        digests += load_digests(shard / "likenesses.npz")
     refuse_split_pairs(
         f"data set {snakemake.params.dataset}", duplicate_pairs(digests), snakemake.params.splits
     )
-    if shards:
-        manifest = merge_shards(database, shards, joint_weight=options.joint_weight, dtype=options.dtype)
-    else:
-        manifest = write_database(
-            database,
-            files.each("database/clips/{clip}.npz", snakemake.params.splits),
-            snakemake.params.splits,
-            channels=snakemake.params.channels,
-            sources=snakemake.params.sources,
-            every=snakemake.params.every,
-            joint_weight=options.joint_weight,
-            dtype=options.dtype,
-            seed=options.seed,
-        )
+    manifest = write_database(
+        database,
+        files.each("database/clips/{clip}.npz", snakemake.params.splits),
+        snakemake.params.splits,
+        channels=snakemake.params.channels,
+        sources=snakemake.params.sources,
+        every=snakemake.params.every,
+        joint_weight=options.joint_weight,
+        dtype=options.dtype,
+        seed=options.seed,
+    )
     share = manifest.bytes / manifest.original_bytes
     rows = {split: manifest.row_count(split) for split in manifest.chunks}
     log.info(

@@ -194,18 +194,6 @@ class LimitLearner:
         kept = _Cycles(**{name: getattr(cycles, name)[keep] for name in vars(cycles)})
         self._clips[clip] = (source, kept)
 
-    def to_arrays(self, clip: str) -> dict[str, np.ndarray]:
-        """The cycles of an added clip as named arrays, for a file. Empty if the clip was not added."""
-        if clip not in self._clips:
-            return {}
-        source, cycles = self._clips[clip]
-        return {"source": np.array(source or ""), **vars(cycles)}
-
-    def add_arrays(self, clip: str, arrays: Mapping[str, np.ndarray]) -> None:
-        """Add a clip from the arrays of `to_arrays`."""
-        named = {name: values for name, values in arrays.items() if name != "source"}
-        self._clips[clip] = (str(arrays["source"]) or None, _Cycles(**named))
-
     def learn(self) -> Limits | None:
         """The limits, or None if no cycle with a value above 0 can be compared with a healthy one.
 

@@ -64,7 +64,7 @@ LENGTH = 8  # bytes of the number, at the start of the file, that says how long 
 MOST_PARTS = 16  # one call of `preadv` fills at most this many buffers; every POSIX system allows so many
 # NumPy's name of a type -> its name in safetensors. NumPy has no bfloat16, so uint16 numbers hold its bits.
 TYPES = {"<f2": "F16", "<u2": "BF16", "<f4": "F32", "<i4": "I32"}
-HINT = "Delete the folders of the database and of its shards. The next run makes them again."
+HINT = "Delete the folder of the database. The next run makes it again."
 
 
 @dataclass(frozen=True)
@@ -169,24 +169,13 @@ def _checksum(parts: Sequence[memoryview]) -> int:
 
 # The file manifest.json of a database: what the database contains.
 #
-# A database is made by merging shards. Each shard has the rows of some clips, in files called chunks. The
-# manifest is written last, so a folder without it is not a complete database.
+# The manifest is written last, so a folder without it is not a complete database.
 
 
 FILE = "manifest.json"
 STATISTICS = "statistics.npz"  # means and deviations of all training rows
-SCALES = "scales.npz"  # for each shard, the statistics with which its chunks are standardised
-VERSION = 2  # of the database's format
+VERSION = 3  # of the database's format
 SPLITS = ("train", "held_out")
-
-
-@dataclass(frozen=True)
-class ShardCounts:
-    """How many clips a shard has, and how many chunks it has in each of the splits `train` and `held_out`."""
-
-    clips: int
-    train: int
-    held_out: int
 
 
 @dataclass(frozen=True)
@@ -197,11 +186,10 @@ class Manifest:
     layout: the columns of the rows that a network gets. skeleton: see `Skeleton.to_dict`.
     visits: how often a pass over the data uses each row. dtype: type of the numbers on disk.
     joint_weight: factor by which the standardised joints in the network's input are multiplied.
-    clips: one entry for each clip, shard after shard: `clip` (its name), `split`, number of `rows` and of
+    clips: one entry for each clip: `clip` (its name), `split`, number of `rows` and of
     `pairs` (of a row and one of its terrain fits), and for a hurt version `source`, the name of the healthy
     clip from which it was computed.
-    shards: number of clips and of chunks of each shard.
-    chunks: split -> its chunks, shard after shard. Each chunk file numbers the clips of its shard from 0.
+    chunks: split -> its chunks.
     original_bytes: size of the same data in the layout of Holden et al. (2017), which has each row `visits`
     times. bytes: size of all chunks. limits: channel -> speed limits (`hobble.channels.speed_limits`).
     """
@@ -213,7 +201,6 @@ class Manifest:
     dtype: str
     joint_weight: float
     clips: list[dict[str, Any]]
-    shards: list[ShardCounts]
     chunks: Mapping[str, list[Chunk]]
     original_bytes: int
     bytes: int
@@ -223,22 +210,12 @@ class Manifest:
         """Number of rows of a split."""
         return sum(chunk.rows for chunk in self.chunks[split])
 
-    def shard_of_chunk(self, split: str) -> np.ndarray:
-        """(chunks,) the number of the shard of each chunk of a split."""
-        return np.repeat(np.arange(len(self.shards)), [getattr(shard, split) for shard in self.shards])
-
-    def first_clip(self) -> np.ndarray:
-        """(shards,) the index in `clips` of each shard's first clip."""
-        count = np.array([shard.clips for shard in self.shards])
-        return np.cumsum(count) - count
-
     def save(self, path: Path) -> None:
         """Write manifest.json into the database folder `path`, completely or not at all."""
         values = {**vars(self), "format": "hobble database", "version": VERSION}
         values["layout"] = self.layout.to_dict()
         # The skeleton is stored as text, because write_json sorts keys, but joints have to keep their order.
         values["skeleton"] = json.dumps(self.skeleton)
-        values["shards"] = [asdict(shard) for shard in self.shards]
         values["chunks"] = {split: [c.to_dict() for c in chunks] for split, chunks in self.chunks.items()}
         write_json(path / FILE, values)
 
@@ -256,7 +233,6 @@ class Manifest:
                 raise InputError(file, f"not a database of format version {VERSION}", fix=HINT)
             values["layout"] = RowLayout.from_dict(values["layout"])
             values["skeleton"] = json.loads(values["skeleton"])
-            values["shards"] = [ShardCounts(**shard) for shard in values["shards"]]
             chunks = values["chunks"]
             values["chunks"] = {split: [Chunk(**chunk) for chunk in chunks[split]] for split in SPLITS}
             return cls(**values)

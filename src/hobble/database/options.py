@@ -26,7 +26,7 @@ class RowOptions(Section):
 
 
 class Merging(Section):
-    """How rows are standardised and stored. Read by the rules `database_shard` and `database_merge`."""
+    """How rows are standardised and stored. Read by the rule `database_merge`."""
 
     joint_weight: PositiveFloat = Field(
         0.1, description="factor of the standardised joints in the network's input"
@@ -38,13 +38,7 @@ class Merging(Section):
 
 
 class DatabaseOptions(RowOptions, Merging):
-    """The whole section: the content of rows, their storage, and the number of shards (parts)."""
-
-    shards: Annotated[int, Field(gt=0, le=1000)] = Field(
-        1,
-        description="number of shards of the database. Each is made by a job from the rows of some clips, so "
-        "a new clip changes only one. The order in which training sees the rows depends on this number",
-    )
+    """The whole section: the content of rows, and how they are standardised and stored."""
 
     terrain_side: PositiveFloat = Field(
         25.0, description="distance from the path to the ground heights on its left and right, cm"

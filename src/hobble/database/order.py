@@ -2,8 +2,8 @@
 
 The functions keep no state. The order depends only on their arguments, such as the seed.
 
-Rows are stored in chunks (files), and the chunks belong to shards (parts of the database). Each row has one
-or more terrain fits (ground heights that suit its motion).
+Rows are stored in chunks (files). Each row has one or more terrain fits (ground heights that suit its
+motion).
 
 A pass visits every row `visits` times. It consists of `visits` layers. A layer visits every row once, with
 one of the row's fits. Each pass permutes the fits of every row anew. In layer l, a row with n fits has the
@@ -52,39 +52,20 @@ def layer_parts(
         start = end
 
 
-def chunk_groups(shards: np.ndarray, window: int, seed: int, pass_index: int, layer: int) -> list[np.ndarray]:
+def chunk_groups(chunks: int, window: int, seed: int, pass_index: int, layer: int) -> list[np.ndarray]:
     """Groups of chunks, in the order of a layer. Each is an array with the numbers of its chunks.
 
-    The chunks of a group are read together, and their rows are mixed. shards: (chunks,) the shard of each
-    chunk. window: largest number of chunks of a group. The first group has as many chunks as there are
-    shards. Each further group has twice as many as the group before, up to `window`. The first groups are
-    small, so that the first rows of a layer are ready soon. Their rows are still well mixed: each group has
-    chunks of all shards in proportion, to within two chunks, and the rows of a shard were permuted when they
-    were written.
+    The chunks of a group are read together, and their rows are mixed. chunks: number of all chunks. window:
+    largest number of chunks of a group. The first group has one chunk, and each further group has twice as
+    many as the group before, up to `window`. The first groups are small, so that the first rows of a layer
+    are ready soon. They are well mixed even so, because all rows were permuted when they were written.
     """
-    random = random_generator(seed, CHUNKS, pass_index, layer)
-    order = random.permutation(len(shards))
-    chunk_counts = np.bincount(shards)  # of each shard
-    if (shard_count := int(np.count_nonzero(chunk_counts))) > 1:
-        places = _spread_places(shards[order], chunk_counts, random.random(len(chunk_counts)))
-        order = order[np.argsort(places, kind="stable")]
-    groups, start, size = [], 0, min(shard_count, window)
-    while start < len(order):
+    order = random_generator(seed, CHUNKS, pass_index, layer).permutation(chunks)
+    groups, start, size = [], 0, 1
+    while start < chunks:
         groups.append(order[start : start + size])
         start, size = start + size, min(2 * size, window)
     return groups
-
-
-def _spread_places(shards: np.ndarray, chunk_counts: np.ndarray, shift: np.ndarray) -> np.ndarray:
-    """(chunks,) a place from 0 to 1 for each chunk. The places of a shard's chunks are evenly spaced.
-
-    shards: (chunks,) the shard of each chunk. chunk_counts: (shards,) number of chunks of each shard. shift:
-    (shards,) numbers from 0 to 1. Chunk i of a shard with n chunks gets the place (i + shift) / n.
-    """
-    number, by_shard = np.empty(len(shards)), np.argsort(shards, kind="stable")
-    first = np.cumsum(chunk_counts) - chunk_counts
-    number[by_shard] = np.arange(len(shards)) - np.repeat(first, chunk_counts)
-    return (number + shift[shards]) / chunk_counts[shards]
 
 
 def row_order(rows: int, seed: int, pass_index: int, layer: int, group: int) -> np.ndarray:

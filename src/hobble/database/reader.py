@@ -18,14 +18,11 @@ from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
-from hobble.core.errors import HobbleError, InputError
+from hobble.core.errors import HobbleError
 from hobble.core.files import load_npz
 from hobble.core.quat import Array
 from hobble.database import order
 from hobble.database.chunks import (
-    HINT,
-    SCALES,
-    SPLITS,
     STATISTICS,
     STORED,
     Manifest,
@@ -36,105 +33,6 @@ from hobble.database.chunks import (
 from hobble.database.order import SampleRange
 from hobble.database.statistics import Statistics
 from hobble.rows.layout import RowLayout, column_count_without_terrain, compose, fit_column_count
-
-PART_ROWS = 256  # 16-bit rows are converted so many at a time, so that their float32 copy is small
-
-# (C,) factors and (C,) summands of C columns, float32. A value v becomes v * factor + summand.
-FactorsAndSummands = tuple[Array, Array]
-
-
-@dataclass(frozen=True)
-class Conversion:
-    """How to convert a shard's rows to the statistics of the whole database.
-
-    x: for the columns of X without terrain. y: for the columns of Y. fits: for the columns of a terrain fit.
-    """
-
-    x: FactorsAndSummands = field(repr=False)
-    y: FactorsAndSummands = field(repr=False)
-    fits: FactorsAndSummands = field(repr=False)
-
-    def apply(self, x: np.ndarray, y: np.ndarray, fits: np.ndarray, dtype: str) -> None:
-        """Convert the arrays of a chunk in place. dtype: type of the numbers on disk."""
-        for values, factors_and_summands in ((x, self.x), (y, self.y), (fits, self.fits)):
-            _convert(values, factors_and_summands, dtype)
-
-
-def _convert(values: np.ndarray, factors_and_summands: FactorsAndSummands, dtype: str) -> None:
-    factor, summand = factors_and_summands
-    if values.dtype == np.float32:
-        np.multiply(values, factor, out=values)
-        np.add(values, summand, out=values)
-        return
-    for start in range(0, len(values), PART_ROWS):
-        part = values[start : start + PART_ROWS]
-        part[...] = to_stored_type(to_floats(part).astype(np.float32) * factor + summand, dtype)
-
-
-def _factors_and_summands(mean: Array, std: Array, to_mean: Array, to_std: Array) -> FactorsAndSummands:
-    """How to convert values standardised by (C,) mean and std to values standardised by to_mean and to_std.
-
-    v becomes (v * std + mean - to_mean) / to_std.
-    """
-    factor, summand = np.float64(std) / to_std, (np.float64(mean) - to_mean) / to_std
-    return factor.astype(np.float32), summand.astype(np.float32)
-
-
-def make_conversion(whole: Statistics, own: Statistics, terrain: slice) -> Conversion | None:
-    """The conversion from a shard's statistics (`own`) to those of the database (`whole`).
-
-    None if the statistics are equal. terrain: the terrain columns of X.
-    """
-    if all(np.array_equal(vars(own)[name], values) for name, values in vars(whole).items()):
-        return None
-    factor, summand = _factors_and_summands(own.x_mean, own.x_std, whole.x_mean, whole.x_std)
-    x = np.delete(factor, terrain), np.delete(summand, terrain)
-    y = _factors_and_summands(own.y_mean, own.y_std, whole.y_mean, whole.y_std)
-    # The last column of a fit is a height in cm. It is not standardised, so it stays as it is.
-    fits = np.append(factor[terrain], np.float32(1)), np.append(summand[terrain], np.float32(0))
-    return Conversion(x, y, fits)
-
-
-class ShardConversions:
-    """The conversions of all shards of a database.
-
-    dtype: type of the numbers on disk. conversions: one for each shard, None if a shard needs none.
-    first_clip: (shards,) number of each shard's first clip in the database. shard_of_chunk: split ->
-    (chunks,) index of each chunk's shard.
-    """
-
-    def __init__(self, path: Path, manifest: Manifest, whole: Statistics) -> None:
-        """Read the statistics of all shards of the database folder `path`.
-
-        whole: the statistics of the whole database. Raises InputError if the shapes of the arrays in the file
-        do not fit the number of shards or of columns.
-        """
-        data = load_npz(path / manifest.folder / SCALES)
-        count, terrain = len(manifest.shards), manifest.layout.x_terrain
-        if any(data[name].shape != (count, *values.shape) for name, values in vars(whole).items()):
-            raise InputError(
-                path / manifest.folder / SCALES, f"not the statistics of {count} shards", fix=HINT
-            )
-        of_shards = [Statistics(**{name: data[name][n] for name in vars(whole)}) for n in range(count)]
-        self.dtype = manifest.dtype
-        self.conversions = [make_conversion(whole, own, terrain) for own in of_shards]
-        self.first_clip = manifest.first_clip()
-        self.shard_of_chunk = {split: manifest.shard_of_chunk(split) for split in SPLITS}
-
-    def convert(self, split: str, chunk: int, tables: Mapping[str, np.ndarray]) -> None:
-        """Convert a chunk in place, from its shard's statistics and clip numbers to those of the database.
-
-        chunk: number of the chunk in the split. tables: the arrays of its file, by name. A shard numbers its
-        own clips from 0.
-        """
-        shard = self.shard_of_chunk[split][chunk]
-        if (conversion := self.conversions[shard]) is not None:
-            conversion.apply(tables["x"], tables["y"], tables["fits"], self.dtype)
-        tables["clip"][...] += np.int32(self.first_clip[shard])
-
-
-# Loads the rows of some chunks into memory. A chunk is a file of a few MB with rows of a database.
-
 
 Buffers = Mapping[str, np.ndarray]
 
@@ -181,36 +79,6 @@ def empty_buffers(manifest: Manifest, split: str, count: int) -> dict[str, np.nd
         "frame": np.empty(rows, np.int32),
         "phase": np.empty(rows, np.float32),
     }
-
-
-def load_chunks(
-    folder: Path,
-    manifest: Manifest,
-    split: str,
-    numbers: Sequence[int],
-    into: Buffers,
-    shards: ShardConversions,
-    verified: set[str],
-) -> ChunkWindow:
-    """Read some chunks of a split, one after another, directly into the arrays `into` (`empty_buffers`).
-
-    folder: the chunks' folder. numbers: the numbers of the chunks. shards: converts the rows, which are
-    standardised by the statistics of their shard (a part of the database), to the statistics of the whole
-    database. verified: names of chunk files with a correct checksum, which are not checked again. The names
-    of the files read are added to it. Raises InputError, which names the file, if a chunk is damaged.
-    """
-    wanted = [manifest.chunks[split][i] for i in numbers]
-    all_rows, all_fits = sum(c.rows for c in wanted), sum(c.fits for c in wanted)
-    tables = {name: table[: all_fits if name == "fits" else all_rows] for name, table in into.items()}
-    row = fit = 0  # where the rows and the fits of the next chunk begin
-    for number, chunk in zip(numbers, wanted, strict=True):
-        rows, fits = slice(row, row + chunk.rows), slice(fit, fit + chunk.fits)
-        parts = {name: table[fits if name == "fits" else rows] for name, table in tables.items()}
-        read_chunk(folder, chunk, parts, verify=chunk.file not in verified)
-        verified.add(chunk.file)
-        shards.convert(split, number, parts)
-        row, fit = rows.stop, fits.stop
-    return ChunkWindow(numbers, [c.rows for c in wanted], order.first_fits(tables["count"]), **tables)
 
 
 Item = TypeVar("Item")
@@ -261,10 +129,10 @@ class Database:
     manifest: Manifest
     statistics: Statistics
     memory_mb: int
-    _conversions: ShardConversions = field(repr=False)
     _loaded: dict[str, ChunkWindow] = field(default_factory=dict, repr=False)
     _verified: set[str] = field(default_factory=set, repr=False)
     phase_weight: float = 1.0
+    _phase_factor: float = 1.0  # of the stored standardised change of phase
 
     @classmethod
     def open(cls, path: str | Path, memory_mb: int = 512) -> Database:
@@ -277,7 +145,7 @@ class Database:
         path = Path(path)
         manifest = Manifest.load(path)
         statistics = Statistics(**load_npz(path / manifest.folder / STATISTICS))
-        return cls(path, manifest, statistics, memory_mb, ShardConversions(path, manifest, statistics))
+        return cls(path, manifest, statistics, memory_mb)
 
     def with_phase_weight(self, weight: float) -> Database:
         """The same database, with the standardised change of phase (a column of Y) multiplied by `weight`.
@@ -286,17 +154,13 @@ class Database:
         """
         if weight == 1.0:
             return self
-        y_std = self.statistics.y_std.copy()
-        y_std[self.layout.y_phase_change] /= weight
+        column, y_std = self.layout.y_phase_change, self.statistics.y_std.copy()
+        y_std[column] /= weight
+        factor = self._phase_factor * float(self.statistics.y_std[column][0]) / float(y_std[column][0])
         statistics = replace(self.statistics, y_std=y_std)
-        conversions = ShardConversions(self.path, self.manifest, statistics)
+        weight *= self.phase_weight
         return Database(
-            self.path,
-            self.manifest,
-            statistics,
-            self.memory_mb,
-            conversions,
-            phase_weight=self.phase_weight * weight,
+            self.path, self.manifest, statistics, self.memory_mb, phase_weight=weight, _phase_factor=factor
         )
 
     @property
@@ -426,9 +290,8 @@ class Database:
         Yields (number of the group, numbers of its chunks, first place in the group, last place + 1).
         """
         rows = [chunk.rows for chunk in self.manifest.chunks[split]]
-        shards = self._conversions.shard_of_chunk[split]
         done = 0
-        for group, chunks in enumerate(order.chunk_groups(shards, window, *layer_key)):
+        for group, chunks in enumerate(order.chunk_groups(len(rows), window, *layer_key)):
             group_rows = sum(rows[i] for i in chunks)
             low, high = max(start - done, 0), min(stop - done, group_rows)
             if low < high:
@@ -472,9 +335,27 @@ class Database:
         return self._loaded[split]
 
     def load(self, split: str, numbers: Sequence[int], into: Buffers) -> ChunkWindow:
-        """Read some chunks of a split into buffers from `empty_buffers`. numbers: which chunks."""
-        folder = self.path / self.manifest.folder
-        return load_chunks(folder, self.manifest, split, numbers, into, self._conversions, self._verified)
+        """Read chunks directly into the arrays `into`, from `empty_buffers`. numbers: which chunks.
+
+        Raises InputError, which names the file, if a chunk is damaged. Its checksum is verified once.
+        """
+        wanted = [self.manifest.chunks[split][i] for i in numbers]
+        all_rows, all_fits = sum(c.rows for c in wanted), sum(c.fits for c in wanted)
+        tables = {name: table[: all_fits if name == "fits" else all_rows] for name, table in into.items()}
+        row = fit = 0  # where the rows and the fits of the next chunk begin
+        for chunk in wanted:
+            rows, fits = slice(row, row + chunk.rows), slice(fit, fit + chunk.fits)
+            parts = {name: table[fits if name == "fits" else rows] for name, table in tables.items()}
+            read_chunk(
+                self.path / self.manifest.folder, chunk, parts, verify=chunk.file not in self._verified
+            )
+            self._verified.add(chunk.file)
+            row, fit = rows.stop, fits.stop
+        if self._phase_factor != 1.0:
+            phase_change = tables["y"][:, self.layout.y_phase_change]
+            weighted = to_floats(phase_change).astype(np.float32) * np.float32(self._phase_factor)
+            phase_change[...] = to_stored_type(weighted, self.manifest.dtype)
+        return ChunkWindow(numbers, [c.rows for c in wanted], order.first_fits(tables["count"]), **tables)
 
     def _compose_blocks(self, picked: Iterator[PickedRows], total: int, block_rows: int) -> Iterator[Block]:
         """Blocks of `block_rows` rows. picked: `total` rows, in portions of any length."""

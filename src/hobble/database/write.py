@@ -1,45 +1,43 @@
-"""Writes a database: plans it, shuffles the rows of all clips in bounded memory, and merges shards.
+"""Writes a database: plans it, shuffles the rows of all clips in bounded memory, and writes them in chunks.
 
 A row is a frame of a clip as a network gets it, with one or more terrain fits (ground heights that suit the
-motion). A shard is a part of a database, with the rows of some clips in files called chunks. Buckets are
-temporary files in which the rows are sorted before chunks are written.
+motion). Chunks are files with some of the rows. Buckets are temporary files in which the rows are
+sorted before chunks are written.
 """
 
 from __future__ import annotations
 
 import contextlib
 import hashlib
-import json
 import os
 import shutil
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
-from functools import reduce
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from hobble.channels import channel
+from hobble.channels.channel import Channel
 from hobble.channels.speed_limits import LimitLearner
 from hobble.core.errors import HobbleError, InputError
-from hobble.core.files import failed_write_error, load_npz, read_json, save_npz, sync_folder, write_json
+from hobble.core.files import failed_write_error, save_npz, sync_folder
 from hobble.core.quat import Array
+from hobble.core.skeleton import Skeleton
 from hobble.database.chunks import (
     FILE,
     HINT,
     INDEX_BYTES,
-    SCALES,
     SPLITS,
     STATISTICS,
     STORED,
     Chunk,
     Manifest,
-    ShardCounts,
     to_stored_type,
     write_chunk,
 )
-from hobble.database.learn_limits import add_rows, make_limit_learners
 from hobble.database.statistics import (
     Moments,
     Statistics,
@@ -49,7 +47,14 @@ from hobble.database.statistics import (
     unseen_joints,
 )
 from hobble.rows.clip_rows import ClipRows, Outline, load_clip_rows, read_outline
-from hobble.rows.layout import RowLayout, column_count_without_terrain, fit_column_count, frame_inputs
+from hobble.rows.layout import (
+    GAITS,
+    RowLayout,
+    body_layout,
+    column_count_without_terrain,
+    fit_column_count,
+    frame_inputs,
+)
 
 # Size of a bucket (`hobble.database.write`). Sorting a bucket needs a few times as much memory.
 BUCKET_BYTES = 64 << 20
@@ -60,7 +65,7 @@ RowSource = ClipRows | str | Path
 
 @dataclass(frozen=True)
 class Plan:
-    """What a shard will contain.
+    """What a database will contain.
 
     layout: the columns of its rows. skeleton: see `Skeleton.to_dict`. visits: how often a pass over the data
     uses each row. clips: one entry for each clip: `clip` (its name), `split`, number of used `rows` and of
@@ -80,18 +85,6 @@ class Plan:
         """Number of used rows in a split ("train" or "held_out")."""
         return sum(clip["rows"] for clip in self.clips if clip["split"] == split)
 
-    def to_dict(self) -> dict[str, Any]:
-        """Plain data for a file."""
-        # The skeleton is stored as text, because write_json sorts keys, but joints have to keep their order.
-        skeleton = json.dumps(self.skeleton)
-        return {**vars(self), "layout": self.layout.to_dict(), "skeleton": skeleton}
-
-    @classmethod
-    def from_dict(cls, values: Mapping[str, Any]) -> Plan:
-        """The inverse of `to_dict`."""
-        layout, skeleton = RowLayout.from_dict(values["layout"]), json.loads(values["skeleton"])
-        return cls(**{**values, "layout": layout, "skeleton": skeleton})
-
 
 def make_plan(
     clips: Mapping[str, RowSource],
@@ -102,10 +95,10 @@ def make_plan(
     sources: Mapping[str, str],
     every: int = 1,
 ) -> Plan | None:
-    """The plan of a shard with the rows of `clips`; None if there are no clips.
+    """The plan of a database with the rows of `clips`; None if there are no clips.
 
     number_bytes: bytes of a number on disk. For the other arguments see
-    `hobble.database.write.write_database`. Raises InputError if the rows of a clip have other columns or
+    `write_database`. Raises InputError if the rows of a clip have other columns or
     joints than those of the first clip.
     """
     entries: list[dict[str, Any]] = []
@@ -347,150 +340,60 @@ def write_chunks(
             number += 1
 
 
-# A shard: the shuffled rows of some clips of a database, in files of a few MB, the chunks.
-#
-# Rows are standardised by the statistics of the shard; the reader converts them to those of the database.
-
-
 # Bytes of a chunk. A chunk is read in one go, so it is large enough for slow disks and small for any memory.
 CHUNK_BYTES = 4 << 20
-INDEX, MOMENTS, SCALE = "shard.json", "moments.npz", "scale.npz"  # names of a shard's files
-MomentsXY = tuple[Moments, Moments]  # moments of the columns of X, and of the columns of Y
 
 
-def write_shard(
-    folder: Path,
-    clips: Mapping[str, RowSource],
-    splits: Mapping[str, str],
-    *,
-    channels: Sequence[str],
-    sources: Mapping[str, str] | None = None,
-    every: int = 1,
-    joint_weight: float,
-    dtype: str = "float32",
-    seed: int = 1,
-    chunk_bytes: int = CHUNK_BYTES,
-) -> None:
-    """Write the shard of `clips` to `folder`. Arguments as in `hobble.database.write.write_database`.
+def make_limit_learners(layout: RowLayout, skeleton: Mapping[str, Any]) -> dict[str, LimitLearner]:
+    """For each channel of the layout whose values slow a body: its name -> a learner of its speed limits.
 
-    `clips` may be empty, and clips may have no rows. Raises InputError if the rows of the clips differ in
-    columns or joints, HobbleError if the disk is full.
+    skeleton: see `Skeleton.to_dict`.
     """
-    plan = make_plan(clips, splits, channels, STORED[dtype].itemsize, chunk_bytes, sources or {}, every)
+    slowing = [(slow, columns) for name, columns in layout.channels if (slow := channel(name)).slows]
+    if not slowing:
+        return {}
+    rig = Skeleton.from_dict(skeleton)
+    return {
+        slow.name: LimitLearner(slow.highest, _other_side(slow, columns, rig), len(GAITS))
+        for slow, columns in slowing
+    }
+
+
+def _other_side(slow: Channel, columns: int, rig: Skeleton) -> np.ndarray:
+    """(columns,) for each column of a channel, the index of the column for the other side of the body.
+
+    If the rig does not pair left and right, each column gets its own index, so that the limits of both sides
+    are learnt separately.
+    """
+    # The channel mirrors values, so a row with the indices of the columns shows which columns swap.
+    numbers = np.arange(columns, dtype=float)
     try:
-        for split in SPLITS:  # delete chunks, do not overwrite them: a database may have hard links to them
-            shutil.rmtree(folder / split, ignore_errors=True)
-        folder.mkdir(parents=True, exist_ok=True)
-        if plan is None:
-            write_json(folder / INDEX, {"plan": None, "chunks": {}})
-            return
-        buckets = make_buckets(folder, plan)
-        no_rows = Moments.of_no_rows(plan.layout.x_size), Moments.of_no_rows(plan.layout.y_size)
-        moments: dict[str, MomentsXY] = dict.fromkeys(SPLITS, no_rows)
-        learners = make_limit_learners(plan.layout, plan.skeleton)
-        for entry, rows, used in scatter(buckets, clips, plan, seed):
-            moments[entry["split"]] = add_moments(moments[entry["split"]], clip_moments(used, plan.layout))
-            if entry["split"] == "train":
-                # Also rows left out of training, because a speed is the mean over all rows of a gait cycle.
-                add_rows(learners, rows, (sources or {}).get(entry["clip"]))
-        # The training rows define the statistics. A shard without training rows uses its held-out rows.
-        of_rows = moments["train"] if moments["train"][0].weight else moments["held_out"]
-        statistics = row_statistics(plan, of_rows, joint_weight)
-        chunks = {
-            split: list(write_chunks(folder, split, buckets[split], plan, statistics, dtype))
-            for split in SPLITS
-        }
-        for split in SPLITS:
-            buckets[split].folder.rmdir()
-        _save(folder, plan, moments["train"], statistics, learners)
-        chunk_entries = {split: [asdict(chunk) for chunk in chunks[split]] for split in SPLITS}
-        write_json(folder / INDEX, {"plan": plan.to_dict(), "chunks": chunk_entries})
-    except OSError as error:
-        raise failed_write_error(error, folder) from error
+        return slow.mirror(numbers[None], rig)[0].astype(int)
+    except HobbleError:
+        return numbers.astype(int)
 
 
-def add_moments(one: MomentsXY, other: MomentsXY) -> MomentsXY:
-    """The moments of two sets of rows together."""
-    return one[0] + other[0], one[1] + other[1]
+def add_rows(learners: Mapping[str, LimitLearner], rows: ClipRows, source: str | None) -> None:
+    """Add the rows of a clip to all learners.
 
-
-def row_statistics(plan: Plan, moments: MomentsXY, joint_weight: float) -> Statistics:
-    """The statistics by which rows with these moments are standardised.
-
-    joint_weight: weight of the joints in the network's input.
+    source: for a hurt version (a clip computed from a healthy clip), the name of the healthy clip; else None.
     """
-    return statistics_of_moments(plan.layout, *moments, joint_weight, unseen_joints(plan.skeleton))
-
-
-def _save(
-    folder: Path,
-    plan: Plan,
-    moments: MomentsXY,
-    statistics: Statistics,
-    learners: Mapping[str, LimitLearner],
-) -> None:
-    """Save the moments of the training rows, the shard's statistics, and the speeds of the training clips.
-
-    The file of moments has the arrays weight (2,), of X and of Y, and x (2, X) and y (2, Y), with the mean in
-    the first row and the sum of squared differences from the mean in the second. learners: by channel.
-    """
-    x, y = ((block.mean, block.squares) for block in moments)
-    weight = np.array([block.weight for block in moments])
-    save_npz(folder / MOMENTS, weight=weight, x=np.array(x), y=np.array(y))
-    save_npz(folder / SCALE, **vars(statistics))
-    for channel, learner in learners.items():
-        cycles = {
-            f"{number}.{key}": values
-            for number, entry in enumerate(plan.clips)
-            for key, values in learner.to_arrays(entry["clip"]).items()
-        }
-        save_npz(folder / f"pace-{channel}.npz", **cycles)
-
-
-@dataclass(frozen=True)
-class Shard:
-    """A finished shard. folder: its folder. plan: what it contains. chunks: split -> its chunks."""
-
-    folder: Path
-    plan: Plan
-    chunks: Mapping[str, list[Chunk]]
-
-    @classmethod
-    def load(cls, folder: Path) -> Shard | None:
-        """Read the shard in `folder`; None if it has no clips. Raises InputError if it is incomplete."""
-        values = read_json(folder / INDEX)
-        try:
-            if values["plan"] is None:
-                return None
-            chunks = {split: [Chunk(**chunk) for chunk in values["chunks"][split]] for split in SPLITS}
-            return cls(folder, Plan.from_dict(values["plan"]), chunks)
-        except (KeyError, TypeError, ValueError) as error:
-            raise InputError(folder / INDEX, f"not a shard of a database ({error})", fix=HINT) from error
-
-    def moments(self) -> MomentsXY:
-        """The moments of the shard's training rows."""
-        data = load_npz(self.folder / MOMENTS)
-        x, y = (Moments(float(w), *data[name]) for w, name in zip(data["weight"], "xy", strict=True))
-        return x, y
-
-    def statistics(self) -> Statistics:
-        """The statistics by which the shard's rows are standardised."""
-        return Statistics(**load_npz(self.folder / SCALE))
-
-    def add_speeds(self, learners: Mapping[str, LimitLearner]) -> None:
-        """Add the speeds of the shard's training clips to the learners. learners: channel -> its learner."""
-        for channel, learner in learners.items():
-            data = load_npz(self.folder / f"pace-{channel}.npz")
-            cycles: dict[int, dict[str, np.ndarray]] = {}  # index of a clip -> name of an array -> values
-            for key, values in data.items():
-                number, _, name = key.partition(".")
-                cycles.setdefault(int(number), {})[name] = values
-            for clip_index, arrays in sorted(cycles.items()):
-                learner.add_arrays(self.plan.clips[clip_index]["clip"], arrays)
-
-
-# Merges shards into a database, without reading their rows.
-# The manifest is written last, completely or not at all.
+    if not learners or not len(rows):
+        return
+    layout = rows.layout
+    shares = rows.x[:, body_layout(layout).x_gait].reshape(len(rows), len(GAITS), layout.samples)
+    is_above_0 = {name: rows.channels[name].any(axis=1) for name, _ in layout.channels}
+    for name, learner in learners.items():
+        others = [above_0 for other, above_0 in is_above_0.items() if other != name]
+        learner.add(
+            rows.clip,
+            gait=shares[:, :, layout.samples // 2],  # the sample in the middle is the present frame
+            velocity=rows.y[:, layout.y_root_velocity],
+            values=rows.channels[name],
+            cycle=rows.cycle,
+            others=np.any(others, axis=0) if others else np.zeros(len(rows), bool),
+            source=source,
+        )
 
 
 def write_database(
@@ -506,7 +409,7 @@ def write_database(
     seed: int = 1,
     chunk_bytes: int = CHUNK_BYTES,
 ) -> Manifest:
-    """Build a database with one shard in the folder `path`. Returns its manifest.
+    """Build a database in the folder `path`. Returns its manifest, which is written last.
 
     clips: clip name -> its rows, or the file with them. splits: clip name -> "train" or "held_out". channels:
     the network's input channels, in the order of their columns. sources: name of a hurt version -> name of
@@ -517,33 +420,45 @@ def write_database(
     Raises HobbleError if no training clip has rows, InputError if the rows of the clips differ in columns or
     joints.
     """
-    with _work_folder(Path(path)) as work:
-        shard = work / "0"
-        write_shard(
-            shard,
-            clips,
-            splits,
-            channels=channels,
-            sources=sources,
-            every=every,
-            joint_weight=joint_weight,
-            dtype=dtype,
-            seed=seed,
-            chunk_bytes=chunk_bytes,
+    plan = make_plan(clips, splits, channels, STORED[dtype].itemsize, chunk_bytes, sources or {}, every)
+    if plan is None or not plan.row_count("train"):
+        raise HobbleError(
+            "There is nothing to train on: no training clip has a whole locomotion cycle. Add clips, or list "
+            "fewer under held_out."
         )
-        return _merge(Path(path), work, [shard], joint_weight, dtype)
-
-
-def merge_shards(
-    path: str | Path, shards: Sequence[Path], *, joint_weight: float, dtype: str = "float32"
-) -> Manifest:
-    """Build the database folder `path` from the folders `shards`, in their order. Returns its manifest.
-
-    joint_weight, dtype: as in `write_database`. Raises HobbleError if no training clip has rows,
-    InputError if the rows of the shards differ in columns or joints.
-    """
     with _work_folder(Path(path)) as work:
-        return _merge(Path(path), work, shards, joint_weight, dtype)
+        build = work / "rows"
+        buckets = make_buckets(work, plan)
+        learners = make_limit_learners(plan.layout, plan.skeleton)
+        x, y = Moments.of_no_rows(plan.layout.x_size), Moments.of_no_rows(plan.layout.y_size)
+        for entry, rows, used in scatter(buckets, clips, plan, seed):
+            if entry["split"] == "train":
+                x_of_clip, y_of_clip = clip_moments(used, plan.layout)
+                x, y = x + x_of_clip, y + y_of_clip
+                # Also rows left out of training, because a speed is the mean over all rows of a gait cycle.
+                add_rows(learners, rows, (sources or {}).get(entry["clip"]))
+        statistics = statistics_of_moments(plan.layout, x, y, joint_weight, unseen_joints(plan.skeleton))
+        chunks = {
+            split: list(write_chunks(build, split, buckets[split], plan, statistics, dtype))
+            for split in SPLITS
+        }
+        save_npz(build / STATISTICS, **vars(statistics))
+        row_numbers = plan.layout.x_size + plan.layout.y_size + 1  # numbers in a row: X, Y and the phase
+        manifest = Manifest(
+            folder=_folder_name(build, chunks),
+            layout=plan.layout,
+            skeleton=plan.skeleton,
+            visits=plan.visits,
+            dtype=dtype,
+            joint_weight=joint_weight,
+            clips=plan.clips,
+            chunks=chunks,
+            original_bytes=4 * row_numbers * plan.visits * sum(entry["rows"] for entry in plan.clips),
+            bytes=sum(chunk.bytes for split in SPLITS for chunk in chunks[split]),
+            limits={name: learnt.to_dict() for name, each in learners.items() if (learnt := each.learn())},
+        )
+        _put_in_place(Path(path), build, manifest)
+        return manifest
 
 
 @contextlib.contextmanager
@@ -564,85 +479,6 @@ def _work_folder(path: Path) -> Iterator[Path]:
         shutil.rmtree(work, ignore_errors=True)
 
 
-def _merge(path: Path, work: Path, folders: Sequence[Path], joint_weight: float, dtype: str) -> Manifest:
-    """Merge the shards in `folders` inside the folder `work`, then move the result to the folder `path`."""
-    shards = [shard for folder in folders if (shard := Shard.load(folder)) is not None]
-    _check_shards(shards)
-    plan, clips = shards[0].plan, [entry for shard in shards for entry in shard.plan.clips]
-    statistics = row_statistics(
-        plan, reduce(add_moments, (shard.moments() for shard in shards)), joint_weight
-    )
-    build = work / "rows"
-    chunks = _link_chunks(shards, build)
-    save_npz(build / STATISTICS, **vars(statistics))
-    scales = [shard.statistics() for shard in shards]
-    save_npz(
-        build / SCALES,
-        **{name: np.stack([vars(scale)[name] for scale in scales]) for name in vars(statistics)},
-    )
-    learners = make_limit_learners(plan.layout, plan.skeleton)
-    for shard in shards:
-        shard.add_speeds(learners)
-    visits = max(shard.plan.visits for shard in shards)
-    row_numbers = plan.layout.x_size + plan.layout.y_size + 1  # numbers in a row: X, Y and the phase
-    manifest = Manifest(
-        folder=_folder_name(build, chunks),
-        layout=plan.layout,
-        skeleton=plan.skeleton,
-        visits=visits,
-        dtype=dtype,
-        joint_weight=joint_weight,
-        clips=clips,
-        shards=[ShardCounts(len(s.plan.clips), *(len(s.chunks[split]) for split in SPLITS)) for s in shards],
-        chunks=chunks,
-        original_bytes=4 * row_numbers * visits * sum(entry["rows"] for entry in clips),
-        bytes=sum(chunk.bytes for split in SPLITS for chunk in chunks[split]),
-        limits={name: learnt.to_dict() for name, learner in learners.items() if (learnt := learner.learn())},
-    )
-    _put_in_place(path, build, manifest)
-    return manifest
-
-
-def _check_shards(shards: Sequence[Shard]) -> None:
-    """Check that there are training rows, and that the rows of all shards have the same columns and joints.
-
-    Raises HobbleError or InputError.
-    """
-    trained = (entry["rows"] for s in shards for entry in s.plan.clips if entry["split"] == "train")
-    if not any(trained):
-        raise HobbleError(
-            "There is nothing to train on: no training clip has a whole locomotion cycle. Add clips, or list "
-            "fewer under held_out."
-        )
-    first = shards[0].plan
-    for shard in shards:
-        if not have_same_columns(shard.plan, first):
-            clip, other = shard.plan.clips[0]["clip"], first.clips[0]["clip"]
-            raise InputError(clip, f"the layout of its rows differs from that of {other}")
-
-
-def _link_chunks(shards: Sequence[Shard], build: Path) -> dict[str, list[Chunk]]:
-    """Give the chunks of all shards a second name in the folder `build`, or copy them if hard links fail.
-
-    Returns split -> chunks with their paths in `build`.
-    """
-    linked: dict[str, list[Chunk]] = {split: [] for split in SPLITS}
-    for shard in shards:
-        for split, chunks in shard.chunks.items():
-            for chunk in chunks:
-                named = replace(chunk, file=f"{shard.folder.name}/{chunk.file}")
-                target = build / named.file
-                target.parent.mkdir(parents=True, exist_ok=True)
-                try:
-                    os.link(shard.folder / chunk.file, target)
-                except FileNotFoundError:
-                    raise
-                except OSError:
-                    shutil.copyfile(shard.folder / chunk.file, target)
-                linked[split].append(named)
-    return linked
-
-
 def _remove_unused(path: Path, keep: str | None) -> None:
     """Remove the files that killed builds left in the database folder `path`.
 
@@ -657,7 +493,7 @@ def _remove_unused(path: Path, keep: str | None) -> None:
 
 def _folder_name(build: Path, chunks: Mapping[str, list[Chunk]]) -> str:
     """The final name of the folder `build`, from a hash of its content."""
-    digest = hashlib.sha256((build / STATISTICS).read_bytes() + (build / SCALES).read_bytes())
+    digest = hashlib.sha256((build / STATISTICS).read_bytes())
     digest.update(repr(chunks).encode())
     return f"rows-{digest.hexdigest()[:12]}"
 

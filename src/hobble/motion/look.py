@@ -17,7 +17,6 @@ import numpy as np
 from hobble.core.clip import Clip
 from hobble.core.clip_files import clips_in, unused_file_notes
 from hobble.core.errors import HobbleError, InputError
-from hobble.core.files import load_npz, save_npz
 from hobble.core.quat import Array
 from hobble.motion.body import SIDES, TRUNK
 from hobble.motion.edit import resample
@@ -70,32 +69,6 @@ def clip_digest(clip: Clip, sha256: str) -> ClipDigest:
     except HobbleError:  # the names of the rig's joints do not show which joint is whose counterpart
         mirrored = None
     return ClipDigest(clip.name, sha256, len(clip) / clip.fps, poses, mirrored)
-
-
-def save_digests(path: Path, clips: Sequence[ClipDigest]) -> None:
-    """Write the data of all clips to one npz file. Its keys are like "3.poses", for the fourth clip."""
-    arrays = {
-        f"{number}.{name}": np.array(value)
-        for number, clip in enumerate(clips)
-        for name, value in vars(clip).items()
-        if value is not None
-    }
-    save_npz(path, count=np.array(len(clips)), **arrays)
-
-
-def load_digests(path: Path) -> list[ClipDigest]:
-    """The inverse of `save_digests`."""
-    data = load_npz(path)
-    return [
-        ClipDigest(
-            str(data[f"{number}.name"]),
-            str(data[f"{number}.sha256"]),
-            float(data[f"{number}.seconds"]),
-            data[f"{number}.poses"],
-            data.get(f"{number}.mirrored"),
-        )
-        for number in range(int(data["count"]))
-    ]
 
 
 def duplicate_pairs(clips: Sequence[ClipDigest]) -> list[tuple[str, str, str]]:

@@ -39,8 +39,10 @@ class SampleBatch(NamedTuple):
     total: int
 
 
-class TrainingRows:
-    """The training rows of a database, as one process reads them. A section is a part of a pass over them.
+class HostRows:
+    """The training rows, composed by the host and copied to `device`, as one process reads them.
+
+    A section is a part of a pass.
 
     processes: the processes that share a batch. stretches: number of consecutive parts that a section is cut
     into. Each batch takes samples from every part. None: one part for each process.
@@ -60,10 +62,6 @@ class TrainingRows:
         """How the processes share a section in batches of `size`."""
         total = self.database.section_sample_count(TRAIN, section, sections)
         return self.processes.share_section(total, size, self.stretches)
-
-
-class HostRows(TrainingRows):
-    """Rows that the host reads and composes from frame, channels and terrain fit, then copies to `device`."""
 
     def batches(
         self, pass_index: int, section: int, sections: int, seed: int, size: int

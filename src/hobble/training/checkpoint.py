@@ -24,7 +24,6 @@ from hobble.models.model import Options, Trainable, TrainedOptions, TrainingStep
 from hobble.training.optimiser import Adam
 from hobble.training.options import Machines, Training
 from hobble.training.processes import ALONE, Processes
-from hobble.training.schedule import depends_on_passes
 
 # The columns of history.csv before the held-out errors of the blocks of Y; `columns` explains them.
 COLUMNS = ("pass", "section", "samples", "seconds", "train_mse", "held_out_mse")
@@ -240,7 +239,7 @@ def recipe_hash(network: Options, training: Training, database: Database, code: 
     fingerprint of the source code of the training, or None.
     """
     settings = training.model_dump(mode="json", exclude=set(NOT_IN_RECIPE_HASH))
-    if not depends_on_passes(training):
+    if training.schedule == "constant":  # more passes only continue a shorter training
         del settings["passes"]
     if training.stretches is None:
         del settings["stretches"]

@@ -127,12 +127,6 @@ def _adam_loop(
 # On CUDA, the update of a small batch is captured as a graph, so that all its kernels start at once.
 
 
-# Updates of batches with at most this many rows are captured. With larger batches, launches of kernels take
-# little time compared with matrix products.
-CAPTURED_UP_TO = 1024
-WARM_UP = 3  # updates before the capture; during these, libraries choose algorithms and allocate memory
-
-
 class Update:
     """Draws the dropout masks of a batch, computes the gradient and takes a step.
 
@@ -203,57 +197,6 @@ class SharedUpdate(Update):
         return self.sent[-1].clone()
 
 
-class CapturedUpdate(Update):
-    """The update on a CUDA device for batches of `rows` rows.
-
-    It is captured as a CUDA graph: one launch starts about a hundred kernels. Batches of another size, such
-    as the last one of a section, use the plain update. The graph reads the batch and the optimiser's numbers
-    from fixed memory, which is filled before each replay. The dropout generator is registered with the graph,
-    so it advances and can be seeded as usual.
-    """
-
-    def __init__(self, step: TrainingStep, adam: Adam, rows: int, undropped: Sequence[slice] = ()) -> None:
-        super().__init__(step, adam, undropped)
-        flat, widths = adam.network.flat, (adam.network.inputs, adam.network.outputs)
-        self.x, self.y = (torch.zeros(rows, width, device=flat.device) for width in widths)
-        self.p = torch.zeros(rows, device=flat.device)
-        self.numbers = torch.zeros(len(adam.step_factors(0.0)), dtype=torch.float32, device=flat.device)
-        self.graph = torch.cuda.CUDAGraph()
-        self.graph.register_generator_state(step.generator)
-        # The updates of the warm-up change these tensors, so they are put back below.
-        before = [tensor.clone() for tensor in (flat, adam.first_moment, adam.second_moment)]
-        side_stream = torch.cuda.Stream()
-        side_stream.wait_stream(torch.cuda.current_stream())
-        with torch.cuda.stream(side_stream):
-            for _ in range(WARM_UP):
-                self._update_from_fixed_memory()
-        torch.cuda.current_stream().wait_stream(side_stream)
-        with torch.cuda.graph(self.graph):
-            self.loss = self._update_from_fixed_memory()
-        self.error = step.error
-        for tensor, value in zip((flat, adam.first_moment, adam.second_moment), before, strict=True):
-            tensor.copy_(value)
-
-    def _update_from_fixed_memory(self) -> Tensor:
-        """The operations that are captured. Returns the loss."""
-        loss = self.step(self.x, self.y, self.p, self.masks(len(self.p)))
-        self.adam.step_with_torch(self.step.gradients, self.numbers)
-        return loss
-
-    def __call__(self, x: Tensor, y: Tensor, p: Tensor, share: float, total: int | None = None) -> Tensor:
-        """See `Update.__call__`."""
-        if len(p) != len(self.p):
-            return super().__call__(x, y, p, share)
-        self.x.copy_(x)
-        self.y.copy_(y)
-        self.p.copy_(p)
-        self.adam.steps += 1
-        self.numbers.copy_(torch.tensor(self.adam.step_factors(share)), non_blocking=True)
-        self.graph.replay()
-        self.step.error = self.error  # a plain update may have replaced it
-        return self.loss.clone()
-
-
 def update_for(
     step: TrainingStep, adam: Adam, rows: int, processes: Processes = ALONE, undropped: Sequence[slice] = ()
 ) -> Update:
@@ -263,8 +206,6 @@ def update_for(
     """
     if not processes.is_alone:
         return SharedUpdate(step, adam, processes, rows, undropped)
-    if adam.network.flat.device.type == "cuda" and rows <= CAPTURED_UP_TO:
-        return CapturedUpdate(step, adam, rows, undropped)
     return Update(step, adam, undropped)
 
 

@@ -119,6 +119,23 @@ class Recipe(Section):
             )
         return self
 
+    def learning_rate_share(self, passes: float) -> float:
+        """The factor by which `learning_rate` is multiplied after `passes` passes over the data.
+
+        passes: may be a fraction. During the first `warm_up` passes the factor rises linearly from 0. If the
+        schedule is `constant`, it then stays at 1. If the schedule is `cosine`, it is also multiplied by half
+        a cosine wave, which falls from 1 at the start to 0 at the end of the last pass (Loshchilov and Hutter
+        2017, without restarts).
+
+        >>> recipe = Recipe(schedule="cosine", warm_up=0.5, passes=8)
+        >>> [round(recipe.learning_rate_share(passes), 3) for passes in (0, 0.25, 2, 4, 8)]
+        [0.0, 0.499, 0.854, 0.5, 0.0]
+        """
+        rise = min(1.0, passes / self.warm_up) if self.warm_up else 1.0
+        if self.schedule == "constant":
+            return rise
+        return rise * (1 + math.cos(math.pi * min(1.0, passes / self.passes))) / 2
+
     @property
     def all_sections(self) -> int:
         """Number of sections of all passes, at least one."""

@@ -19,7 +19,7 @@ from hobble.core.errors import HobbleError
 from hobble.database.reader import Database
 from hobble.models.model import Options
 from hobble.training.augment import OtherPaces, OtherPoses, RollOut, VersionPoses
-from hobble.training.batches import SPLIT, TRAIN, HeldOutErrors, LossWatch
+from hobble.training.batches import SPLIT, TRAIN, HeldOutErrors, HostRows, LossWatch
 from hobble.training.checkpoint import (
     Saver,
     State,
@@ -30,11 +30,9 @@ from hobble.training.checkpoint import (
     step_for,
     use_threads,
 )
-from hobble.training.device_rows import rows_on_device_or_host
 from hobble.training.optimiser import Symmetry, update_for
 from hobble.training.options import Training
 from hobble.training.processes import ALONE, Processes
-from hobble.training.schedule import learning_rate_share
 
 log = logging.getLogger("hobble.training")
 
@@ -103,7 +101,7 @@ def _run(
     symmetry = Symmetry(state.network, database) if training.symmetric else None
     if symmetry and not state.adam.steps:  # no step yet, so the weights are new
         symmetry.make_new_network_symmetric()
-    rows = rows_on_device_or_host(database, device, processes, training.stretches)
+    rows = HostRows(database, device, processes, training.stretches)
     places = processes.own_places(batch_size)  # the places in each batch that this process fills
     other_poses = OtherPoses(database, training.other_poses, len(places), device, places.start)
     version_poses = VersionPoses(database, training.version_poses, len(places), device, places.start)
@@ -132,7 +130,7 @@ def _run(
             other_poses.mix(batch.x, batch.p)
             version_poses.mix(batch.x, batch.p, batch.clip)
             roll_out.add(batch.x)
-            rate_share = learning_rate_share(training, (state.samples + watch.seen) / samples)
+            rate_share = training.learning_rate_share((state.samples + watch.seen) / samples)
             watch.add(update(batch.x, batch.y, batch.p, rate_share, batch.total), batch)
             roll_out.remember(step.error)
             if symmetry:

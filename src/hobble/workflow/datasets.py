@@ -2,25 +2,13 @@
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Iterable, Sequence
 from typing import Any
 
 from hobble.config.load_configuration import Catalogue
 from hobble.core.errors import HobbleError
 from hobble.core.section import Section
-from hobble.workflow.batches import batch_of
 from hobble.workflow.clips import MIRROR_SUFFIX, Clips, original
-
-
-def shard_of(clip: str, shards: int) -> int:
-    """The number of the shard that holds a clip's rows, from 0 to `shards` - 1.
-
-    A shard is a part of a database that one job makes from the rows of some clips. Mirrors and hurt versions
-    are in the shard of their original. The shard does not depend on other clips. If the number of batches is
-    a multiple of `shards`, all clips of a batch are in the same shard.
-    """
-    return batch_of(original(clip), shards)
 
 
 class Datasets:
@@ -109,22 +97,6 @@ class Datasets:
         if len(set(splits.values())) < 2:
             return []
         return [clip for clip in splits if clip == original(clip)]
-
-    def shards(self, dataset: str) -> int:
-        """The number of shards of each of the data set's databases."""
-        return int(self.options(dataset, "database", "shards")["shards"])
-
-    @functools.cache  # noqa: B019 - one project lives as long as the process
-    def _splits_by_shard(self, dataset: str, channels: tuple[str, ...]) -> list[dict[str, str]]:
-        count = self.shards(dataset)
-        splits: list[dict[str, str]] = [{} for _ in range(count)]
-        for clip, split in self.splits(dataset, channels).items():
-            splits[shard_of(clip, count)][clip] = split
-        return splits
-
-    def splits_in_shard(self, dataset: str, channels: Sequence[str], shard: int) -> dict[str, str]:
-        """The part of what `splits` returns for the clips of one shard. shard: its number, from 0."""
-        return self._splits_by_shard(dataset, tuple(channels))[shard]
 
     def hurt_row_step(self, dataset: str) -> int:
         """The number n such that training uses every n-th row of the hurt versions."""

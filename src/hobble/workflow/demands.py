@@ -61,7 +61,7 @@ RATES = {
     "hurt": Rate(20, 0.7),
     "terrain": Rate(15, 0.3, mirrors=True, least=3),
     "database": Rate(22, 0.15, mirrors=True),
-    "shard": Rate(10, 0.1, row_bytes=24, least=5),
+    "merge": Rate(10, 0.1, row_bytes=24, least=5),
     "look": Rate(10, 0.1, row_bytes=24, least=5),
     "report": Rate(12, 0.1, least=10),
 }
@@ -110,22 +110,6 @@ class Demands:
         """Minutes for a job that reads all clips and mirrors of a data set."""
         rate = RATES[stage]
         return _minutes(rate.seconds * self.all_thousands_of_frames(dataset), attempt, rate.least)
-
-    def shard_memory(self, dataset: str, attempt: int = 1) -> int:
-        """MB for a job that makes a shard. It holds one clip at a time, and a few numbers for each row."""
-        rate = RATES["shard"]
-        rows = rate.row_bytes * self._shard_thousands(dataset) / 1e3
-        return _megabytes(rate.mb * self._longest(dataset) + rows, attempt)
-
-    def shard_minutes(self, dataset: str, attempt: int = 1) -> int:
-        """Minutes for a job that makes a shard."""
-        rate = RATES["shard"]
-        return _minutes(rate.seconds * self._shard_thousands(dataset), attempt, rate.least)
-
-    def _shard_thousands(self, dataset: str) -> float:
-        """Thousands of frames of the largest shard. It may have twice as many as the average shard."""
-        shards = self.project.datasets.shards(dataset)
-        return self.all_thousands_of_frames(dataset) * min(1.0, 2 / shards if shards > 1 else 1.0)
 
     def measure_memory(self, configuration: str, name: str, attempt: int = 1) -> int:
         """MB for the job of the measurement `name`."""
