@@ -35,7 +35,8 @@ def splits_of(w):
 def compared_clips(w):
     """The clips that are compared with the others, so that no motion is both trained on and held out."""
     names = datasets.clips_to_compare(w.dataset, channels_of_folder(w.channels))
-    return [name for name in names if name in splits_of(w)]
+    splits = splits_of(w)
+    return [name for name in names if name in splits]
 
 
 def rows_and_compared(w):
