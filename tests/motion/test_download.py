@@ -42,16 +42,21 @@ def test_a_downloaded_file_is_complete_and_no_partial_file_is_left(server, fetch
     assert (server.requests, fetch.waits) == ([None], [])
 
 
-def test_a_failed_download_is_tried_again_after_growing_waits(server, fetch):
-    server.faults = [503, 500]
+@pytest.mark.parametrize(
+    ("faults", "server_is", "requests", "waits"),
+    [
+        ([503, 500], {}, [None, None, None], [1, 2]),
+        ([70_000, 50_000], {}, [None, "bytes=70000-", "bytes=120000-"], None),
+        ([70_000], {"ranges": False}, [None, "bytes=70000-"], None),  # the download starts over
+        ([70_000, "other part"], {}, [None, "bytes=70000-", None], None),  # a wrong range is discarded
+        ([70_000], {"announces": False}, [None, None], None),  # its checksum shows that it was cut
+    ],
+)
+def test_a_download_with_faults_becomes_complete(server, fetch, faults, server_is, requests, waits):
+    vars(server).update(server_is, faults=faults)
     assert fetch().read_bytes() == CONTENT
-    assert fetch.waits == [1, 2]
-
-
-def test_an_interrupted_download_continues_where_it_stopped(server, fetch):
-    server.faults = [70_000, 50_000]
-    assert fetch().read_bytes() == CONTENT
-    assert server.requests == [None, "bytes=70000-", "bytes=120000-"]
+    assert server.requests == requests
+    assert waits is None or fetch.waits == waits
 
 
 def test_a_later_run_continues_an_interrupted_download(server, fetch):
@@ -61,24 +66,6 @@ def test_a_later_run_continues_an_interrupted_download(server, fetch):
     assert fetch.part.stat().st_size == 90_000
     assert fetch().read_bytes() == CONTENT
     assert server.requests[1:] == ["bytes=90000-"]
-
-
-def test_without_range_requests_the_download_starts_over(server, fetch):
-    server.faults, server.ranges = [70_000], False
-    assert fetch().read_bytes() == CONTENT
-    assert server.requests == [None, "bytes=70000-"]
-
-
-def test_an_answer_with_the_wrong_range_is_discarded(server, fetch):
-    server.faults = [70_000, "other part"]
-    assert fetch().read_bytes() == CONTENT
-    assert server.requests == [None, "bytes=70000-", None]
-
-
-def test_without_a_length_an_interruption_is_found_by_the_checksum(server, fetch):
-    server.faults, server.announces = [70_000], False
-    assert fetch().read_bytes() == CONTENT
-    assert server.requests == [None, None]
 
 
 @pytest.mark.parametrize("left", [b"not how it begins", CONTENT, CONTENT + b"more"])
@@ -108,18 +95,18 @@ def test_a_wrong_checksum_is_refused_and_the_file_is_deleted(server, fetch):
     assert server.requests == [None, None]
 
 
-def test_a_missing_file_is_requested_only_once(server, fetch):
-    server.faults = [404] * 9
-    with pytest.raises(InputError, match=r"cannot be downloaded: the server says 404 Not Found\. Run"):
+@pytest.mark.parametrize(
+    ("status", "said", "requests", "waits"),
+    [
+        (404, r"cannot be downloaded: the server says 404 Not Found\. Run", 1, []),
+        (500, "500 Internal Server Error, 5 times", 5, [1, 2, 4, 8]),
+    ],
+)
+def test_a_file_that_is_not_served_is_refused(server, fetch, status, said, requests, waits):
+    server.faults = [status] * 9
+    with pytest.raises(InputError, match=said):
         fetch()
-    assert (len(server.requests), fetch.waits) == (1, [])
-
-
-def test_a_download_without_an_answer_ends_after_all_attempts(server, fetch):
-    server.faults = [500] * 9
-    with pytest.raises(InputError, match="500 Internal Server Error, 5 times"):
-        fetch()
-    assert fetch.waits == [1, 2, 4, 8]
+    assert (len(server.requests), fetch.waits) == (requests, waits)
 
 
 def test_without_a_network_the_message_says_so(tmp_path):

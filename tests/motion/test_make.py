@@ -145,17 +145,10 @@ def test_a_wrong_frame_count_is_repaired_or_refused(walk, bvh, make, declared):
         make(path, defects="refuse")
 
 
-def test_making_a_clip_twice_gives_equal_bytes(walk, bvh, make):
-    path = bvh(walk)
-    a, first = make(path)
-    b, second = make(path)
-    assert first == second
-    assert a.rotations.tobytes() == b.rotations.tobytes()
-
-
 @pytest.mark.shared
-def test_every_shared_clip_becomes_a_clip(shared, make):
-    for file in sorted((shared / "mocap").glob("*/*.bvh")):
+@pytest.mark.parametrize("every", [15, pytest.param(1, marks=pytest.mark.slow)])
+def test_shared_clips_become_clips(shared, make, every):
+    for file in sorted((shared / "mocap").glob("*/*.bvh"))[::every]:
         clip, report = make(file)
         assert np.isfinite(clip.positions).all(), file.name
         assert report["unit_name"] == ("CMU" if report["rig"] == "holden31" else "cm"), file.name

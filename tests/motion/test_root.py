@@ -13,12 +13,8 @@ from hobble.core import quat
 from hobble.motion.root import (
     RootFrames,
     extend_root,
-    facing_directions,
     local_pose,
-    points_to_root,
     root_frames,
-    rotations_to_root,
-    vectors_to_root,
 )
 
 
@@ -54,15 +50,6 @@ def test_rows_do_not_depend_on_place_and_heading(walk, angle, shift):
     np.testing.assert_allclose(ours.turn, theirs.turn, atol=1e-9)
 
 
-def test_rotation_takes_the_facing_direction_to_z(walk):
-    root = root_frames(turned(walk, 2.9, 0), 20)
-    np.testing.assert_allclose(
-        quat.rotate(root.rotation, root.direction), np.tile([0, 0, 1], (len(root), 1)), atol=1e-12
-    )
-    np.testing.assert_allclose(np.linalg.norm(root.direction, axis=1), 1)
-    assert np.all(root.direction[:, 1] == 0)
-
-
 def test_turning_left_is_positive(walk):
     """If the figure turns left by d in a frame, q[i+1] q[i]^-1 turns by -d, so the runtime applies the
     negative.
@@ -70,31 +57,6 @@ def test_turning_left_is_positive(walk):
     clip = replace(walk, rotations=np.tile(quat.IDENTITY, (5, 31, 1)), root=np.zeros((5, 3)))
     clip.rotations[:, 0] = quat.yaw(0.1 * np.arange(5))
     np.testing.assert_allclose(root_frames(clip, 0).turn, -0.1, atol=1e-12)
-
-
-def test_the_facing_direction_is_smoothed_by_the_documented_gaussian(walk):
-    from scipy.ndimage import gaussian_filter1d
-
-    raw = facing_directions(walk.skeleton, walk.positions, 0)
-    smooth = gaussian_filter1d(raw, 20, axis=0, mode="nearest")
-    smooth /= np.linalg.norm(smooth, axis=1, keepdims=True)
-    np.testing.assert_allclose(root_frames(walk, 20).direction, smooth, atol=1e-12)
-
-
-def test_conversions_to_the_root_frame_follow_their_formulas(walk):
-    root = root_frames(walk, 20)
-    point = walk.positions[5, 3]
-    hips = walk.positions[5, 0] * [1, 0, 1]
-    np.testing.assert_allclose(
-        points_to_root(root, walk.positions[[5], :], [5])[0, 3], quat.rotate(root.rotation[5], point - hips)
-    )
-    np.testing.assert_allclose(
-        vectors_to_root(root, np.ones((len(walk), 3)))[7], quat.rotate(root.rotation[7], np.ones(3))
-    )
-    np.testing.assert_allclose(
-        rotations_to_root(root, walk.global_rotations)[9, 4],
-        quat.mul(root.rotation[9], walk.global_rotations[9, 4]),
-    )
 
 
 @pytest.mark.shared
@@ -137,8 +99,3 @@ def test_the_root_goes_straight_on_past_both_ends():
         np.testing.assert_array_equal(getattr(longer, name)[:7], np.tile(getattr(root, name)[0], (7, 1)))
         np.testing.assert_array_equal(getattr(longer, name)[47:], np.tile(getattr(root, name)[-1], (7, 1)))
     np.testing.assert_array_equal(longer.turn, np.pad(root.turn, 7))
-
-
-def test_a_clip_of_one_frame_stands_still():
-    root = RootFrames(np.ones((1, 2)), np.array([[0, 0, 1.0]]), quat.yaw(np.zeros(1)), np.zeros(0))
-    np.testing.assert_array_equal(extend_root(root, 3).position, np.ones((7, 2)))
