@@ -21,6 +21,12 @@ def original(shared):
     return shared / "mocap/cmu/02_01.bvh"
 
 
+@pytest.fixture
+def known(original, make):
+    """The clip of the file as it is."""
+    return make(original)[0]
+
+
 def renamed(path, folder, names):
     """A file of a second and a half with other joint names."""
     text, rows = path.read_text().split("Frame Time:")
@@ -49,15 +55,10 @@ def wrists(clip, side):
 
 
 @pytest.mark.shared
-def test_a_rig_without_sides_is_refused_with_one_question(original, tmp_path, make):
-    with pytest.raises(InputError, match=r"its joint names do not tell left.*Set motion.handedness"):
-        make(renamed(original, tmp_path, word))
-
-
-@pytest.mark.shared
-def test_handedness_tells_left_from_right(original, tmp_path, make):
-    known, _ = make(original)
+def test_a_rig_whose_names_tell_no_sides_is_refused_until_handedness_is_set(original, known, tmp_path, make):
     path = renamed(original, tmp_path, word)
+    with pytest.raises(InputError, match=r"its joint names do not tell left.*Set motion.handedness"):
+        make(path)
     right, report = make(path, handedness="right")
     left, _ = make(path, handedness="left")
     assert any("motion.handedness: right was used" in note for note in report["notes"])
@@ -68,8 +69,7 @@ def test_handedness_tells_left_from_right(original, tmp_path, make):
 
 
 @pytest.mark.shared
-def test_lower_case_side_letters_are_recognised(original, tmp_path, make):
-    known, _ = make(original)
+def test_lower_case_side_letters_are_recognised(original, known, tmp_path, make):
     clip, report = make(renamed(original, tmp_path, asf))
     assert not any("left side from its right" in note for note in report["notes"])
     here = wrists(clip, "left")

@@ -95,7 +95,9 @@ def both(tmp_path, make):
 
 
 @pytest.mark.shared
-@pytest.mark.parametrize("name", RIGS)
+@pytest.mark.parametrize(
+    "name", [pytest.param(k, marks=SLOW) if "KIT, b" in k or "Spanish" in k else k for k in RIGS]
+)
 def test_a_clip_on_another_rig_is_retargeted_within_a_centimetre(both, clip, name):
     rig, how = RIGS[name]
     first, second, report, names = both(clip, rig, **how)
@@ -114,31 +116,35 @@ def test_arms_that_hang_from_the_neck_as_in_3ds_max_belong_to_the_chest(both, cl
     assert compare(first, second, names).max() < 1.5
 
 
+def without(*joints: str) -> str:
+    return "\n".join(line for line in PLAIN.splitlines() if not line.startswith(joints))
+
+
+def two_figures() -> str:
+    one = PLAIN.replace("hips|-|", "hips|scene|")
+    other = re.sub(r"^(\w+)\|(?!scene)", r"other_\1|other_", one, flags=re.M).replace(
+        "hips|scene", "other_hips|scene", 1
+    )
+    return f"scene|-|ground\n{one}\n{other}"
+
+
+PAIRS = r"in doubt: .*two equal legs and two equal arms[\s\S]*roles:"
+
+
 @pytest.mark.shared
 @pytest.mark.parametrize(
-    ("without", "why"),
+    ("rig", "why"),
     [
-        (("shoulder", "upper_arm", "forearm", "hand"), "two equal legs and two equal arms"),
-        (("thigh", "shin", "foot", "toe"), "two equal legs and two equal arms"),
-        (("upper_arm_r", "forearm_r", "hand_r"), "two equal legs and two equal arms"),
-        (("neck", "head"), "no joint for the head"),
+        (without("shoulder", "upper_arm", "forearm", "hand"), PAIRS),
+        (without("thigh", "shin", "foot", "toe"), PAIRS),
+        (without("upper_arm_r", "forearm_r", "hand_r"), PAIRS),
+        (without("neck", "head"), r"in doubt: .*no joint for the head[\s\S]*roles:"),
+        (two_figures(), r"two figures, \w*hips and \w*hips. Export each figure on its own"),
     ],
 )
-def test_a_body_without_limbs_or_head_is_refused_with_a_draft(both, clip, without, why):
-    rig = "\n".join(line for line in PLAIN.splitlines() if not line.startswith(without))
-    with pytest.raises(InputError, match=rf"in doubt: .*{why}[\s\S]*roles:"):
+def test_no_body_or_two_are_refused(both, clip, rig, why):
+    with pytest.raises(InputError, match=why):
         both(clip, rig)
-
-
-@pytest.mark.shared
-def test_two_figures_under_one_root_are_refused(both, clip):
-    one = PLAIN.replace("hips|-|", "hips|scene|")
-    other = "\n".join(
-        "|".join((f"other_{name}", parent if parent == "scene" else f"other_{parent}", joint))
-        for name, parent, joint in (line.split("|") for line in one.splitlines())
-    )
-    with pytest.raises(InputError, match=r"two figures, \w*hips and \w*hips. Export each figure on its own"):
-        both(clip, f"scene|-|ground\n{one}\n{other}")
 
 
 @pytest.mark.shared
@@ -237,7 +243,9 @@ def test_a_very_short_bone_above_the_chest_does_not_turn_it(both, walk):
 
 
 @pytest.mark.shared
-@pytest.mark.parametrize("seed", [*range(0, 24, 2), *(pytest.param(k, marks=SLOW) for k in range(1, 24, 2))])
+@pytest.mark.parametrize(
+    "seed", [*range(0, 24, 4), *(pytest.param(k, marks=SLOW) for k in range(24) if k % 4)]
+)
 def test_a_clip_on_a_scrambled_rig_is_recovered(shared, tmp_path, seed):
     """`python -m tests.motion.scramble` tests more."""
     name = ("02_01", "16_11", "07_04", "105_16", "09_03", "08_03")[seed % 6]
@@ -249,7 +257,8 @@ def test_a_clip_on_a_scrambled_rig_is_recovered(shared, tmp_path, seed):
 @pytest.mark.parametrize(
     ("seed", "right", "said"),
     [
-        *((seed, True, "neck") for seed in (50, 80, 100, 212)),  # by the line from chest to head 1.1 cm off
+        (50, True, "neck"),  # by the line from chest to head 1.1 cm off
+        *(pytest.param(seed, True, "neck", marks=SLOW) for seed in (80, 100, 212)),
         (24, False, "ankles"),
         (104, False, "balls of the feet"),
     ],

@@ -19,18 +19,25 @@ from hobble.motion.read import read_bvh
 from hobble.motion.retarget import plan, retarget_clip, retarget_pose
 from hobble.motion.rig import joint_pairs
 from hobble.motion.skeleton_file import load_skeleton
+from tests.motion.scramble import SKELETONS
 
 NAMES = ("holden31", "ava191", "mixamo55", "rig22")
 FEET = [f"{side}_{part}" for side in ("left", "right") for part in ("heel", "toe")]
 
 
 @pytest.fixture(scope="module")
-def rigs(root):
-    return {name: load_skeleton(root / f"config/skeletons/{name}.yaml") for name in NAMES}
+def rigs():
+    return {name: load_skeleton(SKELETONS / f"{name}.yaml") for name in NAMES}
 
 
 def onto(clip: Clip, source, target) -> Clip:
     return retarget_clip(clip, plan(source.skeleton, target.skeleton, joint_pairs(source, target)))
+
+
+def sourced(file, target):
+    """What a file is, and its clip at 60 Hz."""
+    source = load_source(read_bvh(file), target, SKELETONS, ClipMotion())
+    return source, resample(source.clip, 60.0)
 
 
 def slide(clip: Clip, role: str) -> np.ndarray:
@@ -44,9 +51,15 @@ def standing(clip: Clip, role: str) -> np.ndarray:
     return np.sum(step**2, axis=1) < 0.02
 
 
+def bone(of: Clip, a: str, b: str) -> np.ndarray:
+    """(F, 3) unit vectors from one joint to another."""
+    way = of.positions[:, of.skeleton.role(b)] - of.positions[:, of.skeleton.role(a)]
+    return way / np.linalg.norm(way, axis=-1, keepdims=True)
+
+
 @pytest.mark.parametrize("start", NAMES)
 @pytest.mark.parametrize("end", NAMES)
-def test_standing_feet_do_not_move_whatever_the_heading(walker, rigs, start, end):
+def test_standing_feet_do_not_move_and_limbs_point_as_the_source_s_do(walker, rigs, start, end):
     clip = walker(rigs[start].skeleton, 120, 60.0)
     made = onto(clip, rigs[start], rigs[end])
     scale = plan(clip.skeleton, rigs[end].skeleton, joint_pairs(rigs[start], rigs[end])).scale
@@ -55,28 +68,14 @@ def test_standing_feet_do_not_move_whatever_the_heading(walker, rigs, start, end
         assert frames.sum() > 20
         # What is left are a few frames where the other rig's leg cannot reach, 5 mm over all steps together.
         assert slide(made, role)[frames].sum() <= 1.2 * scale * slide(clip, role)[frames].sum() + 0.5
-
-
-@pytest.mark.parametrize("start", NAMES)
-@pytest.mark.parametrize("end", NAMES)
-def test_limbs_point_as_the_source_s_do(walker, rigs, start, end):
-    clip = walker(rigs[start].skeleton, 60, 60.0)
-    made = onto(clip, rigs[start], rigs[end])
-
-    def bone(of, a, b):
-        way = of.positions[:, of.skeleton.role(b)] - of.positions[:, of.skeleton.role(a)]
-        return way / np.linalg.norm(way, axis=-1, keepdims=True)
-
-    for side in ("left", "right"):
-        for a, b in (("shoulder", "elbow"), ("elbow", "wrist")):
-            np.testing.assert_allclose(
-                bone(made, f"{side}_{a}", f"{side}_{b}"), bone(clip, f"{side}_{a}", f"{side}_{b}"), atol=1e-6
-            )
-        for a, b in (("hip", "knee"), ("knee", "heel")):
-            cosine = np.sum(
-                bone(made, f"{side}_{a}", f"{side}_{b}") * bone(clip, f"{side}_{a}", f"{side}_{b}"), -1
-            )
-            assert np.degrees(np.arccos(np.clip(cosine, -1, 1))).max() < 12
+    for a, b, most in (
+        *(("shoulder", "elbow", 1e-4), ("elbow", "wrist", 1e-4)),
+        *(("hip", "knee", 12.0), ("knee", "heel", 12.0)),
+    ):
+        for side in ("left", "right"):
+            ours, theirs = (bone(one, f"{side}_{a}", f"{side}_{b}") for one in (made, clip))
+            apart = 2 * np.arcsin(np.linalg.norm(ours - theirs, axis=-1) / 2)
+            assert np.degrees(apart).max() < most, (side, a)
 
 
 def test_the_same_proportions_come_out_exactly(walk, rigs):
@@ -97,14 +96,9 @@ def test_a_rig_of_191_joints_moves_like_its_31_known_ones(walk, rigs):
             continue  # placed elsewhere on the hand and the pelvis
         apart = ava.positions[:, ava.skeleton.index(mine)] - walk.positions[:, walk.skeleton.index(theirs)]
         assert np.linalg.norm(apart, axis=-1).max() < 1e-4, mine
-
-
-def test_joints_without_motion_follow_their_parents_rigidly(walk, rigs):
-    ava = onto(walk, rigs["holden31"], rigs["ava191"])
     moved = rigs["ava191"].maps["holden31"]
     still = [i for i, name in enumerate(ava.skeleton.joints) if name not in moved]
-    assert len(still) == 191 - len(moved)
-    assert quat.angle(ava.rotations[:, still], quat.IDENTITY).max() < 1e-6
+    assert quat.angle(ava.rotations[:, still], quat.IDENTITY).max() < 1e-6  # rigid below their parents
 
 
 @pytest.mark.parametrize("end", ["ava191", "mixamo55", "rig22"])
@@ -214,29 +208,17 @@ def test_a_rig_without_fingers_is_recognised(walker, rigs, bvh, make):
 
 
 # The clips on which standing heels are hardest to keep, by every performer, and each of the injured ones.
-SLIDING = (
-    *("cmu/02_01", "cmu/02_03", "cmu/03_01", "cmu/07_09", "cmu/08_01", "cmu/08_05", "cmu/08_06", "cmu/08_11"),
-    *(
-        "cmu/09_04",
-        "cmu/09_07",
-        "cmu/09_08",
-        "cmu/16_36",
-        "cmu/16_53",
-        "cmu/105_16",
-        "pfnn/LocomotionFlat09_000",
-    ),
-    *("ferre/Injured_Walk_LLL", "ferre/Injured_Walk_RUL", "ferre/Injured_Jog_LLA", "ferre/Injured_Run_LLL"),
-    *("ferre/Injured_LUL_Backwards", "ferre/Injured_Ilde", "ferre/Injured_Walk_RUL_extended_converted"),
-)
+SLIDING = ["cmu/02_01", "pfnn/LocomotionFlat09_000", "ferre/Injured_Walk_LLL", "ferre/Injured_LUL_Backwards"]
+MORE = """cmu/02_03 cmu/03_01 cmu/07_09 cmu/08_01 cmu/08_05 cmu/08_06 cmu/08_11 cmu/09_04 cmu/09_07 cmu/09_08
+    cmu/16_36 cmu/16_53 cmu/105_16 ferre/Injured_Walk_RUL ferre/Injured_Jog_LLA ferre/Injured_Run_LLL
+    ferre/Injured_Ilde ferre/Injured_Walk_RUL_extended_converted"""
+SLIDING += [pytest.param(name, marks=pytest.mark.slow) for name in MORE.split()]
 
 
 @pytest.mark.shared
 @pytest.mark.parametrize("file", SLIDING)
-def test_feet_of_real_clips_slide_no_more_than_before_in_every_direction(shared, root, rigs, options, file):
-    target = rigs["holden31"]
-    bvh, keys = read_bvh(shared / f"mocap/{file}.bvh"), ClipMotion(**options)
-    source = load_source(bvh, target, root / "config/skeletons", keys)
-    clip = resample(source.clip, 60.0)
+def test_feet_of_real_clips_slide_no_more_than_before_in_every_direction(shared, rigs, file):
+    source, clip = sourced(shared / f"mocap/{file}.bvh", rigs["holden31"])
     for end in NAMES:
         pairs = joint_pairs(rigs[source.match.rig], rigs[end])
         pairs = {mine: theirs for mine, theirs in pairs.items() if theirs in clip.skeleton.joints}
@@ -249,18 +231,14 @@ def test_feet_of_real_clips_slide_no_more_than_before_in_every_direction(shared,
 
 
 @pytest.mark.shared
-def test_a_real_walk_keeps_knee_bend_lean_and_stride(shared, root, rigs, options):
+def test_a_real_walk_keeps_knee_bend_lean_and_stride(shared, rigs):
     """Knee bend, trunk lean and stride over leg length stay those of the source."""
     target = rigs["holden31"]
-    bvh, keys = read_bvh(shared / "mocap/cmu/02_01.bvh"), ClipMotion(**options)
-    source = load_source(bvh, target, root / "config/skeletons", keys)
-    clip = resample(source.clip, 60.0)
+    source, clip = sourced(shared / "mocap/cmu/02_01.bvh", target)
     made = retarget_clip(clip, plan(clip.skeleton, target.skeleton, source.match.followed_joints))
 
     def knee(of):
-        p = {r: of.positions[:, of.skeleton.role(f"left_{r}")] for r in ("hip", "knee", "heel")}
-        a, b = p["hip"] - p["knee"], p["heel"] - p["knee"]
-        cosine = np.sum(a * b, -1) / np.linalg.norm(a, axis=-1) / np.linalg.norm(b, axis=-1)
+        cosine = np.sum(bone(of, "left_hip", "left_knee") * bone(of, "left_knee", "left_heel"), -1)
         return np.degrees(np.arccos(cosine))
 
     def lean(of):
@@ -272,7 +250,7 @@ def test_a_real_walk_keeps_knee_bend_lean_and_stride(shared, root, rigs, options
 
 
 @pytest.mark.shared
-@pytest.mark.parametrize("file", ["105_10", "105_29", "105_16", "105_26", "08_03"])
+@pytest.mark.parametrize("file", ["105_10", "105_16", "08_03"])
 def test_nearly_straight_legs_bend_smoothly(shared, make, file):
     """With other feet, the leg is too short for the target of the ankle. The hips come down instead of
     straightening the knee.

@@ -53,7 +53,7 @@ def test_feet_on_uneven_ground_cast_no_doubt_on_the_zero_pose(shared, make):
 
 
 @pytest.mark.shared
-@pytest.mark.parametrize("name", ["walk_old_001", "walk-back_tired_001", "dash_angry_001"])
+@pytest.mark.parametrize("name", ["walk-back_tired_001", "dash_angry_001"])
 def test_a_rig_whose_zero_pose_is_a_line_comes_out_upright(shared, make, name):
     path = shared / f"mocap/styles/dataset-1_{name}.bvh"
     clip, report = make(path)
@@ -64,7 +64,7 @@ def test_a_rig_whose_zero_pose_is_a_line_comes_out_upright(shared, make, name):
 
 
 @pytest.mark.shared
-@pytest.mark.parametrize("name", ["A11_Cycle2", "D4_Cycle2"])
+@pytest.mark.parametrize("name", ["D4_Cycle2"])
 def test_a_rig_without_a_file_is_found(shared, make, name):
     path = shared / f"mocap/patients/Subject{name}.bvh"
     clip, report = make(path)
@@ -76,7 +76,7 @@ def test_a_rig_without_a_file_is_found(shared, make, name):
 
 
 @pytest.mark.shared
-@pytest.mark.parametrize("name", ["03_04", "105_16"])
+@pytest.mark.parametrize("name", ["105_16", pytest.param("03_04", marks=pytest.mark.slow)])
 def test_hips_and_shoulders_are_as_level_as_in_the_file(shared, make, name):
     """The spines of captured rigs are bent sideways in the zero pose; hips and shoulders are not."""
     path = shared / f"mocap/cmu/{name}.bvh"
@@ -179,11 +179,8 @@ def test_in_a_squat_the_zero_pose_shows_the_pelvis(standing, tmp_path, make):
     assert report["unsure"] == []
 
 
-def test_a_squat_on_a_rig_without_a_standing_zero_pose_is_noted(standing, tmp_path, make):
+def test_a_squat_without_a_standing_zero_pose_is_noted_and_on_tiptoe_refused(standing, tmp_path, make):
     *_, report = rewritten(squat(standing, 0.0), "one axis", tmp_path, make)
     assert "almost never upright" in " ".join(report["unsure"])
-
-
-def test_a_squat_on_tiptoe_without_a_standing_zero_pose_is_refused(standing, tmp_path, make):
     with pytest.raises(InputError, match="squats, perhaps on tiptoe"):
         rewritten(squat(standing, 0.5), "one axis", tmp_path, make)
