@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from hobble.report.gather import ReportMaterial
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from itertools import combinations, product
 from typing import Any
 
@@ -42,12 +42,16 @@ from hobble.report.parts import (
     TemplatePart,
     Trace,
     axis,
+    bar_trace,
     citation,
     configuration_colours,
     configuration_names,
     dot_trace,
     format_duration,
     format_number,
+    heatmap,
+    marker_trace,
+    ordered_axis,
     reference_line,
     with_order,
 )
@@ -80,7 +84,7 @@ ENDINGS = {
     "_mirror": " A clip whose name ends in _mirror is mirrored.",
 }
 COLOURS = {"train": "@muted", "held_out": "@accent"}  # split -> its colour in the charts
-NAMES = {"train": "training", "held_out": "held out"}  # split -> its name on the page
+NAMES = {"held_out": "held out", "train": "training"}  # split -> its name on the page
 # The keys of the 5th to 95th percentile of the error in accuracy.json.
 QUANTILES = ("p05", "p25", "p50", "p75", "p95")
 # Columns of the table of clips.
@@ -107,33 +111,15 @@ def clip_bars(found: Json, material: ReportMaterial) -> Chart | None:
     if not rows:
         return None
     traces = []
-    for split in ("held_out", "train"):
+    for split, name in NAMES.items():
         chosen = [row for row in rows if row["split"] == split]
-        traces.append(
-            {
-                "type": "bar",
-                "orientation": "h",
-                "name": NAMES[split],
-                "y": [row["clip"] for row in chosen],
-                "x": [100 * row["mean"] for row in chosen],
-                "error_x": {
-                    "type": "data",
-                    "symmetric": False,
-                    "array": [100 * (row.get("sd") or 0) for row in chosen],
-                    "arrayminus": [0 for _ in chosen],
-                    "color": "@faint",
-                    "thickness": 1,
-                    "width": 2,
-                },
-                "marker": {"color": COLOURS[split]},
-                "hovertemplate": "%{y}: %{x:.2f} %<extra></extra>",
-            }
-        )
-    shapes, notes = [], []
+        means, clips = [100 * row["mean"] for row in chosen], [row["clip"] for row in chosen]
+        bars = bar_trace(name, means, clips, COLOURS[split], "%{y}: %{x:.2f} %<extra></extra>")
+        sds = {"array": [100 * (row.get("sd") or 0) for row in chosen], "arrayminus": [0 for _ in chosen]}
+        whiskers = {"type": "data", "symmetric": False, "color": "@faint", "thickness": 1, "width": 2, **sds}
+        traces.append({**bars, "orientation": "h", "error_x": whiskers})
     published = material.published_entry("accuracy")
-    if published:
-        shape, note = reference_line(100 * published["mean"], f"{published['label']}, published")
-        shapes, notes = [shape], [note]
+    line = reference_line(100 * published["mean"], f"{published['label']}, published") if published else {}
     held_out = any(row["split"] == "held_out" for row in rows)
     return Chart(
         "accuracy-clips",
@@ -143,23 +129,14 @@ def clip_bars(found: Json, material: ReportMaterial) -> Chart | None:
         "are one standard deviation long."
         + (" Held-out clips come first: the network was not trained on them." if held_out else ""),
         traces,
-        {
-            "xaxis": axis("relative error, %", rangemode="tozero"),
-            "yaxis": _clip_axis([row["clip"] for row in rows]),
-            "shapes": shapes,
-            "annotations": notes,
-            "bargap": 0.35,
-            "barmode": "overlay",
-        },
+        {**_clip_axes(row["clip"] for row in rows), **line, "bargap": 0.35, "barmode": "overlay"},
         height=_height(len(rows)),
     )
 
 
-def clip_boxes(found: Json) -> Chart | None:
-    """A box for each clip: quantiles of its error over frames and joints. None if no clip has quantiles."""
+def clip_boxes(found: Json) -> Chart:
+    """A box for each clip: quantiles of its error over frames and joints."""
     rows = [row for row in _rows(found)[::-1] if has_quantiles(row)]  # plotly puts the first at the bottom
-    if not rows:
-        return None
     traces = []
     for split, fill, line in (("held_out", "@accent-wash", "@accent"), ("train", "@sunken", "@faint")):
         if chosen := [row for row in rows if row["split"] == split]:
@@ -173,13 +150,14 @@ def clip_boxes(found: Json) -> Chart | None:
         "the dotted line the mean. Whiskers reach from the 5th to the 95th percentile. A box near zero with "
         "a long whisker means that the clip is easy except for a few moments.",
         traces,
-        {
-            "xaxis": axis("relative error, %", rangemode="tozero"),
-            "yaxis": _clip_axis([row["clip"] for row in rows]),
-            "boxmode": "overlay",
-        },
+        {**_clip_axes(row["clip"] for row in rows), "boxmode": "overlay"},
         height=_height(len(rows)),
     )
+
+
+def _clip_axes(clips: Iterable[str]) -> dict[str, Any]:
+    """The axes of a chart with a row for each clip, from the bottom."""
+    return {"xaxis": axis("relative error, %", rangemode="tozero"), "yaxis": ordered_axis(clips)}
 
 
 def boxes(name: str, errors: Sequence[Json], colour: str) -> Trace:
@@ -190,11 +168,6 @@ def boxes(name: str, errors: Sequence[Json], colour: str) -> Trace:
     return {"type": "box", "name": name, **fences, "mean": mean, "marker": {"color": colour}}
 
 
-def _clip_axis(clips: Sequence[str]) -> dict[str, Any]:
-    """The vertical axis of a chart with a row for each clip, from the bottom."""
-    return {"categoryorder": "array", "categoryarray": list(clips), "automargin": True}
-
-
 def has_quantiles(row: Json) -> bool:
     """Whether the errors of a clip or a split have all QUANTILES."""
     return all(row.get(key) is not None for key in QUANTILES)
@@ -202,10 +175,15 @@ def has_quantiles(row: Json) -> bool:
 
 def accuracy_table(found: Json, name: str) -> Table:
     """A row for each clip that was measured: its number of frames and its errors. name: the configuration."""
-    columns = [Column("clip"), Column("split", lambda value: NAMES.get(value, value)), Column.count("frames")]
-    columns += [Column.number(label) for label in ("mean", "sd", "position error, cm")]
-    rows = [[row.get(key) for key in CLIP_COLUMNS[: len(columns)]] for row in _rows(found)]
-    return Table(f"{name}-accuracy", columns, rows)
+    columns = {
+        "clip": Column("clip"),
+        "split": Column("split", lambda value: NAMES.get(value, value)),
+        "frames": Column.count("frames"),
+        "mean": Column.number("mean"),
+        "sd": Column.number("sd"),
+        "position_error_cm": Column.number("position error, cm"),
+    }
+    return Table.of(f"{name}-accuracy", columns, _rows(found))
 
 
 def published_table(found: Json, material: ReportMaterial) -> Table:
@@ -336,30 +314,18 @@ def _generalisation(found: Json) -> Iterator[Hint]:
             "So the errors on this page do not show how well the network predicts new clips. List a few "
             "clips under held_out in the data set.",
         )
-        return
-    if not train.get("mean"):
-        return
-    ratio = held_out["mean"] / train["mean"]
-    if ratio > 1.5:
-        yield Hint(
-            "warn",
-            f"The error on held-out clips is {ratio:.1f} times the error on training clips.",
-            "The network overfits. Add more varied clips (speeds, turns, performers) before you make the "
-            "network larger or train it longer.",
-        )
-    elif ratio < 1.2:
-        yield Hint(
-            "good",
-            f"The error on held-out clips is {ratio:.2f} times the error on training clips, so the network "
-            "does not overfit.",
-            "A larger network may do better.",
-        )
-    else:
-        yield Hint(
-            "fact",
-            f"The error on held-out clips is {ratio:.2f} times the error on training clips.",
-            "That is usual.",
-        )
+    elif train.get("mean"):
+        ratio = held_out["mean"] / train["mean"]
+        words = "The error on held-out clips is {} times the error on training clips"
+        if ratio > 1.5:
+            advice = "The network overfits. Add more varied clips (speeds, turns, performers) before you "
+            advice += "make the network larger or train it longer."
+            yield Hint("warn", f"{words.format(f'{ratio:.1f}')}.", advice)
+        elif ratio < 1.2:
+            head = f"{words.format(f'{ratio:.2f}')}, so the network does not overfit."
+            yield Hint("good", head, "A larger network may do better.")
+        else:
+            yield Hint("fact", f"{words.format(f'{ratio:.2f}')}.", "That is usual.")
 
 
 def _worst_clip(found: Json) -> Iterator[Hint]:
@@ -525,9 +491,17 @@ def compared_columns(compared: Compared) -> Iterator[OverviewColumn]:
     )
 
 
-def error_boxes(compared: Compared) -> Chart | None:
+def error_boxes(compared: Compared) -> Chart:
     """A box for each configuration: the spread of its error over all frames of a split. A menu selects it."""
     colours, options = configuration_colours(compared), {}
+    published = [row for row in compared["published"]["accuracy"] if row["configuration"] in colours]
+    marks = marker_trace(
+        "published mean",
+        [row["configuration"] for row in published],
+        [100 * row["mean"] for row in published],
+        {"symbol": "diamond-open", "size": 10, "color": "@ink"},
+        hovertemplate="%{x}: %{y:.2f} % published<extra></extra>",
+    )
     for split, label in SPLIT_LABELS.items():
         traces = []
         for entry in compared["accuracy"]:
@@ -537,20 +511,7 @@ def error_boxes(compared: Compared) -> Chart | None:
                 box = boxes(name, [entry[split]], colours[name])
                 traces.append({**box, "x": [name], "boxmean": True, "line": line})
         if traces:
-            options[label] = traces
-    if not options:
-        return None
-    names = configuration_names(compared)
-    published = [row for row in compared["published"]["accuracy"] if row["configuration"] in names]
-    marks: Trace = {
-        "type": "scatter",
-        "mode": "markers",
-        "name": "published mean",
-        "x": [row["configuration"] for row in published],
-        "y": [100 * row["mean"] for row in published],
-        "marker": {"symbol": "diamond-open", "size": 10, "color": "@ink"},
-        "hovertemplate": "%{x}: %{y:.2f} % published<extra></extra>",
-    }
+            options[label] = [*traces, marks] if published else traces
     return Chart(
         "compare-boxes",
         "Spread of the error",
@@ -560,12 +521,12 @@ def error_boxes(compared: Compared) -> Chart | None:
         layout={"yaxis": axis("relative error, %", rangemode="tozero"), "showlegend": False},
         height=400,
         choose="Clips",
-        options={label: [*traces, marks] if published else traces for label, traces in options.items()},
+        options=options,
     )
 
 
-def difference_table(compared: Compared) -> Table | None:
-    """Errors and frame times of each pair of configurations, and their difference; None without pairs.
+def difference_table(compared: Compared) -> Table:
+    """Errors and frame times of each pair of configurations, and their difference.
 
     By eq. 3.2 of Segerstedt (2021), the difference of two means is divided by the mean of their standard
     deviations. One column has the result for deviations over single frames, another for those over means of
@@ -577,10 +538,7 @@ def difference_table(compared: Compared) -> Table | None:
         [r["a"], r["b"], f"{what}, {r['over'].replace('_', ' ')}", *(r.get(key) for key in PAIR_COLUMNS)]
         for what, r in pairs
     ]
-    if not rows:
-        return None
-    columns = [Column("one"), Column("other"), Column("measured")]
-    columns += [Column.number(label) for label in PAIR_COLUMNS.values()]
+    columns = [*map(Column, ("one", "other", "measured")), *map(Column.number, PAIR_COLUMNS.values())]
     return Table("compare-difference", columns, rows, "Differences between all pairs")
 
 
@@ -594,53 +552,25 @@ def clip_dots(compared: Compared) -> Chart | None:
     traces = []
     for entry in compared["accuracy"]:
         rows = [row for row in entry["clips"] if row.get("mean") is not None]
-        traces.append(
-            dot_trace(
-                entry["configuration"],
-                [100 * row["mean"] for row in rows],
-                [row["clip"] for row in rows],
-                configuration_colours(compared)[entry["configuration"]],
-                "%{y}: %{x:.2f} %",
-            )
-        )
-    layout = {
-        "xaxis": axis("relative error, %", rangemode="tozero"),
-        "yaxis": {**_clip_axis(order), "type": "category"},
-    }
+        means, names = [100 * row["mean"] for row in rows], [row["clip"] for row in rows]
+        colour = configuration_colours(compared)[entry["configuration"]]
+        traces.append(dot_trace(entry["configuration"], means, names, colour, "%{y}: %{x:.2f} %"))
+    layout = _clip_axes(order)
+    layout["yaxis"]["type"] = "category"
     caption = "Each row is a clip, with one dot for each configuration. Held-out clips are at the top."
     return Chart("compare-clips", "Error of each clip", caption, traces, layout, 130 + 19 * len(order))
 
 
-def difference_map(compared: Compared) -> Chart | None:
+def difference_map(compared: Compared) -> Chart:
     """The difference of each two configurations. A menu selects the split and the kind of deviation."""
-    configurations, options = configuration_names(compared), {}
+    names, options = configuration_names(compared), {}
+    hover, look = "%{y} and %{x}: %{z:.3f}<extra></extra>", {"texttemplate": "%{z:.2f}", "xgap": 3, "ygap": 3}
     for (split, label), (key, kind) in product(SPLIT_LABELS.items(), DEVIATIONS.items()):
         values = {(r["a"], r["b"]): r[key] for r in compared["difference"] if r["over"] == split}
-        if all(value is None for value in values.values()):
-            continue
-        # compare.json has each pair in one order only, (a, b) or (b, a).
-        cells = [[values.get((a, b), values.get((b, a))) for b in configurations] for a in configurations]
-        options[f"{label}, {kind}"] = [
-            {
-                "type": "heatmap",
-                "x": configurations,
-                "y": configurations,
-                "z": cells,
-                "colorscale": [[0, "@sunken"], [1, "@accent"]],
-                "zmin": 0,
-                "texttemplate": "%{z:.2f}",
-                "xgap": 3,
-                "ygap": 3,
-                "showscale": False,
-                "hovertemplate": "%{y} and %{x}: %{z:.3f}<extra></extra>",
-            }
-        ]
-    if not options:
-        return None
-    layout = {
-        "xaxis": {"type": "category"},
-        "yaxis": {"type": "category", "autorange": "reversed", "automargin": True},
-    }
+        if any(value is not None for value in values.values()):
+            # compare.json has each pair in one order only, (a, b) or (b, a).
+            cells = [[values.get((a, b), values.get((b, a))) for b in names] for a in names]
+            options[f"{label}, {kind}"] = [heatmap(names, names, cells, hover, **look)]
     return Chart(
         "compare-difference",
         "Difference between two configurations",
@@ -648,8 +578,11 @@ def difference_map(compared: Compared) -> Chart | None:
         "standard deviations. Segerstedt uses the standard deviation of the clips' means. The standard "
         "deviation of single frames is several times as large. A value of 1 says that the means are one "
         "standard deviation apart. Our rule of thumb: differences under 0.2 are too small to matter.",
-        layout=layout,
-        height=max(240, 90 + 42 * len(configurations)),
+        layout={
+            "xaxis": {"type": "category"},
+            "yaxis": {"type": "category", "autorange": "reversed", "automargin": True},
+        },
+        height=max(240, 90 + 42 * len(names)),
         choose="Clips and deviation",
         options=options,
     )

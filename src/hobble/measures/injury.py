@@ -7,7 +7,8 @@ injury.json.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from itertools import product
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,7 +19,7 @@ from hobble.core.files import Json
 from hobble.core.section import PositiveFloat
 from hobble.measures.compare import ComparisonAddition, ConfigurationResults
 from hobble.measures.measure import Cost, Measure, SampleOptions
-from hobble.measures.recognition import NAMED_AXES, heatmap
+from hobble.measures.recognition import NAMED_AXES
 from hobble.report.parts import (
     Chart,
     ChartGroup,
@@ -33,7 +34,11 @@ from hobble.report.parts import (
     Trace,
     axis,
     format_number,
+    heatmap,
     line_trace,
+    marker_trace,
+    ordered_axis,
+    shows_something,
     with_order,
 )
 from hobble.runtime.options import Runtime
@@ -90,16 +95,16 @@ PANELS: tuple[Panel, ...] = (
     ("rough", "Largest acceleration of a joint", "cm per frame²", ROUGH, 2.0, True),
 )
 # Columns of the table of responses: label, and how the value is found in a response.
-RESPONSE_COLUMNS: Mapping[str, Callable[[Mapping[str, Any]], Any]] = {
-    "change of the pose, cm": lambda r: r.get("from_healthy_cm"),
-    "share of the healthy speed": lambda r: r.get("speed_share"),
-    "time to settle, s": lambda r: r.get("settle_seconds"),
-    "time to heal, s": lambda r: r.get("heal_seconds"),
-    "change left after healing, cm": lambda r: r.get("after_healing_cm"),
-    "difference between rising and falling severity, cm": lambda r: r.get("hysteresis_cm"),
-    "largest acceleration, divided by the healthy walk's": lambda r: r.get("acceleration_share"),
-    "ρ of pose": lambda r: (r.get("spearman") or {}).get("from_healthy"),
-    "ρ of speed": lambda r: (r.get("spearman") or {}).get("speed"),
+RESPONSE_COLUMNS = {
+    "from_healthy_cm": "change of the pose, cm",
+    "speed_share": "share of the healthy speed",
+    "settle_seconds": "time to settle, s",
+    "heal_seconds": "time to heal, s",
+    "after_healing_cm": "change left after healing, cm",
+    "hysteresis_cm": "difference between rising and falling severity, cm",
+    "acceleration_share": "largest acceleration, divided by the healthy walk's",
+    "spearman_from_healthy": "ρ of pose",
+    "spearman_speed": "ρ of speed",
 }
 INTRODUCTION = (
     "The character walks or jogs while the severity of one link (the piece of the body between two "
@@ -205,21 +210,17 @@ def _parts(found: Json, name: str) -> list[SectionPart]:
     """The parts of the section. found: injury.json, with links renamed. name: of the configuration."""
     rows, responses, second = (found.get(key) or [] for key in ("rows", "responses", "second"))
     untrained = {r["link"] for r in responses if not _trained(r)}
-    divided, jogs = (
-        divided_chart(found.get("divided") or ()),
-        jog_chart(found.get("into_a_jog") or (), untrained),
-    )
+    jogs = jog_chart(found.get("into_a_jog") or (), untrained)
     words = {"from_worst": "from severity 10"}
+    all_rows = table_of_rows(f"{name}-injury", rows, "Every walk and jog at rising severity", words)
     return [
         SectionPart(0, ChartPair(effect_charts(responses))),
         SectionPart(10, response_table(name, responses)),
         SectionPart(20, sweep_charts(rows, found.get("falling") or (), untrained) if rows else None),
         SectionPart(40, second_chart(second)),
         SectionPart(50, table_of_rows(f"{name}-second-injury", second, "Every walk with two injuries")),
-        SectionPart(60, ChartPair([divided, jogs])),
-        SectionPart(
-            70, table_of_rows(f"{name}-injury", rows, "Every walk and jog at rising severity", words)
-        ),
+        SectionPart(60, ChartPair([divided_chart(found.get("divided") or ()), jogs])),
+        SectionPart(70, all_rows),
     ]
 
 
@@ -230,20 +231,17 @@ def _trained(response: Mapping[str, Any]) -> bool:
 
 def table_of_rows(
     key: str, rows: Rows, title: str, words: Mapping[str, str] | None = None, texts: Collection[str] = ()
-) -> Table | None:
-    """A table with all values of the rows. None if there are no rows.
+) -> Table:
+    """A table with all values of the rows.
 
     words: key of a row -> heading of its column, if it is not the key itself. texts: keys of texts, which may
     be missing in the first row.
     """
-    if not rows:
-        return None
-    columns = []
-    for name, value in rows[0].items():
+    columns = {}
+    for name, value in rows[0].items() if rows else ():
         heading = (words or {}).get(name, name.replace("_", " "))
-        is_text = isinstance(value, str) or name in texts
-        columns.append(Column(heading) if is_text else Column.number(heading))
-    return Table(key, columns, [[row.get(name) for name in rows[0]] for row in rows], title)
+        columns[name] = Column(heading) if isinstance(value, str) or name in texts else Column.number(heading)
+    return Table.of(key, columns, rows, title)
 
 
 def sweep_charts(rows: Rows, falling: Rows = (), untrained: Collection[str] = ()) -> ChartGroup:
@@ -346,18 +344,15 @@ def effect_charts(responses: Rows) -> list[Chart]:
             "not to the right of the hollow dots, its link has no effect either."
         )
         speed += hollow
-    share = "share of the healthy speed"
+    of_pose, of_speed = (
+        ("injury-pose", "Change of the pose", pose),
+        ("injury-speed", "Remaining speed", speed),
+    )
     charts = [
-        _effect_chart(
-            responses,
-            "from_healthy_cm",
-            ("injury-pose", "Change of the pose", pose),
-            "cm per joint at severity 10",
-            2.0,
-        ),
-        _effect_chart(responses, "speed_share", ("injury-speed", "Remaining speed", speed), share, 1.0),
+        _effect_chart(responses, "from_healthy_cm", of_pose, "cm per joint at severity 10", 2.0),
+        _effect_chart(responses, "speed_share", of_speed, "share of the healthy speed", 1.0),
     ]
-    return [chart for chart in charts if chart.traces]
+    return [chart for chart in charts if shows_something(chart)]
 
 
 def _effect_chart(
@@ -365,54 +360,39 @@ def _effect_chart(
 ) -> Chart:
     """A dot for each link and gait. texts: name, title and caption of the chart."""
     traces: list[Trace] = []
-    for gait, colour in GAIT_COLOURS.items():
-        for hurt in (True, False):
-            dots = [
-                r
-                for r in responses[::-1]
-                if r["gait"] == gait and _trained(r) is hurt and r.get(key) is not None
-            ]
-            if dots:
-                trace = {
-                    "type": "scatter",
-                    "mode": "markers",
-                    "name": gait if hurt else f"{gait}, {UNTRAINED}",
-                    "y": [r["link"] for r in dots],
-                    "x": [r[key] for r in dots],
-                    "marker": {"color": colour, "size": 9} if hurt else HOLLOW | {"color": colour},
-                    "hovertemplate": "%{y}: %{x:.2f}<extra>%{fullData.name}</extra>",
-                }
-                traces.append(trace)
+    known = [r for r in responses if r.get(key) is not None]
+    for (gait, colour), hurt in product(GAIT_COLOURS.items(), (True, False)):
+        if dots := [r for r in known[::-1] if r["gait"] == gait and _trained(r) is hurt]:
+            name = gait if hurt else f"{gait}, {UNTRAINED}"
+            marker = {"size": 9} if hurt else HOLLOW
+            x, y = [r[key] for r in dots], [r["link"] for r in dots]
+            hover = "%{y}: %{x:.2f}<extra>%{fullData.name}</extra>"
+            traces.append(marker_trace(name, x, y, {**marker, "color": colour}, hovertemplate=hover))
     # Links that were hurt in training are at the top. Plotly counts from below, so the list is reversed.
     from_top = sorted(responses, key=lambda r: not _trained(r))
     links = list(dict.fromkeys(r["link"] for r in from_top))[::-1]
-    furthest = max((r[key] for r in responses if r.get(key) is not None), default=0.0)
+    furthest = max((r[key] for r in known), default=0.0)
     layout = {
         "xaxis": axis(axis_title, range=[0, 1.08 * max(least_range, furthest)]),
-        "yaxis": {
-            "categoryorder": "array",
-            "categoryarray": links,
-            "automargin": True,
-            "type": "category",
-        },
+        "yaxis": ordered_axis(links, type="category"),
     }
     return Chart(*texts, traces, layout, 150 + 21 * len(links))
 
 
 def response_table(name: str, responses: Rows) -> Table:
     """A row for each gait and link. name: of the configuration."""
-    columns = [
-        Column("gait"),
-        Column("link"),
-        Column("in training", lambda v: "hurt" if v else "never hurt"),
-        *map(Column.number, RESPONSE_COLUMNS),
-    ]
-    rows = [
-        [r["gait"], r["link"], _trained(r), *(value(r) for value in RESPONSE_COLUMNS.values())]
+    columns = {
+        "gait": Column("gait"),
+        "link": Column("link"),
+        "trained": Column("in training", lambda v: "hurt" if v else "never hurt"),
+        **{key: Column.number(label) for key, label in RESPONSE_COLUMNS.items()},
+    }
+    records = [
+        {"trained": True, **r} | {f"spearman_{key}": rho for key, rho in (r.get("spearman") or {}).items()}
         for r in responses
     ]
     title = "Every link at severity 10, and the rank correlation of its effects with severity (Spearman's ρ)"
-    return Table(f"{name}-injury-responses", columns, rows, title)
+    return Table.of(f"{name}-injury-responses", columns, records, title)
 
 
 def second_chart(rows: Rows) -> Chart | None:
@@ -429,8 +409,7 @@ def second_chart(rows: Rows) -> Chart | None:
         """key: of a row. number: format of its value."""
         values = [[by_pair.get((a, b), {}).get(key) for b in second_links] for a in first_links]
         hover = f"%{{x}} in addition to %{{y}}: %{{z:{number}}}<extra></extra>"
-        texts = {"texttemplate": f"%{{z:{number}}}", "hovertemplate": hover}
-        return [heatmap(second_links, first_links, values, **texts)]
+        return [heatmap(second_links, first_links, values, hover, texttemplate=f"%{{z:{number}}}")]
 
     return Chart(
         "second-injury",

@@ -27,6 +27,7 @@ from hobble.report.parts import (
     axis,
     format_number,
     line_trace,
+    marker_trace,
 )
 from hobble.runtime.options import Runtime
 
@@ -77,30 +78,21 @@ def section(found: Json, material: ReportMaterial) -> PageSection:
     found = with_spoken_links(found, material)
     words = {"called": "linear recogniser", "graded": "graded recogniser", **RECOGNISED}
     texts = ("gait", "link", "part", "side", "called", "graded")
+    sources = hurt_motion_in_words(found["hurt_seconds"], shown_name) + sample_sentence(found)
+    all_sizes = table_of_rows(f"{name}-limp-sizes", found["sizes"], "Sizes of all effects", words, texts)
+    title = "Speed with a second injury in addition to the first"
     return PageSection(
         "injury",
         [
-            SectionPart(
-                1,
-                Paragraph(hurt_motion_in_words(found["hurt_seconds"], shown_name) + sample_sentence(found)),
-            ),
+            SectionPart(1, Paragraph(sources)),
             SectionPart(2, size_chart(found)),
             SectionPart(3, Paragraph(RECOGNISERS)),
             SectionPart(3, recognised_table(name, found["named"])),
             SectionPart(5, other_channel_table(name, found["named_together"])),
             SectionPart(4, held_out_table(name, found["held_out_limps"], shown_name)),
-            SectionPart(
-                80, table_of_rows(f"{name}-limp-sizes", found["sizes"], "Sizes of all effects", words, texts)
-            ),
+            SectionPart(80, all_sizes),
             SectionPart(81, captured_table(name, found["captured"], shown_name)),
-            SectionPart(
-                82,
-                table_of_rows(
-                    f"{name}-limp-second",
-                    found["second"],
-                    "Speed with a second injury in addition to the first",
-                ),
-            ),
+            SectionPart(82, table_of_rows(f"{name}-limp-second", found["second"], title)),
         ],
     )
 
@@ -142,15 +134,10 @@ def size_chart(found: Json) -> Chart:
         return trace
 
     def people(i: int, gait: str, mean: float, spread: float) -> Trace:
-        return {
-            "type": "scatter",
-            "mode": "markers",
-            "name": f"people, {gait.replace('_', ' ')}",
-            "x": [10.3 + 0.1 * i],  # side by side, to the right of severity 10
-            "y": [mean],
-            "error_y": {"type": "data", "array": [spread], "visible": True},
-            "marker": {"color": "@muted", "size": 8},
-        }
+        x = [10.3 + 0.1 * i]  # side by side, to the right of severity 10
+        bars = {"type": "data", "array": [spread], "visible": True}
+        name = f"people, {gait.replace('_', ' ')}"
+        return marker_trace(name, x, [mean], {"color": "@muted", "size": 8}, error_y=bars)
 
     return Chart(
         "limp-sizes",
@@ -173,65 +160,53 @@ def size_chart(found: Json) -> Chart:
 
 def recognised_table(name: str, rows: Rows) -> Table:
     """How well limps of hurt legs are recognised at each severity. rows: `named` of limp.json."""
-    columns = [
-        Column.number("severity"),
-        Column.count("walks"),
-        *map(Column.number, RECOGNISED.values()),
-    ]
-    table = [[r["severity"], r["walks"], *(r[key] for key in RECOGNISED)] for r in rows]
-    return Table(f"{name}-limp-named", columns, table, "Is the limp of a hurt leg recognised?")
+    columns = {"severity": Column.number("severity"), "walks": Column.count("walks"), **_shares()}
+    return Table.of(f"{name}-limp-named", columns, rows, "Is the limp of a hurt leg recognised?")
 
 
-def other_channel_table(name: str, rows: Rows) -> Table | None:
+def _shares() -> dict[str, Column]:
+    return {key: Column.number(label) for key, label in RECOGNISED.items()}
+
+
+def other_channel_table(name: str, rows: Rows) -> Table:
     """How well limps of hurt legs are recognised while another channel has its highest value.
 
     rows: `named_together` of limp.json.
     """
-    if not rows:
-        return None
-    columns = [
-        Column("with"),
-        Column.count("walks"),
-        Column.number("speed, share of the same walk without injury"),
-        *map(Column.number, RECOGNISED.values()),
-    ]
-    keys = ("column", "walks", "speed_share", *RECOGNISED)
+    columns = {
+        "column": Column("with"),
+        "walks": Column.count("walks"),
+        "speed_share": Column.number("speed, share of the same walk without injury"),
+        **_shares(),
+    }
     title = "Is the limp of a hurt leg (severity 10) recognised while another channel has its highest value?"
-    return Table(f"{name}-limp-together", columns, [[row.get(key) for key in keys] for row in rows], title)
+    return Table.of(f"{name}-limp-together", columns, rows, title)
 
 
-def held_out_table(name: str, rows: Rows, shown_name: Callable[[str], str]) -> Table | None:
+def held_out_table(name: str, rows: Rows, shown_name: Callable[[str], str]) -> Table:
     """Compares captured limps, which were held out of training, with the character.
 
     rows: `held_out_limps` of limp.json.
     """
-    if not rows:
-        return None
-    columns = [
-        Column("clip"),
-        Column("hurt"),
-        Column("healthy walk of"),
-        Column.number("distance of the healthy character"),
-        Column.number("distance of the hurt character"),
-        Column("hurt character is nearer", lambda v: "yes" if v else "no"),
-    ]
-    keys = ("compared_with", "healthy", "hurt", "nearer")
-    table = [[r["clip"], _in_words(r["hurt_links"], shown_name), *(r[k] for k in keys)] for r in rows]
+    columns = {
+        "clip": Column("clip"),
+        "hurt_links": Column("hurt"),
+        "compared_with": Column("healthy walk of"),
+        "healthy": Column.number("distance of the healthy character"),
+        "hurt": Column.number("distance of the hurt character"),
+        "nearer": Column("hurt character is nearer", lambda v: "yes" if v else "no"),
+    }
+    records = [{**r, "hurt_links": _in_words(r["hurt_links"], shown_name)} for r in rows]
     title = "Held-out captured limps: is the hurt character nearer to them than the healthy character?"
-    return Table(f"{name}-limp-exam", columns, table, title)
+    return Table.of(f"{name}-limp-exam", columns, records, title)
 
 
-def captured_table(name: str, rows: Rows, shown_name: Callable[[str], str]) -> Table | None:
+def captured_table(name: str, rows: Rows, shown_name: Callable[[str], str]) -> Table:
     """A table of the SHOWN_EFFECTS of captured limps. rows: `captured` of limp.json."""
-    if not rows:
-        return None
-    columns = [Column("clip"), Column("hurt"), Column("healthy walk of")]
-    columns += [Column.number(k.replace("_", " ")) for k in SHOWN_EFFECTS]
-    table = [
-        [r["clip"], _in_words(r["hurt"], shown_name), r["healthy"], *(r[k] for k in SHOWN_EFFECTS)]
-        for r in rows
-    ]
-    return Table(f"{name}-limp-captured", columns, table, "Effects of captured limps")
+    columns = {"clip": Column("clip"), "hurt": Column("hurt"), "healthy": Column("healthy walk of")}
+    columns |= {key: Column.number(key.replace("_", " ")) for key in SHOWN_EFFECTS}
+    records = [{**r, "hurt": _in_words(r["hurt"], shown_name)} for r in rows]
+    return Table.of(f"{name}-limp-captured", columns, records, "Effects of captured limps")
 
 
 def _in_words(hurt: Mapping[str, float], shown_name: Callable[[str], str]) -> str:

@@ -18,7 +18,7 @@ from typing import Literal
 from hobble.channels.shown import shown_names
 from hobble.core.files import Json
 from hobble.measures.measure import Cost, Measure, SampleOptions, sample_sentence
-from hobble.report.parts import Chart, PageSection, Paragraph, SectionPart
+from hobble.report.parts import Chart, PageSection, Paragraph, SectionPart, heatmap
 from hobble.runtime.options import Runtime
 
 MEASURE = Measure(
@@ -96,19 +96,9 @@ def together_chart(result: Json, shown_name: Callable[[str], str] = str) -> Char
     columns = list(dict.fromkeys(row["column"] for row in rows))
     labels = [shown_name(column) for column in columns]
     shares = {(row["manner"], row["column"]): row["share"] for row in rows}
-    trace = {
-        "type": "heatmap",
-        "x": manners,
-        "y": labels[::-1],  # plotly puts the first row at the bottom
-        "z": [[shares[m, c] for m in manners] for c in columns[::-1]],
-        "colorscale": [[0, "@sunken"], [1, "@accent"]],
-        "zmin": 0,
-        "zmax": 1,
-        "showscale": False,
-        "xgap": 2,
-        "ygap": 2,
-        "hovertemplate": "%{x} with %{y}: %{z:.0%}<extra></extra>",
-    }
+    # Plotly puts the first row at the bottom.
+    cells = [[shares[m, c] for m in manners] for c in columns[::-1]]
+    trace = heatmap(manners, labels[::-1], cells, "%{x} with %{y}: %{z:.0%}<extra></extra>", zmax=1)
     # Numbers of windows with a manner: those that are named right, and all.
     right = sum((row["share"] or 0.0) * row["windows"] for row in rows if row["manner"] != NONE)
     total = sum(row["windows"] for row in rows if row["manner"] != NONE)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from hobble.core.files import Json
 from hobble.measures.compare import ComparisonAddition, ConfigurationResults, published_row
 from hobble.measures.measure import Cost, Measure, Row, SampleOptions, sample_sentence
-from hobble.report.parts import Chart, PageSection, SectionPart
+from hobble.report.parts import Chart, PageSection, SectionPart, heatmap
 from hobble.runtime.options import Runtime
 
 if TYPE_CHECKING:
@@ -35,22 +35,6 @@ def section(found: Json, material: ReportMaterial) -> PageSection:
     return PageSection("injury", [SectionPart(30, recognition_chart(found))])
 
 
-def heatmap(x: Sequence[str], y: Sequence[str], z: Sequence[Sequence[float | None]], **more: Any) -> Any:
-    """A trace with a cell for each pair of names. z: a row of values for each item of y."""
-    return {
-        "type": "heatmap",
-        "x": x,
-        "y": y,
-        "z": z,
-        "colorscale": [[0, "@sunken"], [1, "@accent"]],
-        "zmin": 0,
-        "xgap": 2,
-        "ygap": 2,
-        "showscale": False,
-        **more,
-    }
-
-
 def recognition_chart(found: Json) -> Chart | None:
     """A chart of one confusion table of the classifier, chosen in a menu. None if nothing was measured.
 
@@ -66,15 +50,9 @@ def recognition_chart(found: Json) -> Chart | None:
         "captured clips, cross-validated": captured.get("cross_validated"),
         "captured clips held out of training": captured.get("held_out"),
     }
-    options = {_title(label, table): [_confusion(table)] for label, table in tables.items() if _shown(table)}
-    if not options:
-        return None
     people = found.get("people")
     note = (
-        f" People recognised the part {100 * people:.0f} % of the time (Ferre 2019, on the motion of another "
-        "network)."
-        if people
-        else ""
+        f" People recognised the part {100 * (people or 0):.0f} % of the time (Ferre 2019, on the motion of "
     )
     return Chart(
         "recognition",
@@ -85,12 +63,12 @@ def recognition_chart(found: Json) -> Chart | None:
         layout=NAMED_AXES,
         height=max(300, 190 + 20 * len(found.get("classes") or ())),
         choose="Walks",
-        options=options,
+        options={
+            _title(label, table): [_confusion(table)]
+            for label, table in tables.items()
+            if table and table.get("confusion")
+        },
     )
-
-
-def _shown(table: Json | None) -> bool:
-    return bool(table and table.get("confusion"))
 
 
 def _title(label: str, table: Json) -> str:
@@ -110,7 +88,7 @@ def _confusion(table: Json) -> Any:
     totals = [max(1, sum(row.values())) for row in confusion.values()]
     shares = [[n / total or None for n in row] for row, total in zip(counts, totals, strict=True)]
     hover = "%{y} hurts, %{x} recognised: %{customdata} (%{z:.0%})<extra></extra>"
-    return heatmap(answers, list(confusion), shares, customdata=counts, zmax=1, hovertemplate=hover)
+    return heatmap(answers, list(confusion), shares, hover, customdata=counts, zmax=1)
 
 
 def compared(all_measured: Sequence[ConfigurationResults], published: Json) -> ComparisonAddition:

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from itertools import combinations
+from itertools import combinations, product
 from typing import Annotated, Any
 
 import numpy as np
@@ -46,6 +46,7 @@ from hobble.report.parts import (
     Trace,
     Verdict,
     axis,
+    bar_trace,
     citation,
     configuration_colours,
     configuration_names,
@@ -53,6 +54,7 @@ from hobble.report.parts import (
     format_bytes,
     format_number,
     line_trace,
+    marker_trace,
     reference_line,
     verdict_on_lowest,
     with_order,
@@ -115,13 +117,10 @@ def lap_chart(found: Json, material: ReportMaterial) -> Chart | None:
     # The configured phase mode comes first, because the chart begins with the first option.
     entries = sorted(found.get("modes", [found]), key=lambda entry: entry["mode"] != found["mode"])
     options = {f"{entry['mode']} phase": _lap_bars(entry["laps"]) for entry in entries}
-    shapes, notes = [], []
-    published = material.published_entry("responsivity")
-    if published:
-        shape, note = reference_line(
-            published["milliseconds"], f"{published['label']}: published mean", vertical=False
-        )
-        shapes, notes = [shape], [note]
+    line = {}
+    if published := material.published_entry("responsivity"):
+        text = f"{published['label']}: published mean"
+        line = reference_line(published["milliseconds"], text, vertical=False)
     laps, fewest = (pick(len(entry["laps"]) for entry in entries) for pick in (max, min))
     fewer_laps = f" In the other phase modes there are only {fewest} laps, to save time."
     return Chart(
@@ -137,8 +136,7 @@ def lap_chart(found: Json, material: ReportMaterial) -> Chart | None:
             "barmode": "stack",
             "xaxis": axis("lap", dtick=1 if laps < 25 else None),
             "yaxis": axis("ms per frame", rangemode="tozero"),
-            "shapes": shapes,
-            "annotations": notes,
+            **line,
         },
         choose="Phase mode" if len(options) > 1 else None,
         options=options,
@@ -150,7 +148,6 @@ def track_chart(found: Json) -> Chart | None:
     track, runs = found.get("track") or {}, found.get("runs") or []
     if not runs or not track.get("x"):
         return None
-    labels = [f"{i}, {gait}" for i, gait in enumerate(track["gaits"])]
     closed_x, closed_z = [*track["x"], track["x"][0]], [*track["z"], track["z"][0]]
     traces = [line_trace("track", closed_x, closed_z, "@faint", dash="dash", width=1.2, hoverinfo="skip")]
     for run in runs:
@@ -158,28 +155,25 @@ def track_chart(found: Json) -> Chart | None:
         shown = {"legendgroup": "runs", "showlegend": run is runs[0]}
         traces.append(line_trace(name, run["x"], run["z"], "@accent", width=1.5, hoverinfo="skip", **shown))
     places = [
-        (x, z, cm, run["lap"])
+        (x, z, [cm, run["lap"]])
         for run in runs
         for x, z, cm in zip(run["x"], run["z"], run["off_cm"], strict=True)
     ]
-    off_track = [place for place in places if place[2] > OFF_TRACK]
+    off_track = [place for place in places if place[2][0] > OFF_TRACK]
     if off_track:
-        traces.append(_off_track_markers(off_track))
-    traces.append(
-        {
-            "type": "scatter",
-            "mode": "markers+text",
-            "name": "waypoints",
-            "x": track["x"],
-            "y": track["z"],
-            "text": labels,
-            "textposition": "top center",
-            "textfont": {"size": 11, "color": "@soft"},
-            "marker": {"symbol": "circle-open", "size": 12, "color": "@ink"},
-            "hoverinfo": "skip",
-        }
-    )
-    largest = max(place[2] for place in places)
+        x, z, cm_and_lap = map(list, zip(*off_track, strict=True))
+        hover = "lap %{customdata[1]}: %{customdata[0]:.0f} cm off<extra></extra>"
+        red, name = {"size": 6, "color": "@hurt-high"}, f"more than {OFF_TRACK:.0f} cm off"
+        traces.append(marker_trace(name, x, z, red, customdata=cm_and_lap, hovertemplate=hover))
+    circle = {"symbol": "circle-open", "size": 12, "color": "@ink"}
+    labels = {
+        "mode": "markers+text",
+        "text": [f"{i}, {gait}" for i, gait in enumerate(track["gaits"])],
+        "textposition": "top center",
+        "textfont": {"size": 11, "color": "@soft"},
+    }
+    traces.append(marker_trace("waypoints", track["x"], track["z"], circle, hoverinfo="skip", **labels))
+    largest = max(place[2][0] for place in places)
     where = f"Places more than {OFF_TRACK:.0f} cm from the track are red. " if off_track else ""
     return Chart(
         "track",
@@ -197,43 +191,16 @@ def track_chart(found: Json) -> Chart | None:
     )
 
 
-def _off_track_markers(places: list[tuple[float, float, float, int]]) -> Trace:
-    """Markers at places far from the track. places: (x and z in m, distance from the track in cm, lap)."""
-    return {
-        "type": "scatter",
-        "mode": "markers",
-        "name": f"more than {OFF_TRACK:.0f} cm off",
-        "x": [x for x, *_ in places],
-        "y": [z for _, z, *_ in places],
-        "customdata": [[cm, lap] for *_, cm, lap in places],
-        "marker": {"size": 6, "color": "@hurt-high"},
-        "hovertemplate": "lap %{customdata[1]}: %{customdata[0]:.0f} cm off<extra></extra>",
-    }
-
-
 def _lap_bars(laps: Sequence[Json]) -> list[Trace]:
     """Stacked bars of the steps' mean times in each lap of a phase mode, and diamonds at the medians."""
     numbers, hover = [lap["lap"] for lap in laps], "lap %{x}: %{y:.3f} ms<extra>%{fullData.name}</extra>"
-    common = {"x": numbers, "hovertemplate": hover}
-    bars: list[Trace] = [
-        {
-            "type": "bar",
-            "name": step,
-            "y": [lap["milliseconds"][step] for lap in laps],
-            "marker": {"color": colour},
-            **common,
-        }
+    bars = [
+        bar_trace(step, numbers, [lap["milliseconds"][step] for lap in laps], colour, hover)
         for step, colour in STEPS.items()
     ]
-    dots: Trace = {
-        "type": "scatter",
-        "mode": "markers",
-        "name": "median",
-        "y": [lap["milliseconds"]["spread"]["median"] for lap in laps],
-        "marker": {"symbol": "diamond", "size": 8, "color": "@ink"},
-        **common,
-    }
-    return [*bars, dots]
+    medians = [lap["milliseconds"]["spread"]["median"] for lap in laps]
+    diamond = {"symbol": "diamond", "size": 8, "color": "@ink"}
+    return [*bars, marker_trace("median", numbers, medians, diamond, hovertemplate=hover)]
 
 
 FEWEST_STEPS = 10  # if the character takes fewer steps, the mean foot slide is not shown
@@ -264,7 +231,7 @@ def section(found: Json, material: ReportMaterial) -> PageSection:
         "speed",
         [
             SectionPart(0, Paragraph(TRACK) if figures_of_track else None),
-            SectionPart(10, KeyFigures(figures_of_track) if figures_of_track else None),
+            SectionPart(10, KeyFigures(figures_of_track)),
             SectionPart(15, track_chart(found)),
             SectionPart(20, lap_chart(found, material)),
             SectionPart(30, speed_table(found, material), open=True, short=True),
@@ -295,25 +262,20 @@ def hints(found: Json, material: ReportMaterial) -> Iterator[Hint]:
     yield from with_order(40, _track_hints(found))
 
 
-def lap_table(found: Json, name: str) -> Table | None:
+def lap_table(found: Json, name: str) -> Table:
     """A row per lap: how it went, the mean time of each step of a frame, and the median time of a frame."""
-    laps = found.get("laps")
-    if not laps:
-        return None
+    laps = found.get("laps") or [{}]
     columns = {key: column for key, column in LAP_COLUMNS.items() if key in laps[0]}
-    rows = [
-        [
-            *(
-                None if key == "foot_slide_cm" and lap["steps"] < FEWEST_STEPS else lap[key]
-                for key in columns
-            ),
-            *(lap["milliseconds"][step] for step in STEPS),
-            lap["milliseconds"]["spread"]["median"],
-        ]
-        for lap in laps
+    columns |= {step: Column.number(f"{step}, mean ms") for step in STEPS}
+    columns["median"] = Column.number("whole frame, median ms")
+    records = [
+        lap
+        | {step: lap["milliseconds"][step] for step in STEPS}
+        | {"median": lap["milliseconds"]["spread"]["median"]}
+        | ({"foot_slide_cm": None} if lap["steps"] < FEWEST_STEPS else {})
+        for lap in found.get("laps", ())
     ]
-    heads = [*columns.values(), *(Column.number(f"{step}, mean ms") for step in STEPS)]
-    return Table(f"{name}-responsivity", [*heads, Column.number("whole frame, median ms")], rows)
+    return Table.of(f"{name}-responsivity", columns, records)
 
 
 def track_figures(found: Json) -> list[KeyFigure]:
@@ -476,21 +438,19 @@ def time_differences(all_measured: Sequence[ConfigurationResults]) -> list[dict[
 
     The difference is computed by eq. 3.2 of Segerstedt (2021), see `pair`.
     """
-    out: list[dict[str, Any]] = []
-    for a, b in combinations(all_measured, 2):
-        entries_of_b = {entry["mode"]: entry for entry in mode_entries(b)}
-        for entry in mode_entries(a):
-            if entry["mode"] in entries_of_b:
-                times = [
-                    {
-                        "mean": e["milliseconds"]["total"],
-                        "sd": e["milliseconds"]["spread"]["sd"],
-                        "means": lap_means(e),
-                    }
-                    for e in (entry, entries_of_b[entry["mode"]])
-                ]
-                out.append({"a": a.name, "b": b.name, "over": entry["mode"], **compare_series(*times)})
-    return out
+    series = {m.name: {e["mode"]: _time_series(e) for e in mode_entries(m)} for m in all_measured}
+    return [
+        {"a": a, "b": b, "over": mode, **compare_series(series[a][mode], series[b][mode])}
+        for a, b in combinations(series, 2)
+        for mode in series[a]
+        if mode in series[b]
+    ]
+
+
+def _time_series(entry: Json) -> Json:
+    """The times of a frame in one phase mode, as `compare_series` takes them."""
+    times = entry["milliseconds"]
+    return {"mean": times["total"], "sd": times["spread"]["sd"], "means": lap_means(entry)}
 
 
 def fit_lines(all_measured: Sequence[ConfigurationResults], published: Json) -> list[dict[str, Any]]:
@@ -498,49 +458,30 @@ def fit_lines(all_measured: Sequence[ConfigurationResults], published: Json) -> 
 
     computations: one of COUNTS. step: which time is fitted. "total" is the mean time of a whole frame; the
     published times are such means. "predict" is the mean time of the step `predict`. "median" is the median
-    time of a whole frame; other programs on the machine change it least. slope: milliseconds per computation.
-    Configurations with the same network are separate points. Networks without layers are left out.
+    time of a whole frame; other programs on the machine change it least. mode: None for published times.
+    slope: milliseconds per computation. Configurations with the same network are separate points. Networks
+    without layers are left out.
     """
-    out = []
-    entries = [
-        (m, entry) for m in all_measured if m.results_of(NAME)["parameters"] for entry in mode_entries(m)
-    ]
-    modes = list(dict.fromkeys(entry["mode"] for _, entry in entries))
-    for counts in COUNTS:
-        for mode in modes:
-            for step in ("total", "predict", "median"):
-                points = [
-                    (m.results_of(NAME)["parameters"][counts], _time(entry["milliseconds"], step))
-                    for m, entry in entries
-                    if entry["mode"] == mode
-                ]
-                out.append(_fit("hobble", mode, step, counts, points))
+    points: dict[tuple[str, str | None, str, str], list[tuple[int, float]]] = {}  # (computations, ms)
+    entries = [(m.results_of(NAME)["parameters"], entry) for m in all_measured for entry in mode_entries(m)]
+    entries = [(sizes, entry) for sizes, entry in entries if sizes]
+    modes = dict.fromkeys(entry["mode"] for _, entry in entries)
+    for counts, mode, step in product(COUNTS, modes, ("total", "predict", "median")):
+        points["hobble", mode, step, counts] = [
+            (sizes[counts], (e["milliseconds"]["spread"] if step == "median" else e["milliseconds"])[step])
+            for sizes, e in entries
+            if e["mode"] == mode
+        ]
     times = {row["configuration"]: row["milliseconds"] for row in published["responsivity"]}
     for counts, key in (("true", "parameters"), ("table_6_1_as_printed", "table_6_1")):
-        points = [
-            (row[key], times[row["configuration"]])
-            for row in published["computations"]
-            if row["configuration"] in times
-        ]
-        out.append(_fit("published", None, "total", counts, points))
-    return out
-
-
-def _time(milliseconds: Json, step: str) -> float:
-    """The time of a `step` of `fit_lines`, ms. milliseconds: the entry of that name in responsivity.json."""
-    return (milliseconds["spread"] if step == "median" else milliseconds)[step]
-
-
-def _fit(
-    whose: str, mode: str | None, step: str, counts: str, points: list[tuple[int, float]]
-) -> dict[str, Any]:
-    """The line through `points`: (computations, ms) of each configuration.
-
-    whose: "hobble" or "published". mode: None for published times. step, counts: see `fit_lines`.
-    """
-    x, y = [x for x, _ in points], [y for _, y in points]
-    head = {"whose": whose, "mode": mode, "step": step, "computations": counts}
-    return {**head, "x": x, "y": y, **fit_line(x, y)}
+        rows = [row for row in published["computations"] if row["configuration"] in times]
+        points["published", None, "total", counts] = [(r[key], times[r["configuration"]]) for r in rows]
+    keys = ("whose", "mode", "step", "computations")
+    return [
+        {**dict(zip(keys, head, strict=True)), "x": x, "y": y, **fit_line(x, y)}
+        for head, some in points.items()
+        for x, y in [([x for x, _ in some], [y for _, y in some])]
+    ]
 
 
 def lap_means(entry: Json) -> list[float]:
@@ -552,20 +493,14 @@ def _published_sizes(sizes_of: Mapping[str, Json], published: Json) -> list[dict
     """Published sizes of networks next to ours. sizes_of: configuration -> sizes of its network."""
     out = []
     for row in published["computations"]:
-        sizes = sizes_of.get(row["configuration"])
-        counts = sizes["computations"] if sizes else {}
-        in_table = {**row, "table": "6.1"}
-        out.append(
-            published_row(
-                "computations of Table 6.1", in_table, row["table_6_1"], counts.get("table_6_1_as_printed")
-            )
-        )
+        counts = sizes_of.get(row["configuration"], {}).get("computations", {})
+        printed, in_table = counts.get("table_6_1_as_printed"), {**row, "table": "6.1"}
+        out.append(published_row("computations of Table 6.1", in_table, row["table_6_1"], printed))
         out.append(published_row("parameters of a phase", row, row["parameters"], counts.get("true")))
     for row in published["stages"]:
         if row["stage"] == "training" and "bytes" in row:
-            sizes = sizes_of.get(row["configuration"])
             # The published weights are those of the constant mode, which stores the weights of 50 phases.
-            ours = sizes["weights_bytes"].get("constant") if sizes else None
+            ours = sizes_of.get(row["configuration"], {}).get("weights_bytes", {}).get("constant")
             out.append(published_row("weights of 50 phases", row, row["bytes"], ours, "bytes"))
     return out
 
@@ -671,27 +606,23 @@ def _bytes(compared: Compared) -> dict[str, float]:
     return {e["configuration"]: e["weights_bytes"][e["exact"]] for e in compared["configurations"]}
 
 
-def lap_lines(compared: Compared) -> Chart | None:
+def lap_lines(compared: Compared) -> Chart:
     """Milliseconds per frame, lap by lap, for each phase mode."""
     options: dict[str, list[Trace]] = {}
+    colours = configuration_colours(compared)
     # The cubic mode comes first, because the chart begins with the first option.
     for entry in sorted(compared["responsivity"], key=lambda entry: entry["mode"] != "cubic"):
         laps = [lap for lap in entry["laps"] if isinstance(lap.get("milliseconds"), dict)]
         x, y = [lap["lap"] for lap in laps], [lap["milliseconds"]["spread"]["median"] for lap in laps]
-        colour = configuration_colours(compared)[entry["configuration"]]
-        trace = line_trace(entry["configuration"], x, y, colour, mode="lines+markers")
+        name = entry["configuration"]
+        trace = line_trace(name, x, y, colours[name], mode="lines+markers")
         options.setdefault(f"{entry['mode']} phase", []).append(trace)
-    if not options:
-        return None
-    for traces in options.values():
-        for row in compared["published"]["responsivity"]:
-            if row["configuration"] in configuration_names(compared):
-                last_lap = max((max(t["x"], default=1) for t in traces), default=1)
-                colour = configuration_colours(compared)[row["configuration"]]
-                label = f"{row['label']}: published mean"
-                traces.append(
-                    line_trace(label, [1, last_lap], [row["milliseconds"]] * 2, colour, dash="dot", width=1.2)
-                )
+    published = [row for row in compared["published"]["responsivity"] if row["configuration"] in colours]
+    for traces, row in product(options.values(), published):
+        ends = [1, max((max(t["x"], default=1) for t in traces), default=1)]
+        label, mean = f"{row['label']}: published mean", [row["milliseconds"]] * 2
+        colour = colours[row["configuration"]]
+        traces.append(line_trace(label, ends, mean, colour, dash="dot", width=1.2))
     return Chart(
         "compare-laps",
         "Milliseconds per frame, lap by lap",

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from hobble.report.gather import ReportMaterial
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from functools import partial
 from typing import Annotated, Any
 
@@ -71,29 +71,12 @@ def sample_note(found: Json) -> str:
     return f" Measured on {words}. Whiskers are 95 % confidence intervals." if words else ""
 
 
-def _error_bars(found: Json, split: str) -> dict[str, Any]:
-    """Plotly error bars of the mean errors of a split: half widths of their 95 % confidence intervals."""
-    entries = [entry[split] for entry in found["lengths"]]
-    known = [entry for entry in entries if entry.get("position_error_cm") is not None]
-    half_widths = [(entry.get("interval") or {}).get("position_error_cm", 0.0) for entry in known]
-    return {"type": "data", "array": half_widths, "color": "@faint", "thickness": 1}
-
-
-def rollout_chart(found: Json) -> Chart | None:
+def rollout_chart(found: Json) -> Chart:
     """How the error grows when the network continues from its own poses."""
-    traces = []
-    for split in ("held_out", "train"):
-        rows = [
-            (entry["length"], entry[split]["position_error_cm"])
-            for entry in found.get("lengths", ())
-            if (entry.get(split) or {}).get("position_error_cm") is not None
-        ]
-        if rows:
-            x, y = zip(*rows, strict=True)
-            error_bars = {"error_y": _error_bars(found, split)} if found.get("sample") else {}
-            traces.append(line_trace(NAMES[split], x, y, COLOURS[split], mode="lines+markers", **error_bars))
-    if not traces:
-        return None
+    traces: list[Trace] = []
+    for split, name in NAMES.items():
+        sampled = bool(found.get("sample"))
+        traces += _error_line(name, found.get("lengths", ()), split, COLOURS[split], sampled)
     return Chart(
         "rollouts",
         "Error when the network continues from its own poses",
@@ -105,10 +88,7 @@ def rollout_chart(found: Json) -> Chart | None:
         "predicted position, so their error differs from the value at 1 frame in this chart."
         + sample_note(found),
         traces,
-        {
-            "xaxis": log_axis("frames", [x for trace in traces for x in trace["x"]]),
-            "yaxis": axis("cm per joint", rangemode="tozero"),
-        },
+        _layout(traces),
     )
 
 
@@ -170,33 +150,41 @@ def _distance_words(ending: str, name: str, value: float) -> str:
     return f"the joints of {name} are {format_number(value, 3)} {ending}"
 
 
-def compared_chart(compared: Compared) -> Chart | None:
+def compared_chart(compared: Compared) -> Chart:
     """How the error grows when the networks continue from their own poses."""
     options: dict[str, list[Trace]] = {}
     for split, label in SPLIT_LABELS.items():
-        traces = []
         for name, colour in configuration_colours(compared).items():
             rows = [r for r in compared.get("rollouts", ()) if r["configuration"] == name]
-            rows = [r for r in rows if (r[split] or {}).get("position_error_cm") is not None]
-            if rows:
-                x = [row["length"] for row in rows]
-                y = [row[split]["position_error_cm"] for row in rows]
-                traces.append(line_trace(name, x, y, colour, mode="lines+markers"))
-        if traces:
-            options[label] = traces
-    if not options:
-        return None
+            if line := _error_line(name, rows, split, colour, bars=False):
+                options[label] = options.get(label, []) + line
     return Chart(
         "compare-rollouts",
         "Error when a network continues from its own poses",
         "Mean distance between a joint and its captured position. In a roll-out, a network continues from "
         "its own poses. The horizontal axis shows the length of the roll-outs (60 frames are one second).",
-        layout={
-            "xaxis": log_axis(
-                "frames", [x for traces in options.values() for trace in traces for x in trace["x"]]
-            ),
-            "yaxis": axis("cm per joint", rangemode="tozero"),
-        },
+        layout=_layout(trace for traces in options.values() for trace in traces),
         choose="Clips",
         options=options,
     )
+
+
+def _error_line(name: str, entries: Iterable[Json], split: str, colour: str, bars: bool) -> list[Trace]:
+    """The line of the mean error of a split over the length of roll-outs; [] if none was measured.
+
+    entries: one for each length. bars: whether to draw the half widths of 95 % confidence intervals.
+    """
+    known = [entry for entry in entries if (entry.get(split) or {}).get("position_error_cm") is not None]
+    if not known:
+        return []
+    x, y = [entry["length"] for entry in known], [entry[split]["position_error_cm"] for entry in known]
+    widths = [(entry[split].get("interval") or {}).get("position_error_cm", 0.0) for entry in known]
+    style = {"error_y": {"type": "data", "array": widths, "color": "@faint", "thickness": 1}} if bars else {}
+    return [line_trace(name, x, y, colour, mode="lines+markers", **style)]
+
+
+def _layout(traces: Iterable[Trace]) -> dict[str, Any]:
+    return {
+        "xaxis": log_axis("frames", [x for trace in traces for x in trace["x"]]),
+        "yaxis": axis("cm per joint", rangemode="tozero"),
+    }

@@ -190,6 +190,12 @@ def bar_trace(name: str, x: Sequence, y: Sequence, colour: str, hover: str) -> T
     return trace | {"marker": {"color": colour}, "hovertemplate": hover}
 
 
+def marker_trace(name: str, x: Sequence, y: Sequence, marker: Mapping[str, Any], **more: Any) -> Trace:
+    """The trace of a marker at each point x, y. more: further settings of the trace."""
+    points = {"type": "scatter", "mode": "markers", "name": name, "x": list(x), "y": list(y)}
+    return points | {"marker": dict(marker)} | more
+
+
 def log_range(values: Iterable[float]) -> list[float]:
     """The two ends of a logarithmic axis for `values`, as exponents of ten.
 
@@ -200,21 +206,18 @@ def log_range(values: Iterable[float]) -> list[float]:
     return [math.floor(min(powers)), max(powers) + 0.4 * (max(powers) - math.floor(min(powers)) + 1)]
 
 
-def reference_line(
-    value: float, text: str, vertical: bool = True, colour: str = "@soft"
-) -> tuple[dict, dict]:
-    """A dotted line across the whole plot at `value`, with a text at its end.
+def reference_line(value: float, text: str, vertical: bool = True) -> dict[str, list[dict]]:
+    """What a layout needs for a dotted line across the whole plot at `value`, with a text at its end.
 
     vertical: whether the line is vertical. `value` is on the x axis for a vertical line, otherwise on the y
-    axis. Returns the line as a plotly shape and the text as a plotly annotation.
+    axis.
     """
-    dotted = {"type": "line", "line": {"color": colour, "width": 1, "dash": "dot"}}
-    note = {"text": text, "showarrow": False, "font": {"size": 11, "color": colour}}
-    if vertical:
-        shape = {**dotted, "x0": value, "x1": value, "yref": "paper", "y0": 0, "y1": 1}
-        return shape, {**note, "x": value, "yref": "paper", "y": 1, "yanchor": "bottom"}
-    shape = {**dotted, "y0": value, "y1": value, "xref": "paper", "x0": 0, "x1": 1}
-    return shape, {**note, "y": value, "xref": "paper", "x": 1, "xanchor": "right", "yanchor": "bottom"}
+    a, b = "xy" if vertical else "yx"
+    end = {"yanchor": "bottom"} if vertical else {"xanchor": "right", "yanchor": "bottom"}
+    shape = {"type": "line", "line": {"color": "@soft", "width": 1, "dash": "dot"}}
+    shape |= {f"{a}0": value, f"{a}1": value, f"{b}ref": "paper", f"{b}0": 0, f"{b}1": 1}
+    note = {"text": text, "showarrow": False, "font": {"size": 11, "color": "@soft"}}
+    return {"shapes": [shape], "annotations": [{**note, a: value, f"{b}ref": "paper", b: 1, **end}]}
 
 
 @dataclass(frozen=True)
@@ -452,15 +455,15 @@ class PageSection:
 def join_sections(sections: Iterable[PageSection]) -> list[PageSection]:
     """The sections of a page, in order. Sections of the same name become one; empty sections are left out.
 
-    A joined section has the parts of all its sections. Its other fields are those of its first section that
-    has a title.
+    A joined section has the parts of all its sections, except those that show nothing. Its other fields are
+    those of its first section that has a title.
     """
     by_name: dict[str, list[PageSection]] = {}
     for section in sections:
         by_name.setdefault(section.name, []).append(section)
     out = []
     for name, same_name in by_name.items():
-        parts = [p for s in same_name for p in s.parts if p.content is not None and _has_charts(p.content)]
+        parts = [p for s in same_name for p in s.parts if shows_something(p.content)]
         parts.sort(key=lambda part: part.order)
         titled = next((s for s in same_name if s.title), same_name[0])
         title = titled.title or name.replace("_", " ").capitalize()
@@ -469,9 +472,13 @@ def join_sections(sections: Iterable[PageSection]) -> list[PageSection]:
     return sorted(out, key=lambda section: section.order)
 
 
-def _has_charts(content: Content) -> bool:
-    """False for a pair or group of charts without any chart."""
-    return any(getattr(content, "charts", (True,)))
+def shows_something(content: Content | None) -> bool:
+    """False for None, a chart without traces, a table without rows, and a group or row without members."""
+    if isinstance(content, Chart):
+        return bool(content.traces or content.options)
+    if isinstance(content, Table | KeyFigures):
+        return bool(content.rows if isinstance(content, Table) else content.figures)
+    return content is not None and any(getattr(content, "charts", (True,)))
 
 
 Compared = Mapping[str, Any]  # the content of compare.json
@@ -493,9 +500,25 @@ def configuration_colours(compared: Compared) -> dict[str, str]:
 
 def dot_trace(name: str, x: Sequence, y: Sequence, colour: str, hover: str) -> Trace:
     """A dot at each point x, y. name: the configuration. hover: template of the text at a dot."""
-    trace: Trace = {"type": "scatter", "mode": "markers", "name": name, "x": list(x), "y": list(y)}
     marker = {"color": colour, "size": 9, "opacity": 0.85}
-    return trace | {"marker": marker, "hovertemplate": f"{hover}<extra>%{{fullData.name}}</extra>"}
+    return marker_trace(name, x, y, marker, hovertemplate=f"{hover}<extra>%{{fullData.name}}</extra>")
+
+
+def heatmap(
+    x: Sequence[str], y: Sequence[str], z: Sequence[Sequence[float | None]], hover: str, **more: Any
+) -> Trace:
+    """A trace with a cell for each pair of names; the larger its value, the darker.
+
+    z: a row of values for each item of y. hover: template of the text at a cell. more: further settings.
+    """
+    scale = {"colorscale": [[0, "@sunken"], [1, "@accent"]], "zmin": 0, "showscale": False}
+    cells = {"type": "heatmap", "x": x, "y": y, "z": z, "xgap": 2, "ygap": 2, "hovertemplate": hover}
+    return {**cells, **scale, **more}
+
+
+def ordered_axis(names: Iterable[str], **more: Any) -> dict[str, Any]:
+    """An axis with a row for each of `names`, from the bottom. more: further settings of the axis."""
+    return {"categoryorder": "array", "categoryarray": list(names), "automargin": True, **more}
 
 
 @dataclass(frozen=True)
