@@ -205,10 +205,8 @@ def test_accuracy_and_roll_outs_count_each_clip_for_its_kind(tmp_path, clips):
     )
     assert entry["ended"] == sum(c["ended"] for c in entries[:5])
     chart = rollout_chart(rolled)
-    assert chart is not None
     assert len(chart.traces[0]["error_y"]["array"]) == 2
     plain = rollout_chart(every_roll_out)
-    assert plain is not None
     assert "error_y" not in plain.traces[0]
 
 

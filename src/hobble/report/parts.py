@@ -214,7 +214,7 @@ def reference_line(value: float, text: str, vertical: bool = True) -> dict[str, 
     """
     a, b = "xy" if vertical else "yx"
     end = {"yanchor": "bottom"} if vertical else {"xanchor": "right", "yanchor": "bottom"}
-    shape = {"type": "line", "line": {"color": "@soft", "width": 1, "dash": "dot"}}
+    shape: dict[str, Any] = {"type": "line", "line": {"color": "@soft", "width": 1, "dash": "dot"}}
     shape |= {f"{a}0": value, f"{a}1": value, f"{b}ref": "paper", f"{b}0": 0, f"{b}1": 1}
     note = {"text": text, "showarrow": False, "font": {"size": 11, "color": "@soft"}}
     return {"shapes": [shape], "annotations": [{**note, a: value, f"{b}ref": "paper", b: 1, **end}]}
