@@ -16,12 +16,8 @@ from hobble.motion.skeleton_file import load_skeleton
 def test_a_clip_on_the_target_skeleton_is_unchanged(walk, bvh, make):
     clip, report = make(bvh(walk))
     assert report["repairs"] == []
-    assert (report["unit"], report["up"], report["source_fps"], report["source_frames"]) == (
-        1.0,
-        "+Y",
-        120.0,
-        241,
-    )
+    said = {"unit": 1.0, "up": "+Y", "source_fps": 120.0, "source_frames": 241}
+    assert {key: report[key] for key in said} == said
     assert (clip.fps, len(clip), report["frames"]) == (60.0, 121, 121)
     assert quat.angle(clip.rotations, walk.rotations[::2]).max() < 1e-6
     np.testing.assert_allclose(clip.root, walk.root[::2], atol=1e-6)
@@ -44,25 +40,18 @@ def test_the_unit_is_found_from_the_legs(walk, bvh, make, scaled, factor, unit):
     np.testing.assert_allclose(clip.positions, walk.positions[::2], atol=2e-3 if factor < 1 else 1e-4)
 
 
-def test_the_unit_can_be_set(walk, bvh, make):
+def test_the_unit_can_be_set_and_has_to_be_for_a_rig_of_no_known_size(walk, bvh, make, scaled):
     clip, report = make(bvh(walk), unit=2.0, proportions="clip")
     assert report["unit"] == 2.0
     np.testing.assert_allclose(clip.positions, 2 * walk.positions[::2], atol=1e-3)
-
-
-def test_a_rig_of_no_known_size_is_refused(walk, bvh, make, scaled):
-    with pytest.raises(
-        InputError, match=r"walk.bvh: no unit gives this rig a person's size.*Set motion.unit"
-    ):
+    with pytest.raises(InputError, match=r"walk.bvh: no unit gives .* a person's size.*Set motion.unit"):
         make(bvh(scaled(walk, 500.0)))
 
 
 @pytest.mark.parametrize("proportions", ["skeleton", "clip"])
 def test_a_leg_of_length_0_is_refused(walk, bvh, make, proportions):
     path = bvh(walk, edit=lambda s: re.sub(r"(JOINT RightLeg\s*\{\s*OFFSET).*", r"\1 0 0 0", s))
-    with pytest.raises(
-        InputError, match=r"walk.bvh: the bone from RightUpLeg to RightLeg has no length. Check"
-    ):
+    with pytest.raises(InputError, match=r"walk.bvh: the bone from RightUpLeg to RightLeg has no length"):
         make(path, proportions=proportions)
 
 

@@ -42,19 +42,14 @@ def on_a_curve(walk: Clip) -> Clip:
 
 
 @pytest.mark.parametrize(
-    ("factor", "said"), [(2.54, r"2\.\d+ times"), (1 / 2.54, r"0\.\d+ times"), (100, "1.. times")]
+    ("factor", "said"),
+    [(2.54, r"2\.\d+"), (1 / 2.54, r"0\.\d+"), (100, "1.."), (0.7, r"0\.[67]\d"), (1.3, r"1\.[234]\d")],
 )
 def test_a_root_in_another_unit_than_the_bones_is_refused(bvh, walk, make, factor, said):
     path = bvh(walk, "other", edit=root(factor))
-    with pytest.raises(InputError, match=rf"other.bvh: the hips go .*{said} as fast .*OFFSETs"):
+    with pytest.raises(InputError, match=rf"other.bvh: the hips go .*{said} times as fast .*OFFSETs"):
         make(path)
     make(path, defects="leave")
-
-
-@pytest.mark.parametrize(("factor", "said"), [(0.7, r"0\.[67]\d"), (1.3, r"1\.[234]\d")])
-def test_a_root_that_goes_a_third_too_far_is_refused(bvh, walk, make, factor, said):
-    with pytest.raises(InputError, match=f"the hips go {said} times as fast"):
-        make(bvh(walk, "other", edit=root(factor)))
 
 
 @pytest.mark.parametrize("factor", [0.95, 1.0, 1.08])
@@ -79,33 +74,45 @@ def test_rotation_channels_in_a_wrong_order_are_refused(bvh, walk, make, order, 
     make(path, defects="leave")
 
 
-def test_a_foot_that_stands_seldom_is_noted(bvh, walk, make):
+def shaking(walk: Clip) -> Clip:
     rng = np.random.default_rng(1)
     noise = gaussian_filter1d(rng.normal(size=walk.rotations.shape), 3, axis=0) * 0.03
-    made = make(bvh(replace(walk, rotations=quat.normalize(walk.rotations + noise)), "noise"))
-    assert "in which the hips go, which is less" in made[1]["unsure"][0]
+    return replace(walk, rotations=quat.normalize(walk.rotations + noise))
 
 
-def test_walking_in_place_is_noted(bvh, walk, make):
-    path = bvh(replace(walk, root=walk.root * [0, 1, 0]), "still")
-    assert "stay in place" in make(path)[1]["unsure"][0]
+def standing(walk: Clip) -> Clip:
+    return replace(
+        walk, rotations=walk.rotations[:1] + 0 * walk.rotations, root=walk.root[:1] + 0 * walk.root
+    )
 
 
-def test_a_standing_figure_gets_no_note(bvh, walk, make):
-    still = replace(walk, rotations=np.repeat(walk.rotations[:1], len(walk), axis=0))
-    assert make(bvh(replace(still, root=walk.root[:1] + 0 * walk.root), "stands"))[1]["unsure"] == []
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (shaking, ["in which the hips go, which is less"]),
+        (lambda walk: replace(walk, root=walk.root * [0, 1, 0]), ["stay in place"]),
+        (standing, []),
+    ],
+)
+def test_feet_that_seldom_stand_and_a_walk_in_place_are_noted(bvh, walk, make, change, said):
+    unsure = make(bvh(change(walk)))[1]["unsure"]
+    assert bool(unsure) == bool(said)
+    assert all(part in unsure[0] for part in said)
 
 
-def test_angles_in_radians_are_refused(bvh, walk, make):
-    radians = of_values(lambda values: np.concatenate([values[:, :3], np.radians(values[:, 3:])], axis=1))
-    with pytest.raises(InputError, match=r"no angle is larger than .*radians"):
-        make(bvh(walk, "radians", edit=radians))
+def in_radians(text: str) -> str:
+    return of_values(lambda rows: np.concatenate([rows[:, :3], np.radians(rows[:, 3:])], axis=1))(text)
 
 
-def test_a_file_of_positions_alone_is_refused(bvh, walk, make):
-    def positions(text: str) -> str:
-        text = of_values(lambda values: np.tile(values[:, :3], len(walk.skeleton.joints)))(text)
-        return re.sub(r"CHANNELS .*", "CHANNELS 3 Xposition Yposition Zposition", text)
+def positions_alone(text: str) -> str:
+    text = of_values(lambda rows: np.tile(rows[:, :3], 31))(text)
+    return re.sub(r"CHANNELS .*", "CHANNELS 3 Xposition Yposition Zposition", text)
 
-    with pytest.raises(InputError, match="no joint has rotations"):
-        make(bvh(walk, "points", edit=positions))
+
+@pytest.mark.parametrize(
+    ("edit", "said"),
+    [(in_radians, "no angle is larger than .*radians"), (positions_alone, "no joint has rotations")],
+)
+def test_channels_without_angles_in_degrees_are_refused(bvh, walk, make, edit, said):
+    with pytest.raises(InputError, match=said):
+        make(bvh(walk, edit=edit))

@@ -52,12 +52,8 @@ def replaced(old: str, new: str):
 @pytest.mark.parametrize(
     ("edit", "line", "problem"),
     [
-        (
-            swapped("elbow", "wrist"),
-            "left_wrist",
-            "LowerArm_L, which does not hang from Hand_L, the left_elbow",
-        ),
-        (swapped("hip", "knee"), "left_knee", "left_knee is UpperLeg_L, which does not hang from LowerLeg_L"),
+        (swapped("elbow", "wrist"), "left_wrist", "which does not hang from Hand_L, the left_elbow"),
+        (swapped("hip", "knee"), "left_knee", "UpperLeg_L, which does not hang from LowerLeg_L"),
         (swapped("heel", "toe"), "left_toe", "left_toe is Foot_L, which does not hang from Toes_L"),
         (knees_crossed, "left_knee", "LowerLeg_R, which does not hang from UpperLeg_L, the left_hip"),
         (sides_swapped, "left_shoulder", "left_shoulder is UpperArm_R, whose name says right"),
