@@ -62,7 +62,6 @@ def same_network(one: Path, other: Path) -> bool:
     ("number", "to_all"),
     [
         pytest.param(signal.SIGINT, True, id="Ctrl-C"),
-        pytest.param(signal.SIGINT, False, id="SIGINT", marks=pytest.mark.slow),
         pytest.param(signal.SIGTERM, False, id="SIGTERM", marks=pytest.mark.slow),
     ],
 )
@@ -84,10 +83,11 @@ def test_a_signal_ends_all_jobs_and_leaves_no_lock(
 
 
 @pytest.mark.slow
-def test_a_training_ends_soon_after_the_snakemake_that_was_killed(finished, copied) -> None:
+@pytest.mark.parametrize("with_jobs", [False, True], ids=["snakemake", "snakemake and its jobs"])
+def test_a_training_ends_soon_after_the_snakemake_that_was_killed(finished, copied, with_jobs: bool) -> None:
     process = started(copied, "-c2", WEIGHTS, until=without_network(copied))
     jobs = jobs_of(process)
-    process.kill()
+    (os.killpg if with_jobs else os.kill)(process.pid, signal.SIGKILL)
     assert ended(jobs, within=5)
     process.wait()
     copied.run("-c2", WEIGHTS)
