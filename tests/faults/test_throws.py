@@ -49,7 +49,7 @@ def test_no_fault_during_a_job_damages_a_result(lab: Lab, throw, times: int) -> 
 
 
 @pytest.mark.parametrize(
-    "rule", ["motion_clips", "labels_clips", "channel_clips", "terrain_fits", "database_clips"]
+    "rule", ["hurt_clips", "labels_clips", "channel_clips", "terrain_fits", "database_clips"]
 )
 def test_a_damaged_input_is_refused_or_harmless(lab: Lab, rule: str) -> None:
     thrown = [throws.harm(lab, Random(f"{SEED}-{number}"), rule) for number in range(8)]
