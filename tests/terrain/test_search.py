@@ -10,8 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hobble.terrain.heightmaps import TerrainMap
-from hobble.terrain.kernels import FootPoints, best_patches, patch_errors
-from hobble.terrain.patches import Patches, draw_patches
+from hobble.terrain.patches import FootPoints, Patches, best_patches, draw_patches, patch_errors
 
 CELL = 3.937007874
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from hobble.core.clip import Clip
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
-from hobble.terrain.patches import Patches
+from hobble.terrain.patches import FootPoints, Patches, best_patches
 
 Mask = NDArray[np.bool_]
 
@@ -312,10 +312,6 @@ def fit_cycle(
     regularisation of the surfaces that are added. deepest: how far a foot may be below the ground, cm; None:
     no limit.
     """
-    from hobble.terrain.kernels import (  # here, because it loads compiled code, which flat clips do not need
-        FootPoints,
-        best_patches,
-    )
 
     where, height = soles[..., [0, 2]], soles[..., 1]
     centre, level = where[contacts].mean(axis=0), height[contacts].mean()
