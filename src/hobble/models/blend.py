@@ -22,14 +22,14 @@ from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 from hobble.models.forward import forward
 from hobble.models.load import read_layers
-from hobble.models.model import LayerMirror, Trainable, TrainedOptions, TrainingStep
-from hobble.models.network import Export, Network, pack_layer, standardise_inputs
+from hobble.models.model import Blend, LayerMirror, TrainedOptions, TrainingStep
+from hobble.models.network import Export, pack_layer, standardise_inputs
+from hobble.models.onnx_file import Graph, Node, OnnxNetwork, add_layers, write_checked
 from hobble.rows.layout import ColumnMirror, RowLayout
 
 if TYPE_CHECKING:
     from torch import Tensor
 
-    from hobble.models.onnx_file import Graph, Node
     from hobble.models.predict import BlendPredictor, Shares
 
 
@@ -69,7 +69,7 @@ class BlendedOptions(TrainedOptions):
 
 
 @dataclass(frozen=True)
-class BlendedNetwork(Network):
+class BlendedNetwork(OnnxNetwork):
     """A blended stack, read from a file.
 
     weights: (K, out, in) float32 for each layer. biases: (K, out) float32 for each layer.
@@ -105,6 +105,12 @@ class BlendedNetwork(Network):
     def onnx_extended(self, g: Graph, z: Node) -> Node:
         """`extended` in an ONNX graph."""
         return z
+
+    def onnx_outputs(self, g: Graph, z: Node, mode: str) -> Node:
+        """As in `OnnxNetwork`."""
+        weights, biases, _ = self.prepare(mode)
+        index, share = self.onnx_shares(g, z, mode)
+        return add_layers(g, weights, biases, self.onnx_extended(g, z), share, index)
 
     @classmethod
     def read(cls, path: str | Path, arrays: Mapping[str, Any], shared_fields: Mapping[str, Any]) -> Self:
@@ -161,8 +167,6 @@ class BlendedNetwork(Network):
         """As in `Network`: the format "onnx"."""
 
         def write_onnx(target: Path, mode: str) -> str:
-            from hobble.models.onnx_file import write_checked
-
             difference = write_checked(target, self, mode)
             return f"{target}: differs from Hobble's runtime by at most {difference:.1g}"
 
@@ -175,7 +179,7 @@ class BlendedNetwork(Network):
 
 
 @dataclass(frozen=True)
-class TrainableBlend(Trainable):
+class TrainableBlend(Blend):
     """A blended stack in training. Its first layers are those of the gate, if it has one.
 
     units: units of each layer, the columns of X first. sets: K.
@@ -186,16 +190,8 @@ class TrainableBlend(Trainable):
     units: tuple[int, ...]
     sets: int
 
-    @abstractmethod
-    def shares(self, gate: list[Tensor], x: Tensor, p: Tensor, masks: list[Tensor] | None) -> Tensor:
-        """(B, K): the share of each set, for x (B, X) at phases p (B,).
-
-        gate: the layers of the gate. masks: their dropout masks, None without dropout. If there is a gate,
-        PyTorch has to be able to differentiate the shares.
-        """
-
     def extended(self, x: Tensor, p: Tensor) -> Tensor:
-        """The inputs of the first layer, (B, X + extra_inputs), for x (B, X) at phases p (B,)."""
+        """As in `Blend`."""
         return x
 
     @property
@@ -212,7 +208,7 @@ class TrainableBlend(Trainable):
 
     @property
     def gate_layers(self) -> int:
-        """The number of layers of the gate."""
+        """As in `Blend`."""
         return max(len(self.gate_units) - 1, 0)
 
     @property

@@ -234,3 +234,24 @@ class Trainable(ABC):
             bound = (6.0 / (inputs * outputs)) ** 0.5
             layer[:, :, :-1] = layer.new_tensor(generator.uniform(-bound, bound, (outputs, sets, inputs)))
         return self
+
+
+class Blend(Trainable):
+    """What the training steps of blended stacks need of the network (`hobble.models.step`)."""
+
+    @property
+    @abstractmethod
+    def gate_layers(self) -> int:
+        """The number of layers of the gate. They come first in `layers`."""
+
+    @abstractmethod
+    def shares(self, gate: list[Tensor], x: Tensor, p: Tensor, masks: list[Tensor] | None) -> Tensor:
+        """(B, K): the share of each set, for x (B, X) at phases p (B,).
+
+        gate: the layers of the gate. masks: their dropout masks, None without dropout. If there is a gate,
+        PyTorch has to be able to differentiate the shares.
+        """
+
+    @abstractmethod
+    def extended(self, x: Tensor, p: Tensor) -> Tensor:
+        """The inputs of the first layer, (B, X + extra inputs), for x (B, X) at phases p (B,)."""

@@ -9,18 +9,16 @@ too, so that all files are called in the same way. Only this module needs the on
 from __future__ import annotations
 
 import json
+from abc import abstractmethod
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from hobble.core.errors import HobbleError, InputError
 from hobble.core.files import atomic_path
 from hobble.core.quat import Array
-from hobble.models.network import inverse_or_0
-
-if TYPE_CHECKING:
-    from hobble.models.blend import BlendedNetwork
+from hobble.models.network import Network, inverse_or_0
 
 OPSET = 15  # version of the ONNX operators
 # Largest allowed difference from Hobble's runtime, in units of Y; relative for values above 1.
@@ -117,7 +115,15 @@ def add_layers(
     return h
 
 
-def export(path: str | Path, network: BlendedNetwork, mode: str) -> None:
+class OnnxNetwork(Network):
+    """A network that can be written as an ONNX file."""
+
+    @abstractmethod
+    def onnx_outputs(self, g: Graph, z: Node, mode: str) -> Node:
+        """Add the nodes that find the standardised outputs to a graph. z: the standardised inputs."""
+
+
+def export(path: str | Path, network: OnnxNetwork, mode: str) -> None:
     """Write the network, with a metadata entry `hobble` that describes columns, skeleton and channels.
 
     Raises HobbleError if onnx is not installed, ValueError for an unknown mode.
@@ -128,11 +134,8 @@ def export(path: str | Path, network: BlendedNetwork, mode: str) -> None:
     except ImportError as error:
         raise HobbleError('onnx is not installed: pip install "hobble[onnx]"') from error
     g = Graph()
-    weights, biases, _ = network.prepare(mode)
     z = (g.named("x") - network.x_mean) * inverse_or_0(network.x_std)
-    index, share = network.onnx_shares(g, z, mode)
-    h = add_layers(g, weights, biases, network.onnx_extended(g, z), share, index)
-    g("Add", h * network.y_std, network.y_mean, output="y")
+    g("Add", network.onnx_outputs(g, z, mode) * network.y_std, network.y_mean, output="y")
     x, phase, y = (
         helper.make_tensor_value_info(name, TensorProto.FLOAT, ["batch", *sizes])
         for name, sizes in (("x", [len(network.x_mean)]), ("phase", []), ("y", [len(network.y_mean)]))
@@ -150,7 +153,7 @@ def export(path: str | Path, network: BlendedNetwork, mode: str) -> None:
         temporary.write_bytes(model.SerializeToString(deterministic=True))
 
 
-def check(path: str | Path, network: BlendedNetwork, mode: str) -> float:
+def check(path: str | Path, network: OnnxNetwork, mode: str) -> float:
     """Run the file in onnxruntime and the network in Hobble's runtime; return the largest difference of Y.
 
     Both get CHECKED_ROWS random rows. The difference is relative for values of Y above 1. Raises InputError
@@ -177,14 +180,14 @@ def check(path: str | Path, network: BlendedNetwork, mode: str) -> float:
     return difference
 
 
-def write_checked(path: str | Path, network: BlendedNetwork, mode: str) -> float:
+def write_checked(path: str | Path, network: OnnxNetwork, mode: str) -> float:
     """`export` to a temporary file, `check` it, then rename it to `path`. Returns what `check` returns."""
     with atomic_path(path) as temporary:
         export(temporary, network, mode)
         return check(temporary, network, mode)
 
 
-def _metadata(network: BlendedNetwork, mode: str) -> dict[str, Any]:
+def _metadata(network: OnnxNetwork, mode: str) -> dict[str, Any]:
     """The metadata: what a program that reads the file needs to use the columns."""
     keys = ("configuration", "contacts", "limits", "units")
     return {

@@ -24,6 +24,7 @@ from llvmlite import ir
 from numba import types
 from numba.core import cgutils, config
 from numba.extending import intrinsic
+from numpy.typing import NDArray
 
 from hobble.core.compiled import njit
 from hobble.core.quat import Array
@@ -175,6 +176,21 @@ def write_phase_shares(blended: int, phase: Any, shares: Any) -> None:
             shares[c, first] = at
             shares[c, (first + 1) % points] = after
             shares[c, (first + 2) % points] = last
+
+
+def shares_at(blended: int, points: int, z: Array, phase: Array) -> Array:
+    """The shares (C, points) of the stored sets at phases (C,); see `write_phase_shares`."""
+    shares = np.zeros((len(phase), points), np.float32)
+    write_phase_shares(blended, phase, shares)
+    return shares
+
+
+def gate_shares(gate: Stack, columns: NDArray[np.int64], sets: int, z: Array, phase: Array) -> Array:
+    """The shares (C, sets) that a gate computes from some columns of the standardised inputs z (C, X)."""
+    shares = np.empty((len(z), sets), np.float32)
+    gate.run(np.ones((len(z), 1), np.float32), z[:, columns], shares)
+    logits_to_shares(shares)
+    return shares
 
 
 @njit(error_model="numpy")

@@ -14,7 +14,7 @@ x, but it would take several times the memory traffic.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numba
 import numpy as np
@@ -23,10 +23,7 @@ from torch import Tensor
 from torch.nn.functional import elu
 
 from hobble.core.compiled import njit
-from hobble.models.model import ALL_ROWS
-
-if TYPE_CHECKING:
-    from hobble.models.blend import TrainableBlend
+from hobble.models.model import ALL_ROWS, Blend
 
 # oneDNN's product of float32 matrices has 512-bit kernels for all processors. PyTorch's default, MKL, has
 # them only for Intel's. For products with fewer multiplications and additions than this, calling it takes
@@ -47,7 +44,7 @@ def product(a: Tensor, b: Tensor) -> Tensor:
 
 
 def evaluate(
-    network: TrainableBlend,
+    network: Blend,
     layers: list[Tensor],
     x: Tensor,
     p: Tensor,
@@ -80,7 +77,7 @@ class AutogradStep:
     round the factors of the products to bfloat16. Sums and everything else stay float32.
     """
 
-    def __init__(self, network: TrainableBlend, dropout: float, half: bool = False) -> None:
+    def __init__(self, network: Blend, dropout: float, half: bool = False) -> None:
         self.network, self.keep, self.half = network, 1.0 - dropout, half
         self.generator = torch.Generator(network.flat.device)
         self.gradients: list[Tensor] = []
@@ -140,7 +137,13 @@ class FusedStep(AutogradStep):
             e, slope = _expand(inputs[-1], c, mask)
             expanded.append(self._factor(e))
             slopes.append(slope)
-            x = self._product(expanded[-1], weight)
+            if gates and not number:
+                # The outputs of each set, of which dc is made below. By de it would take one more product.
+                h = self._factor(_expand(x, torch.ones_like(c[:, :1]), mask)[0])
+                each = self._product(h, weight.view(-1, h.shape[1])).view(len(x), -1, c.shape[1])
+                x = torch.bmm(each, c[:, :, None])[:, :, 0]
+            else:
+                x = self._product(expanded[-1], weight)
         self.error = x.sub_(y)
         d = self.error * (2.0 / y.numel())  # gradient of the mean square by the prediction
         dc = torch.zeros_like(c)
@@ -148,11 +151,13 @@ class FusedStep(AutogradStep):
         for number in range(len(weights) - 1, -1, -1):
             factor = self._factor(d)
             gradients.append(self._product(factor.T, expanded[number].T))
-            if number or gates:
+            if number:
                 de = self._product(factor, weights[number].T)
                 d = _contract(de, c, slopes[number])
-            if gates:
+            if number and gates:
                 _add_gradient_by_shares(de.numpy(), inputs[number].numpy(), masks[number].numpy(), dc.numpy())
+            elif gates:
+                dc += torch.bmm(d[:, None], each)[:, 0]
         of_gate = torch.autograd.grad(shares, gate, dc) if gates else ()
         self.gradients = [*of_gate, *reversed(gradients)]
         return torch.mean(torch.square(self.error))

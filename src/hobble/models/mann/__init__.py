@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from torch import Tensor
 
     from hobble.models.onnx_file import Graph, Node
-    from hobble.models.predict import Shares, Stack
+    from hobble.models.predict import Shares
 
 FEET = ("left_heel", "left_toe", "right_heel", "right_toe")  # roles of the joints
 GATE_INPUTS = 3 * len(FEET) + 2 * len(GAITS) + 2  # number of the columns that the gate gets
@@ -122,11 +122,11 @@ class Mann(BlendedNetwork):
 
     def prepare(self, mode: str) -> tuple[tuple[Array, ...], tuple[Array, ...], Shares]:
         """As in `BlendedNetwork`."""
-        from hobble.models.predict import Stack
+        from hobble.models.predict import Stack, gate_shares
 
         # The gate stays float32: it is small, and rounding it would change the shares of all experts.
         gate = Stack(self.gate_weights, self.gate_biases)
-        return self.weights, self.biases, partial(_fast_shares, gate, self.columns, self.sets)
+        return self.weights, self.biases, partial(gate_shares, gate, self.columns, self.sets)
 
     def page_data(self, inputs: NDArray[np.int64], outputs: NDArray[np.int64]) -> dict[str, Any]:
         """As in `BlendedNetwork`. gateLayers: of the gate. gate: its columns, as positions in `inputs`."""
@@ -146,16 +146,6 @@ class Mann(BlendedNetwork):
 
         h = add_layers(g, self.gate_weights, self.gate_biases, g("Gather", z, self.columns, axis=1))
         return None, g("Softmax", h, axis=1)
-
-
-def _fast_shares(gate: Stack, columns: NDArray[np.int64], sets: int, z: Array, phase: Array) -> Array:
-    """The shares (C, K) of Shares (C, K) for standardised inputs z (C, X)."""
-    from hobble.models.predict import logits_to_shares
-
-    shares = np.empty((len(z), sets), np.float32)
-    gate.run(np.ones((len(z), 1), np.float32), z[:, columns], shares)
-    logits_to_shares(shares)
-    return shares
 
 
 def _read_gate_columns(path: str | Path, arrays: Mapping[str, Any], inputs: int) -> NDArray[np.int64]:

@@ -92,14 +92,16 @@ class Pfnn(BlendedNetwork):
 
     def prepare(self, mode: str) -> tuple[tuple[Array, ...], tuple[Array, ...], Shares]:
         """As in `BlendedNetwork`. Raises ValueError for an unknown mode."""
+        from hobble.models.predict import shares_at
+
         stored, blended = STORED_AND_BLENDED[self.resolve_mode(mode)]
         if stored is None:
-            return self.weights, self.biases, partial(_fast_shares, blended, self.sets)
+            return self.weights, self.biases, partial(shares_at, blended, self.sets)
         phases = np.arange(stored) / stored
         weights, biases = (
             tuple(weights_at(points, phases) for points in layers) for layers in (self.weights, self.biases)
         )
-        return weights, biases, partial(_fast_shares, blended, stored)
+        return weights, biases, partial(shares_at, blended, stored)
 
     def onnx_shares(self, g: Graph, z: Node, mode: str) -> tuple[Node | None, Node]:
         """As in `BlendedNetwork`."""
@@ -134,15 +136,6 @@ class Pfnn(BlendedNetwork):
             return f"{target}: weights at 50 phases"
 
         return {**super().exports, "bin": write_bin}
-
-
-def _fast_shares(blended: int, points: int, z: Array, phase: Array) -> Array:
-    """The shares (C, points) of the stored sets; see `write_phase_shares`."""
-    from hobble.models.predict import write_phase_shares
-
-    shares = np.zeros((len(phase), points), np.float32)
-    write_phase_shares(blended, phase, shares)
-    return shares
 
 
 @dataclass(frozen=True)
