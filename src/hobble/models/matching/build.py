@@ -15,7 +15,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,11 +27,23 @@ from hobble.core.skeleton import Skeleton
 from hobble.rows.clip_rows import ClipRows, load_clip_rows
 from hobble.rows.layout import GAITS, RowLayout, compose, frame_inputs
 
-if TYPE_CHECKING:
-    from hobble.models.matching import MatchingOptions
-
 FEET = ("left_heel", "right_heel")  # the joints of the skeleton with these roles
 LEAST_SPREAD = 1e-6  # a group of columns with a smaller mean standard deviation gets weight 0
+
+
+class SearchOptions(Protocol):
+    """The fields of `hobble.models.matching.MatchingOptions`, which explains them."""
+
+    every: int
+    halflife: float
+    path: float
+    facing: float
+    foot_position: float
+    foot_velocity: float
+    hip_velocity: float
+    gait: float
+    ground: float
+    channels: float
 
 
 @dataclass(frozen=True)
@@ -86,7 +98,7 @@ class Tables:
 
 
 def build(
-    options: MatchingOptions, clips: Sequence[str | Path], layout: RowLayout, skeleton: Skeleton
+    options: SearchOptions, clips: Sequence[str | Path], layout: RowLayout, skeleton: Skeleton
 ) -> Tables:
     """Build the tables.
 
@@ -160,7 +172,7 @@ def find_runs(rows: ClipRows) -> tuple[NDArray[np.int64], NDArray[np.int32]]:
 
 
 def feature_groups(
-    layout: RowLayout, skeleton: Skeleton, options: MatchingOptions
+    layout: RowLayout, skeleton: Skeleton, options: SearchOptions
 ) -> list[tuple[str, list[int], float]]:
     """(name, columns of X, weight) of each group of features. All columns of a group get the same factor."""
     samples, now = layout.samples, layout.samples // 2  # now: index of the trajectory sample at the present
@@ -189,7 +201,7 @@ def feature_groups(
 
 
 def columns_and_weights(
-    layout: RowLayout, skeleton: Skeleton, options: MatchingOptions, x: Array
+    layout: RowLayout, skeleton: Skeleton, options: SearchOptions, x: Array
 ) -> tuple[NDArray[np.int64], Array]:
     """Columns of X (n,) and their factors (n,) float32, with which features of different units are compared.
 
