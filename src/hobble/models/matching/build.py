@@ -15,7 +15,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, ClassVar, Protocol
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,19 +31,8 @@ FEET = ("left_heel", "right_heel")  # the joints of the skeleton with these role
 LEAST_SPREAD = 1e-6  # a group of columns with a smaller mean standard deviation gets weight 0
 
 
-class SearchOptions(Protocol):
-    """The fields of `hobble.models.matching.MatchingOptions`, which explains them."""
-
-    every: int
-    halflife: float
-    path: float
-    facing: float
-    foot_position: float
-    foot_velocity: float
-    hip_velocity: float
-    gait: float
-    ground: float
-    channels: float
+# The fields of `hobble.models.matching.MatchingOptions`, whose module imports this one.
+SearchOptions = Any
 
 
 @dataclass(frozen=True)
