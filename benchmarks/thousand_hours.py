@@ -1,7 +1,7 @@
 """Estimate jobs, bytes and hours of each stage for more motion, from the rates of one or two finished runs.
 
     benchmarks/thousand_hours.py [FOLDER] [--configuration holden] [--against NAME] [--hours 1000]
-        [--clips 2500] [--nodes 80] [--shards 1] [--training-nodes 1] [--batch 0] [--passes 0] [--processor]
+        [--clips 2500] [--nodes 80] [--training-nodes 1] [--batch 0] [--passes 0] [--processor]
 
 FOLDER is the folder in which Snakemake ran. From one run, seconds and bytes of jobs over clips are scaled
 with the amount of motion that the configuration uses; all else is unchanged. --against: a run with less
@@ -11,8 +11,7 @@ part and a part that grows with the motion, from both runs.
 --processor: take the processor seconds of a run that shared its machine with other work.
 
 Mirrored clips count as motion: with them, the hours double. Under `synthetic` the bytes are those of the BVH
-files, which are the user's own. --shards: those of the database (`database.shards`). --training-nodes:
-machines that train together; each step also takes a ring all-reduce of the gradient over 10 Gb/s. --batch
+files, which are the user's own. --training-nodes: machines that train together; each step also takes a ring all-reduce of the gradient over 10 Gb/s. --batch
 and --passes: samples of a step and passes, if they differ from the run's. Measurements of clips read at most
 `evaluation.sample_frames`.
 """
@@ -96,7 +95,7 @@ class Rate:
 
 @dataclass(frozen=True)
 class Plan:
-    """motion: seconds in all. clips, nodes, shards: their numbers. training: hours on the clock.
+    """motion: seconds in all. clips, nodes: their numbers. training: hours on the clock.
 
     share: the passes of the training, divided by those of the run.
     """
@@ -104,7 +103,6 @@ class Plan:
     motion: float
     clips: int
     nodes: int
-    shards: int
     training: float
     share: float
 
@@ -115,16 +113,11 @@ class Plan:
         """
         line = {"jobs": 0.0, "work": 0.0, "clock": 0.0, "longest": 0.0, "bytes": run.stages[stage]["bytes"]}
         for rule in run.seconds(stage):
-            # Without shards, the merge does their work.
-            sharded = rule == "database_shard" or (
-                rule == "database_merge" and "database_shard" not in run.seconds(stage)
-            )
-            jobs = batch_count(self.clips) if rule in OF_BATCHES else self.shards if sharded else 1
+            jobs = batch_count(self.clips) if rule in OF_BATCHES else 1
             most = SampleOptions().sample_frames / FPS if rule in SAMPLED else self.motion
             hours = Rate.of(rule, stage, run, less).hours(min(most, self.motion))
             hours *= self.share if rule == "training" else 1.0
-            # The largest shard has about twice the average.
-            one = self.training if rule == "training" else hours / jobs * (2 if sharded and jobs > 1 else 1)
+            one = self.training if rule == "training" else hours / jobs
             line["jobs"] += jobs
             line["work"] += hours
             line["clock"] += one * math.ceil(jobs / (2 * self.nodes))
@@ -180,7 +173,6 @@ def arguments() -> argparse.Namespace:
     parser.add_argument("--hours", type=float, default=1000.0, help="of motion")
     parser.add_argument("--clips", type=int, default=2500)
     parser.add_argument("--nodes", type=int, default=80, help="that run two jobs at once each")
-    parser.add_argument("--shards", type=int, default=1, help="of the database")
     parser.add_argument("--training-nodes", type=int, default=1)
     parser.add_argument("--batch", type=int, default=0, help="samples of a step; 0: that of the run")
     parser.add_argument("--processor", action="store_true", help="count processor seconds, not the clock's")
@@ -201,9 +193,8 @@ def main() -> None:
     print("| stage | jobs | hours of work | on the clock | longest job | GB |")
     print("|---|---|---|---|---|---|")
     training = training_hours(run, less, options)
-    plan = Plan(
-        3600 * options.hours, options.clips, options.nodes, options.shards, training, pass_share(run, options)
-    )
+    share = pass_share(run, options)
+    plan = Plan(3600 * options.hours, options.clips, options.nodes, training, share)
     lines = {stage: plan.line(stage, run, less) for stage in run.stages}
     for stage, line in lines.items():
         show(stage, line)
