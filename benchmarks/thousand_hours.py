@@ -11,9 +11,9 @@ part and a part that grows with the motion, from both runs.
 --processor: take the processor seconds of a run that shared its machine with other work.
 
 Mirrored clips count as motion: with them, the hours double. Under `synthetic` the bytes are those of the BVH
-files, which are the user's own. --training-nodes: machines that train together; each step also takes a ring all-reduce of the gradient over 10 Gb/s. --batch
-and --passes: samples of a step and passes, if they differ from the run's. Measurements of clips read at most
-`evaluation.sample_frames`.
+files, which are the user's own. --training-nodes: machines that train together; each step also takes a ring
+all-reduce of the gradient over 10 Gb/s. --batch and --passes: samples of a step and passes, if they differ
+from the run's. Measurements of clips read at most `evaluation.sample_frames`.
 """
 
 from __future__ import annotations
