@@ -33,6 +33,8 @@ SUPERFLUOUS = re.compile(
 )
 # Snakemake's messages that are shown although they are no warnings.
 SHOWN_MESSAGES = re.compile(r"^Nothing to be done|^Reasons:|^This was a dry-run|^Unlocking|^Touching|^Error")
+# The rule `clip_file` finds its file already there, because a batch made it. Snakemake warns of this.
+FOUND_OUTPUT = "were not present when the DAG was created"
 STOP_MESSAGE = "Terminating processes on user request"  # Snakemake prints this when the user stops the run
 # A line in Snakemake's message about why it runs jobs. It is removed, because jobs are not listed above it.
 JOB_HINT = re.compile(r"^ *\(check individual jobs above for details\)\n", re.M)
@@ -166,7 +168,7 @@ class Terminal:
         elif record.levelno >= logging.ERROR:
             if not (JOB_ENDED.search(text) or SUPERFLUOUS.search(text)) and text:
                 self._print_line(text)
-        elif record.levelno >= logging.WARNING or SHOWN_MESSAGES.search(text):
+        elif FOUND_OUTPUT not in text and (record.levelno >= logging.WARNING or SHOWN_MESSAGES.search(text)):
             self._print_line(JOB_HINT.sub("", text))
 
     def _print_line(self, text: str) -> None:

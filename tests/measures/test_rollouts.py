@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from hobble.measures.measure import Measure, MeasureInputs, all_measures
 from hobble.measures.rollouts_run import RollOutInputs, inputs_of_clip, measure_roll_outs, roll_out_rows
 from hobble.measures.walks import in_root_coordinates
 from hobble.models.network import Network
@@ -173,19 +172,6 @@ def test_results_of_splits_are_means_of_their_clips_and_reproducible(
     assert measure_roll_outs(weights, clips, splits, "injured", lengths=(1, 30)) == result
     monkeypatch.setattr("hobble.measures.rollouts_run.AT_ONCE", 1)
     assert measure_roll_outs(weights, clips, splits, "injured", lengths=(1, 30)) == result
-
-
-@pytest.mark.parametrize("measure", [m for m in all_measures() if m.channel])
-def test_a_channel_s_measure_does_not_apply_to_a_network_without_it(
-    measure: Measure, make_network, tmp_path: Path
-) -> None:
-    """`holden` is measured on clips with severities, and ignores them."""
-    save(tmp_path / "weights.npz", make_network())
-    files = {"weights": tmp_path / "weights.npz", "published": ROOT / "src/hobble/report/published.yaml"}
-    inputs = MeasureInputs("plain", files, {"a": tmp_path / "unread.npz"}, {"a": "train"})
-    found = measure.runner().run(inputs, measure.options())
-    assert found.result["applies"] is False
-    assert "network" in found.result["reason"]
 
 
 def save(path: Path, network: Network) -> None:
