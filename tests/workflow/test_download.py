@@ -27,7 +27,7 @@ def test_a_clip_that_the_folder_lacks_is_downloaded_once(workflow, clips, server
     (config / "far.sha256").write_text(f"{'0' * 64}  walk.bvh\n")
     kept = workflow.checkout / "data/downloaded/far/walk.bvh"
 
-    assert workflow.planned(TARGET) == {"download_clip": 1, "motion_clips": 1}
+    assert workflow.planned(TARGET) == {"download_clip": 1, "motion_clips": 1, "clip_file": 1}
     assert server.requests == []
     text = workflow.run("-c1", TARGET, ok=False)
     assert f"cannot be downloaded: the server has another file: its SHA-256 is {sha256}" in text
