@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,11 +14,14 @@ from hobble.models.load import load_network
 
 @pytest.mark.slow
 @pytest.mark.shared
-def test_the_released_network_holds_for_ten_minutes(root: Path, shared: Path, holden31) -> None:
+def test_the_released_network_holds_for_ten_minutes(
+    root: Path, shared: Path, holden31, monkeypatch: pytest.MonkeyPatch
+) -> None:
     spec = importlib.util.spec_from_file_location("stability", root / "benchmarks" / "stability.py")
     assert spec is not None
     assert spec.loader is not None
     benchmark = importlib.util.module_from_spec(spec)
+    monkeypatch.setitem(sys.modules, spec.name, benchmark)  # where its dataclasses look for their module
     spec.loader.exec_module(benchmark)
     network = load_network(shared / "reference" / "pfnn_release_network.npz", holden31)
     found = benchmark.stability(network)
