@@ -18,7 +18,7 @@ from hobble.runtime.animation import ProceduralAnimation
 
 SCRIPT = """
 import { readFileSync } from "fs";
-import { createCharacter } from "./controller.js";
+import { createCharacter } from "./report/web/controller.js";
 const { spec, targets } = JSON.parse(readFileSync(process.argv[2]));
 const c = createCharacter(spec), flat = () => 0;
 console.log(JSON.stringify(targets.map((target) => {
@@ -34,8 +34,10 @@ def test_the_page_pulls_a_network_of_recorded_poses_toward_its_target_as_python_
     monkeypatch.setattr(type(network), "plays_recorded_poses", True)
     # A target to stop, so that movement is drawn against the network's own.
     targets = [[0.03 * f, 2.5] if f < 60 else [0.0, 0.0] for f in range(90)]
-    for script in WEB.glob("*.js"):
-        shutil.copyfile(script, tmp_path / script.name)
+    package = WEB.parents[1]
+    for script in [*WEB.glob("*.js"), package / "models/layers.js"]:
+        (tmp_path / script.relative_to(package)).parent.mkdir(parents=True, exist_ok=True)
+        shutil.copyfile(script, tmp_path / script.relative_to(package))
     kinds = tmp_path / "node_modules" / "networks"
     kinds.mkdir(parents=True)
     (kinds / "index.js").write_text(networks_module())

@@ -3,7 +3,13 @@
 // The page contains weights as integers, with factors to multiply them by. 16-bit weights come from `packed_rows` of
 // `hobble.models.network`, with a factor for each row. 8-bit weights come from `hobble.report.rounded_weights`, with a factor for
 // each group of columns.
-import { bytes } from "../report/web/math.js";
+// The bytes of a base64 text, as an ArrayBuffer.
+export const bytes = (text) => {
+  if (Uint8Array.fromBase64) return Uint8Array.fromBase64(text).buffer;
+  const raw = atob(text), out = new Uint8Array(raw.length);
+  for (let i = 0; i < raw.length; i++) out[i] = raw.charCodeAt(i);
+  return out.buffer;
+};
 
 // The float32 array in a base64 text.
 export const floats = (text) => new Float32Array(bytes(text));

@@ -1,5 +1,5 @@
 // y = W x + b on standardised x and y.
-import { bytes } from "../../report/web/math.js";
+import { bytes } from "../layers.js";
 
 export const createNetwork = (spec) => {
   const floats = (text) => new Float32Array(bytes(text)), [layer] = spec.network.layers;

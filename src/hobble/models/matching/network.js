@@ -1,8 +1,7 @@
 // Motion matching: plays the clips, searches every few frames for the recorded frame that fits best, and smooths the transitions. It
 // computes the same as `predictor.py` and `inertia.py` in Python. Each character has a memory: an array of `spec.network.memory`
 // numbers, zeros at first. It contains the last row shown and, for each joint, offsets that are added to the recorded poses.
-import { bytes } from "../../report/web/math.js";
-import { createScales, floats } from "../layers.js";
+import { bytes, createScales, floats } from "../layers.js";
 
 // Indices in the memory: 1 + the last row shown (0 before the first frame), frames since the last search, the first offset.
 const ROW = 0, SINCE = 1, OFFSETS = 2;

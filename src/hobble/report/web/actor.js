@@ -1,11 +1,10 @@
 // Writes the played motion as a BVH file.
-import { channelColour } from "./base.js";
+import { bodyChannel, channelColour, valueKey } from "./base.js";
 import { createCharacter } from "./controller.js";
 import { createRig } from "./feet.js";
 import { createFigure } from "./figure.js";
 import { at4, conjugate, multiply } from "./math.js";
 import { createLab } from "./panel.js";
-import { bodyChannel, valueKey } from "./play.js";
 
 const FPS = 60;
 

@@ -1,4 +1,4 @@
-// What all parts of the page share: its data and its colours.
+// What all parts of the page share: its data, its colours, and how channel values are named.
 import { Color, SRGBColorSpace } from "three";
 import { mix } from "./math.js";
 
@@ -68,3 +68,8 @@ export const channelColour = (paint, t, plain = paint.body) => {
 
 // Sets a three.js colour to [r, g, b], 0 to 255. three.js converts it to its linear colour space.
 export const linear = ([r, g, b], colour = new Color()) => colour.setRGB(r / 255, g / 255, b / 255, SRGBColorSpace);
+
+// The key of a column of a channel in the Map of channel values.
+export const valueKey = (channel, column) => `${channel.name}/${column}`;
+// The channel whose columns stand for parts of the body; undefined if there is none.
+export const bodyChannel = (spec) => spec.channels.find((channel) => channel.regions.length);

@@ -2,7 +2,8 @@
 // `hobble.runtime.controller`, with names in camel case. The path has an entry for each frame: px, pz (position) and dx, dz (direction).
 import { networks } from "networks"; // kind -> createNetwork; made by `bundle.networks_module` from the folders of hobble.models
 import { createFeet } from "./feet.js";
-import { at3, at4, bytes, multiply, wrap } from "./math.js";
+import { bytes } from "../../models/layers.js";
+import { at3, at4, multiply, wrap } from "./math.js";
 
 // Returns a function (c) that sets the rotations to draw to those that the network predicted. The network predicts no rotations of joints
 // that move no part of the body, so such a joint gets the rotation of its parent.

@@ -1,6 +1,7 @@
 // Computes curves of a walking body over time, for the recogniser. `hobble.gait.cycles` in Python does the same. Units are degrees and leg
 // lengths. Angles are relative to the vertical and to the direction of travel.
-import { bytes, cross, dot, minus } from "./math.js";
+import { bytes } from "../../models/layers.js";
+import { cross, dot, minus } from "./math.js";
 
 export const SIDES = ["L", "R"];
 const SIDE_NAMES = { L: "left", R: "right" };

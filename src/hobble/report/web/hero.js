@@ -1,7 +1,7 @@
 // A dial with whole values from 0 to `most`. It is drawn as an arc. People turn it by dragging, clicking or pressing keys.
 import { createActor } from "./actor.js";
-import { find, material } from "./base.js";
-import { firstShown, valueKey } from "./play.js";
+import { find, material, valueKey } from "./base.js";
+import { firstShown } from "./play.js";
 import { createView } from "./view.js";
 
 const NS = "http://www.w3.org/2000/svg";

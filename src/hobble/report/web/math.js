@@ -1,13 +1,5 @@
-// Reads numbers that the page contains as base64, and computes with vectors of three numbers.
-
-
-// The bytes of a base64 text, as an ArrayBuffer.
-export const bytes = (text) => {
-  if (Uint8Array.fromBase64) return Uint8Array.fromBase64(text).buffer;
-  const raw = atob(text), out = new Uint8Array(raw.length);
-  for (let i = 0; i < raw.length; i++) out[i] = raw.charCodeAt(i);
-  return out.buffer;
-};
+// Computes with vectors of three numbers and with rotations, and unpacks a body.
+import { bytes } from "../../models/layers.js";
 
 export const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 export const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];

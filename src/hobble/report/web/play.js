@@ -1,6 +1,6 @@
 // Reads the state of Play from a link. Anybody can write a link, so every part is checked.
 import { bvhText, createActor } from "./actor.js";
-import { find, material, save } from "./base.js";
+import { bodyChannel, find, material, save, valueKey } from "./base.js";
 import { GROUNDS } from "./ground.js";
 import { createPanel } from "./panel.js";
 import { createChase, createView } from "./view.js";
@@ -28,10 +28,6 @@ export const readPairs = (text, highest) => (text || "").split(",").flatMap((pai
 
 // The channel values in Play. Each column of each channel has a value. Users set values with sliders, presets and keys.
 
-// The key of a column in the Map of values.
-export const valueKey = (channel, column) => `${channel.name}/${column}`;
-// The channel whose columns stand for parts of the body; undefined if there is none.
-export const bodyChannel = (spec) => spec.channels.find((channel) => channel.regions.length);
 // The channel that the top of the page shows. It is one with parts of the body and a slider, or else the first one with a slider.
 export const firstShown = (spec) => {
   const some = spec.channels.filter((channel) => Object.keys(channel.sliders).length);
