@@ -36,6 +36,7 @@ from hobble.measures.walks import (
     gait_measures,
     generate_walks,
     mean_cycle,
+    mean_of_known,
     settling_seconds,
     spearman,
 )
@@ -434,18 +435,14 @@ def _summary(responses: Rows) -> dict[str, dict[str, float | None]]:
     for gait in GAITS:
         if group := [r for r in responses if r["gait"] == gait]:
             out[gait] = {
-                "spearman_from_healthy": _mean(r["spearman"]["from_healthy"] for r in group),
-                "spearman_speed": _mean(r["spearman"]["speed"] for r in group),
-                "spearman_falling_from_healthy": _mean(r["spearman_falling"]["from_healthy"] for r in group),
-                **{key: _mean(r[key] for r in group) for key in SUMMARISED},
+                "spearman_from_healthy": mean_of_known(r["spearman"]["from_healthy"] for r in group),
+                "spearman_speed": mean_of_known(r["spearman"]["speed"] for r in group),
+                "spearman_falling_from_healthy": mean_of_known(
+                    r["spearman_falling"]["from_healthy"] for r in group
+                ),
+                **{key: mean_of_known(r[key] for r in group) for key in SUMMARISED},
             }
     return out
-
-
-def _mean(values: Iterable[float | None]) -> float | None:
-    """The mean of the values that are not None; None if there are none."""
-    known = [v for v in values if v is not None]
-    return round(float(np.mean(known)), 5) if known else None
 
 
 def run(inputs: MeasureInputs, options: Any) -> Outcome:

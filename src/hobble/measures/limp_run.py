@@ -36,7 +36,7 @@ from hobble.gait.recognise import SIDES, compare_walk, examples_of_people
 from hobble.hurt.effects import part_of_link
 from hobble.measures.measure import MeasureInputs, Outcome
 from hobble.measures.sample import HURT_VERSION, ClipPart, clip_parts, sample_to_measure, with_sample
-from hobble.measures.walks import FPS, channel_values, spearman
+from hobble.measures.walks import FPS, channel_values, mean_of_known, share_of_true, spearman
 from hobble.models.load import load_network
 from hobble.models.network import Network
 from hobble.rows.captured import captured_stretches, rotate_by_yaw
@@ -313,27 +313,16 @@ def _row_of_walk(
     return row | {
         "called": found.answer.name,
         "graded": found.grade.name,
-        "impaired": _share([answer.is_impaired for answer in found.window_answers]),
-        "named": _share(by_graded),
-        "named_by_either": _share([a or b for a, b in zip(by_linear, by_graded, strict=True)]),
-        "wrong_side": _share(wrong) if side else None,
+        "impaired": share_of_true([answer.is_impaired for answer in found.window_answers]),
+        "named": share_of_true(by_graded),
+        "named_by_either": share_of_true([a or b for a, b in zip(by_linear, by_graded, strict=True)]),
+        "wrong_side": share_of_true(wrong) if side else None,
     }
 
 
 def _rounded_values(values: Mapping[str, float]) -> dict[str, float | None]:
     """The values, rounded to 5 decimals. None in place of a value that is not finite."""
     return {name: round(float(v), 5) if np.isfinite(v) else None for name, v in values.items()}
-
-
-def _share(values: Sequence[bool]) -> float | None:
-    """The share of the values that are True; None if there are no values."""
-    return round(sum(values) / len(values), 5) if values else None
-
-
-def _mean(rows: Iterable[Mapping[str, Any]], key: str) -> float | None:
-    """The mean of `key` over the rows in which it is not None; None if there are none."""
-    values = [row[key] for row in rows if row[key] is not None]
-    return round(float(np.mean(values)), 5) if values else None
 
 
 def _trend_rows(rows: Rows) -> Rows:
@@ -354,7 +343,7 @@ def _recognition_by_severity(rows: Rows) -> Rows:
     out = []
     for severity in SEVERITIES:
         legs = [r for r in rows if r["gait"] == "walk" and r["severity"] == severity and r["part"] in LEG]
-        means = {key: _mean(legs, key) for key in RECOGNISED}
+        means = {key: mean_of_known(row[key] for row in legs) for key in RECOGNISED}
         out.append({"severity": severity, "walks": len(legs), **means})
     return out
 
@@ -399,7 +388,10 @@ def _recognition_by_column(rows: Rows) -> Rows:
     out = []
     for (other, column), group in groupby(rows, key=lambda row: (row["channel"], row["column"])):
         of_column = list(group)
-        means = {key: _mean(of_column, key) for key in ("impaired", "named", "wrong_side", "speed_share")}
+        means = {
+            key: mean_of_known(row[key] for row in of_column)
+            for key in ("impaired", "named", "wrong_side", "speed_share")
+        }
         judged = sum(row["named"] is not None for row in of_column)
         known = {key: mean for key, mean in means.items() if mean is not None}
         out.append({"channel": other, "column": column, "walks": judged, **known})

@@ -19,7 +19,14 @@ from hobble.core.skeleton import Skeleton
 from hobble.gait.recognise import Discriminant, learn
 from hobble.measures.measure import MeasureInputs, Outcome, Row, SampleOptions
 from hobble.measures.sample import captured_motion, sample_to_measure, with_sample
-from hobble.measures.walks import FPS, CrowdTarget, channel_values, gait_features, generate_walks
+from hobble.measures.walks import (
+    FPS,
+    CrowdTarget,
+    channel_values,
+    gait_features,
+    generate_walks,
+    share_of_true,
+)
 from hobble.models.load import load_network
 from hobble.models.network import Network
 from hobble.rows.captured import Captured
@@ -187,11 +194,6 @@ def _recognise_with_shrinkage(
         },
         "presence_right": share_of_true(presence_right[tried]),
     }
-
-
-def share_of_true(right: Sequence[bool] | np.ndarray) -> float | None:
-    """The share of values that are true, 0 to 1 with five decimals; None if there are no values."""
-    return round(float(np.mean(right)), 5) if len(right) else None
 
 
 # Target speeds of generated walks, divided by the median speed of captured neutral walks. They are the same

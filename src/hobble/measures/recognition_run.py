@@ -21,7 +21,14 @@ from hobble.gait.recognise import Discriminant, learn
 from hobble.hurt.effects import part_of_link
 from hobble.measures.measure import MeasureInputs, Outcome, Row, SampleOptions
 from hobble.measures.sample import HURT_VERSION, captured_motion, sample_to_measure, with_sample
-from hobble.measures.walks import FPS, CrowdTarget, channel_values, gait_features, generate_walks
+from hobble.measures.walks import (
+    FPS,
+    CrowdTarget,
+    channel_values,
+    gait_features,
+    generate_walks,
+    share_of_true,
+)
 from hobble.models.load import load_network
 from hobble.models.network import Network
 from hobble.rows.captured import Captured
@@ -219,12 +226,12 @@ def count_answers(
         right.setdefault(w.severity, []).append(w.hurt == name)
     return {
         counted: len(windows),
-        "right": _share([is_right for of_severity in right.values() for is_right in of_severity]),
-        "right_without_side": _share(
+        "right": share_of_true([is_right for of_severity in right.values() for is_right in of_severity]),
+        "right_without_side": share_of_true(
             [parts(w.hurt) == parts(name) for w, name in zip(windows, named, strict=True)]
         ),
         "by_severity": [
-            {"severity": severity, counted: len(of_severity), "right": _share(of_severity)}
+            {"severity": severity, counted: len(of_severity), "right": share_of_true(of_severity)}
             for severity, of_severity in sorted(right.items())
         ],
         "confusion": confusion,
@@ -243,11 +250,6 @@ def confusion_rows(result: Mapping[str, Any]) -> list[Row]:
         for hurt, row in found["confusion"].items()
         for named, count in row.items()
     ]
-
-
-def _share(right: Sequence[bool]) -> float | None:
-    """The share of the values that are True; None if there are no values."""
-    return round(sum(right) / len(right), 5) if right else None
 
 
 def run(inputs: MeasureInputs, options: SampleOptions) -> Outcome:

@@ -21,7 +21,7 @@ import numpy as np
 from hobble.core.files import Json
 from hobble.core.quat import Array
 from hobble.measures.measure import MeasureInputs, Outcome, Row
-from hobble.measures.walks import FPS, foot_slide, turns_between
+from hobble.measures.walks import FPS, foot_slide, mean_of_known, turns_between
 from hobble.models.load import load_network
 from hobble.models.network import Network
 from hobble.runtime.animation import ProceduralAnimation, world_rotations
@@ -360,9 +360,9 @@ def laps_of_mode(
         "laps_finished": sum(lap["finished"] for lap in results),
         "waypoints_reached": sum(lap["waypoints_reached"] for lap in results),
         "waypoints": laps * len(track),
-        "mean_lap_seconds": _mean([lap["seconds"] for lap in results if lap["finished"]]),
+        "mean_lap_seconds": mean_of_known([lap["seconds"] for lap in results if lap["finished"]], 4),
         "path_overshoot_cm": max(lap["path_overshoot_cm"] for lap in results),
-        "foot_slide_cm": _mean([lap["foot_slide_cm"] for lap in results]),
+        "foot_slide_cm": mean_of_known([lap["foot_slide_cm"] for lap in results], 4),
         "largest_turn_degrees": max(lap["largest_turn_degrees"] for lap in results),
         "predicted_turn_degrees": max(lap["predicted_turn_degrees"] for lap in results),
         "turns_held_back": sum(lap["turns_held_back"] for lap in results),
@@ -431,9 +431,3 @@ def run(inputs: MeasureInputs, options: Options) -> Outcome:
 def _segments(track: Sequence[Waypoint]) -> list[tuple[Waypoint, Waypoint]]:
     """The two ends of each segment of the closed track. The last segment ends at the first waypoint."""
     return list(zip(track, [*track[1:], track[0]], strict=True))
-
-
-def _mean(values: list[float | None]) -> float | None:
-    """The mean of the values that are not None; None if there are none."""
-    known = [v for v in values if v is not None]
-    return round(float(np.mean(known)), 4) if known else None

@@ -6,7 +6,7 @@ predicted contacts with the ground, from 0 to 1, of left heel, left toe, right h
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -208,17 +208,6 @@ class Walks:
     root: Array = field(repr=False)
     acceleration: Array = field(repr=False)
     starts: np.ndarray
-
-    def of_figures(self, figures: slice) -> Walks:
-        """The motion of the figures in the slice `figures`."""
-        return Walks(
-            self.local[:, figures],
-            self.contacts[:, figures],
-            self.phase[:, figures],
-            self.root[:, figures],
-            self.acceleration[:, figures],
-            self.starts,
-        )
 
     def measured_frames(self, stretch: int, figure: int) -> slice:
         """The frames of stretch number `stretch` in which figure number `figure` is measured.
@@ -435,6 +424,17 @@ def _swing(down: Array) -> Array:
 
 def _mean_and_sd(name: str, values: Array) -> dict[str, float]:
     return {f"{name}_mean": float(np.mean(values)), f"{name}_sd": float(np.std(values))}
+
+
+def mean_of_known(values: Iterable[float | None], digits: int = 5) -> float | None:
+    """The mean of the values that are not None, rounded to `digits` decimals; None if there are none."""
+    known = [v for v in values if v is not None]
+    return round(float(np.mean(known)), digits) if known else None
+
+
+def share_of_true(values: Sequence[bool] | np.ndarray) -> float | None:
+    """The share of values that are true, 0 to 1 with five decimals; None if there are no values."""
+    return round(float(np.mean(values)), 5) if len(values) else None
 
 
 def spearman(x: Sequence[float] | Array, y: Sequence[float | None]) -> float | None:
