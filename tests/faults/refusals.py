@@ -14,9 +14,12 @@ MB = 1 << 20
 HEADER = "HIERARCHY\nROOT Hips\n{\nOFFSET 0 0 0\nCHANNELS 1 Xposition\n"
 
 
+SECONDS = 5  # of the processor; every hostile file of a few kilobytes is refused in less
+
+
 def refused(read: Callable[[], Any], *pieces: str, mb: int = 300, letters: int = 2000) -> None:
-    """`read` raises a HobbleError with these pieces, takes less than `mb` of memory and fewer than
-    `letters`.
+    """`read` raises a HobbleError with these pieces, takes less than `mb` of memory and SECONDS of the
+    processor. The error has fewer than `letters`.
     """
     read_end, write_end = os.pipe()
     pid = os.fork()
@@ -26,6 +29,7 @@ def refused(read: Callable[[], Any], *pieces: str, mb: int = 300, letters: int =
             pages = int(Path("/proc/self/statm").read_text().split()[0])
             most = pages * os.sysconf("SC_PAGE_SIZE") + mb * MB
             resource.setrlimit(resource.RLIMIT_AS, (most, most))
+            resource.setrlimit(resource.RLIMIT_CPU, (SECONDS, SECONDS + 1))
             read()
         except HobbleError as error:
             said = f"refused: {error}"
@@ -37,7 +41,8 @@ def refused(read: Callable[[], Any], *pieces: str, mb: int = 300, letters: int =
     os.close(write_end)
     with os.fdopen(read_end, "rb") as pipe:
         said = pipe.read().decode()
-    os.waitpid(pid, 0)
+    _, status = os.waitpid(pid, 0)
+    assert not os.WIFSIGNALED(status), f"ended by signal {os.WTERMSIG(status)}: more than {SECONDS} s"
     assert said.startswith("refused: "), said[:2000]
     for piece in pieces:
         assert piece in said, said[:2000]

@@ -100,6 +100,8 @@ WHOLE = {
     "a range far past the end": (on_line(_spell, lambda s: "1-999999999999 " + s.split(" ", 1)[1]), "any"),
     "a range from 0": (on_line(_spell, lambda s: "0-30 " + s.split(" ", 1)[1]), "any"),
     "a severity past the highest": (on_line(_spell, lambda s: re.sub(r"\[.*?\]", "[10.01]", s)), "refused"),
+    "blanks for a severity": (on_line(_spell, lambda s: re.sub(r"\[.*", " " * 6000, s)), "refused"),
+    "a range a hundred times": (on_line(_spell, lambda s: f"{s}\n" * 101), "refused"),
     "a comment": (on_line(_spell, lambda s: "# hurts\n" + s), "refused"),
     "cut anywhere": (lambda r, t: t[: r.randrange(len(t))], "any"),
     "a byte changed": (

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -19,6 +20,7 @@ from hobble.motion.skeleton_file import load_skeleton
 from . import bvh_grammar, status_grammar
 from .grammar import Case, cases
 from .lab import ROOT
+from .refusals import SECONDS
 
 SKELETON = ROOT / "config/skeletons/holden31.yaml"
 OPTIONS = ClipMotion()
@@ -52,13 +54,16 @@ def read_severity(path: Path) -> Arrays:
 def judge(case: Case, path: Path, read: Reader, whole: Arrays) -> str:
     """The outcome for a mutated file: "refused", "same" or "read". Raises AssertionError if it is wrong."""
     path.write_text(case.text, encoding="utf-8", newline="")
+    refusal, began = None, time.process_time()
     try:
         found = read(path)
     except InputError as error:
         refusal = error
     except Exception as error:
         raise AssertionError(f"{case.names}: {type(error).__name__}: {error}") from error
-    else:
+    spent = time.process_time() - began
+    assert spent < SECONDS, f"{case.names}: {spent:.1f} s of the processor"
+    if refusal is None:
         return _judge_read(case, found, whole)
     text = str(refusal)
     assert text.startswith(str(path)), text

@@ -125,17 +125,29 @@ def write_json(path: str | Path, value: Any) -> None:
 def read_json(path: str | Path) -> Any:
     """Read a JSON file. Raises InputError with the line if it is not valid JSON."""
     try:
-        return json.loads(read_text(path, MAX_JSON_BYTES))
+        return json.loads(read_text(path, MAX_JSON_BYTES), parse_constant=_refuse_constant)
     except json.JSONDecodeError as error:
         raise InputError(path, f"not valid JSON: {error.msg}", line=error.lineno) from error
     except (RecursionError, ValueError) as error:
         raise InputError(path, f"not valid JSON: {error}") from error
 
 
+def _refuse_constant(word: str) -> None:
+    raise ValueError(f"{word} is not a number")
+
+
 def save_npz(path: str | Path, **arrays: Any) -> None:
-    """Write arrays as an uncompressed npz. Equal arrays give equal bytes (no timestamps, no pickles)."""
-    with atomic_path(path) as temporary, open(temporary, "wb") as file:
-        np.savez(file, allow_pickle=False, **arrays)
+    """Write arrays as an uncompressed npz, without pickles. Equal arrays give equal bytes.
+
+    `np.savez` asks zipfile for fields of 8 bytes, which patch versions of Python write differently. Here only
+    an array of more than a gigabyte has them.
+    """
+    with atomic_path(path) as temporary, zipfile.ZipFile(temporary, "w") as archive:
+        for name, value in arrays.items():
+            array, entry = np.asanyarray(value), zipfile.ZipInfo(f"{name}.npy")  # of the year 1980
+            entry.create_system = 3  # as on Unix, whatever the system
+            with archive.open(entry, "w", force_zip64=array.nbytes > 1 << 30) as file:
+                np.lib.format.write_array(file, array, allow_pickle=False)
 
 
 class Arrays(dict[str, np.ndarray]):

@@ -20,6 +20,7 @@ MAX_YAML_DEPTH = 100  # levels of lists and mappings within each other
 # At most this many values in a file, counted after each alias (`*name`) is replaced by what it stands for.
 # This number of values takes about 100 MB of memory.
 MAX_YAML_NODES = 1_000_000
+LONGEST_INTEGER = 40  # characters; Python refuses to print a number of more than 4,300 digits
 
 
 def check_regular(path: str | Path) -> os.stat_result:
@@ -122,7 +123,7 @@ def _check_depth(events: Iterable[yaml.Event]) -> None:
 
 
 def _check_keys(path: str | Path, top: yaml.Node) -> None:
-    """Raise InputError for a duplicate key. YAML's loader would silently take the last value."""
+    """Raise InputError for a duplicate key, of which YAML's loader would take the last, or a huge integer."""
     todo, seen = [top], set()
     while todo:
         node = todo.pop()
@@ -131,6 +132,10 @@ def _check_keys(path: str | Path, top: yaml.Node) -> None:
         seen.add(id(node))
         todo += _children(node)
         lines: dict[tuple[str, str], int] = {}  # (type, text) of a key -> its line, from 1
+        for scalar in _children(node):
+            if scalar.tag == "tag:yaml.org,2002:int" and len(scalar.value) > LONGEST_INTEGER:
+                problem = f"an integer of {len(scalar.value)} characters"
+                raise InputError(path, problem, line=scalar.start_mark.line + 1)
         for key in (child[0] for child in node.value if isinstance(child, tuple)):
             if not isinstance(key.value, str):
                 continue  # not a valid key; the loader reports it

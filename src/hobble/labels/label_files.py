@@ -17,7 +17,7 @@ import numpy as np
 from hobble.core.errors import InputError
 from hobble.core.files import write_text
 from hobble.core.quat import Array
-from hobble.core.untrusted import read_text
+from hobble.core.untrusted import MAX_TEXT_BYTES, read_text
 from hobble.labels.clip_labels import GAITS, Labels
 
 FILE_GAITS = ("stand", "walk", "jog", "run", "crouch", "jump", "crawl", "unknown")  # columns of `.gait`
@@ -26,6 +26,7 @@ GAIT_OF_FILE_GAIT = {
     "crawl": "crouch",
     "unknown": "bump",
 }  # gait that only files name -> gait of GAITS
+LONGEST_LINE = 1024  # bytes; a line of eight shares with all their digits has about 200
 
 
 @dataclass(frozen=True)
@@ -93,7 +94,7 @@ def read_footsteps(path: Path, time: SourceTime) -> Array:
     steps: list[tuple[float, float, float]] = []
     last = 0.0  # the frame of the landing before
     short_line = 0  # number of the line that holds only one frame; 0: none yet
-    for number, words in _read_lines(path):
+    for number, words in _read_lines(path, time):
         if short_line:
             raise InputError(
                 path,
@@ -139,7 +140,7 @@ def read_gait_keys(path: Path, time: SourceTime, frames: int) -> Array:
     """
     names = (*FILE_GAITS, "bump")
     keys: list[tuple[float, int]] = []
-    for number, words in _read_lines(path):
+    for number, words in _read_lines(path, time):
         if len(words) != 2:
             raise InputError(
                 path,
@@ -178,9 +179,13 @@ def read_gait_keys(path: Path, time: SourceTime, frames: int) -> Array:
     return (1 - fade) * shares[following - 1] + fade * shares[following]
 
 
-def _read_lines(path: Path) -> Iterator[tuple[int, list[str]]]:
-    """Read a file. Yields the number (from 1) and the words of each line that is not empty."""
-    for number, line in enumerate(read_text(path).splitlines(), 1):
+def _read_lines(path: Path, time: SourceTime) -> Iterator[tuple[int, list[str]]]:
+    """Read a file. Yields the number (from 1) and the words of each line that is not empty.
+
+    Raises InputError for a file that is too large for a clip with so many frames.
+    """
+    most = min(MAX_TEXT_BYTES, LONGEST_LINE * (time.frames + 10))
+    for number, line in enumerate(read_text(path, most).splitlines(), 1):
         if words := line.split():
             yield number, words
 
@@ -202,13 +207,15 @@ def _read_matrix(path: Path, time: SourceTime, columns: int) -> Array:
     The file may have one row more or less than the source has frames.
     """
     rows = []
-    for number, words in _read_lines(path):
+    for number, words in _read_lines(path, time):
         if len(words) != columns:
             raise InputError(path, f"has {len(words)} values instead of {columns}", line=number)
         values = [_parse_number(path, number, w) for w in words]
         if not all(-1e-6 <= v <= 1 + 1e-6 for v in values):
             raise InputError(path, "has a value outside 0..1", line=number)
         rows.append(values)
+        if len(rows) > time.frames + 1:
+            break
     if abs(len(rows) - time.frames) > 1:
         raise InputError(
             path,

@@ -14,13 +14,16 @@ of the body, and a table for all films. It also writes tables.md, which has all 
 from __future__ import annotations
 
 import argparse
+from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
+from pydantic import Field
 
+from hobble.core.declared import read_declared
 from hobble.core.errors import InputError
 from hobble.core.files import read_json, write_csv, write_text
 from hobble.core.untrusted import printable, read_yaml
@@ -42,7 +45,7 @@ class ShownFilm:
     hurt in it.
     """
 
-    number: int
+    number: Annotated[int, Field(alias="film", strict=True)]
     kind: str
     parts: tuple[str, ...]
 
@@ -56,7 +59,7 @@ class Study:
     the parts of the body that people can tick.
     """
 
-    name: str
+    name: Annotated[str, Field(alias="study")]
     configuration: str
     parts: tuple[str, ...]
     films: tuple[ShownFilm, ...]
@@ -69,9 +72,9 @@ class FilmAnswer:
     film: the film's number. parts: the ticked parts. fluid: mark for how fluid the motion is, from 1 to 5.
     """
 
-    film: int
+    film: Annotated[int, Field(strict=True)]
     parts: tuple[str, ...]
-    fluid: int
+    fluid: Annotated[int, Field(strict=True, ge=FLUID_MARKS[0], le=FLUID_MARKS[-1])]
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -107,13 +110,7 @@ def read_study(path: str | Path) -> Study:
 
     Raises InputError if the file is damaged.
     """
-    data = read_json(path)
-    try:
-        films = tuple(ShownFilm(row["film"], row["kind"], tuple(row["parts"])) for row in data["films"])
-        return Study(data["study"], data["configuration"], tuple(data["parts"]), films)
-    except (KeyError, TypeError) as error:
-        problem = f"does not describe a questionnaire: {printable(repr(error))}"
-        raise InputError(path, problem, fix=USE_FILMS_JSON) from None
+    return read_declared(path, "the questionnaire", Study, read_json(path), USE_FILMS_JSON)
 
 
 def read_answers(path: str | Path, study: Study) -> list[FilmAnswer]:
@@ -132,30 +129,24 @@ def read_answers(path: str | Path, study: Study) -> list[FilmAnswer]:
         )
     if not isinstance(rows := data.get("answers"), list):
         raise InputError(path, "has no list `answers`", fix=USE_SAVED_FILE)
-    answers = [_checked_answer(path, f"answer {i}", row, study) for i, row in enumerate(rows, 1)]
+    answers = [_read_answer(path, f"answer {i}", row, study) for i, row in enumerate(rows, 1)]
     numbers = [answer.film for answer in answers]
-    if twice := sorted({n for n in numbers if numbers.count(n) > 1}):
-        raise InputError(path, f"film {twice[0]} is answered twice", fix=USE_SAVED_FILE)
+    if twice := [n for n, answered in Counter(numbers).items() if answered > 1]:
+        raise InputError(path, f"film {min(twice)} is answered twice", fix=USE_SAVED_FILE)
     if missing := [film.number for film in study.films if film.number not in numbers]:
         raise InputError(path, f"film {missing[0]} is not answered", fix="Answer all films and save again.")
     return answers
 
 
-def _checked_answer(path: str | Path, where: str, row: Any, study: Study) -> FilmAnswer:
+def _read_answer(path: str | Path, where: str, row: Any, study: Study) -> FilmAnswer:
     """The answer in an item of the list `answers`. where: the item, for messages."""
-    if not isinstance(row, dict):
-        raise InputError(path, f"{where} is no answer: {printable(row, 40)}", fix=USE_SAVED_FILE)
-    film, parts, fluid = row.get("film"), row.get("parts"), row.get("fluid")
-    if film not in [shown.number for shown in study.films] or isinstance(film, bool):
-        raise InputError(path, f"{where}: there is no film {printable(film, 40)}", fix=USE_SAVED_FILE)
-    ticked: list[Any] = parts if isinstance(parts, list) else [parts]
-    if unknown := [part for part in ticked if part not in study.parts]:
+    answer = read_declared(path, where, FilmAnswer, row, USE_SAVED_FILE)
+    if answer.film not in [shown.number for shown in study.films]:
+        raise InputError(path, f"{where}: there is no film {answer.film}", fix=USE_SAVED_FILE)
+    if unknown := [part for part in answer.parts if part not in study.parts]:
         problem = f"{where}: no such part: {printable(unknown[0], 40)}"
         raise InputError(path, problem, fix=f"The parts are {', '.join(study.parts)}.")
-    if not isinstance(fluid, int) or isinstance(fluid, bool) or fluid not in FLUID_MARKS:
-        problem = f"{where}: `fluid` is {printable(fluid, 40)}, but must be 1, 2, 3, 4 or 5"
-        raise InputError(path, problem, fix=USE_SAVED_FILE)
-    return FilmAnswer(film, tuple(dict.fromkeys(ticked)), fluid)
+    return replace(answer, parts=tuple(dict.fromkeys(answer.parts)))
 
 
 def answer_rows_by_numeral(study: Study, people: Sequence[Sequence[FilmAnswer]]) -> dict[str, Rows]:

@@ -88,6 +88,8 @@ class MovingRig:
     names: Sequence[str]
     parents: Sequence[int]
     positions: Array = field(repr=False)
+    # (joint, parent) -> result of `_twins_below`, because comparing names takes long.
+    _twins: dict[tuple[int, int], list[int]] = field(default_factory=dict, init=False, repr=False)
 
     @cached_property
     def lengths(self) -> Array:
@@ -140,11 +142,18 @@ class MovingRig:
         if abs(self.lengths[a] - self.lengths[b]) > share * longer + 0.01 * self.size:
             return False
         for joint, other in ((a, b), (b, a)):
-            across = self.children[self.parents[other]]
-            twins = [j for j in across if j != joint and are_twins(self.names[joint], self.names[j])]
+            twins = self._twins_below(joint, self.parents[other])
             if twins and other not in twins:
                 return False
         return True
+
+    def _twins_below(self, joint: int, parent: int) -> list[int]:
+        """Those children of `parent` whose names say that they are the counterpart of `joint`."""
+        if (joint, parent) not in self._twins:
+            name = self.names[joint]
+            below = [j for j in self.children[parent] if j != joint and are_twins(name, self.names[j])]
+            self._twins[joint, parent] = below
+        return self._twins[joint, parent]
 
     def equal_chains(self, a: int, b: int) -> tuple[float, tuple[int, ...], tuple[int, ...]]:
         """The longest equal chains of bones that start with the bones that end at joints `a` and `b`.
@@ -159,6 +168,7 @@ class MovingRig:
         )
         return float(min(self.lengths[a], self.lengths[b])) + longest[0], (a, *longest[1]), (b, *longest[2])
 
+    @cached_property
     def limb_pairs(self) -> list[Limbs]:
         """All pairs of chains that are long enough and have enough joints to be legs or arms."""
         out = []
@@ -219,7 +229,7 @@ def _find_second_figure(rig: MovingRig, hips: int) -> int | None:
 
 def _find_limbs(rig: MovingRig) -> tuple[Limbs, Limbs]:
     """The legs and the arms of the likeliest body. Raises Doubt if no two pairs of chains can be them."""
-    pairs = rig.limb_pairs()
+    pairs = rig.limb_pairs
     if len(pairs) < 2:
         raise Doubt("its joints do not contain two equal legs and two equal arms")
     all_legs, all_arms = (
@@ -388,7 +398,7 @@ def _head_by_place(rig: MovingRig, legs: Limbs, arms: Limbs, paths: dict[int, li
 
     # A head is single. Hair, ears and wings come in pairs, a left and a right one, so they are left out.
     limbs = legs.all_joints | arms.all_joints
-    twins = set().union(*(pair.all_joints for pair in rig.limb_pairs() if not pair.all_joints & limbs))
+    twins = set().union(*(pair.all_joints for pair in rig.limb_pairs if not pair.all_joints & limbs))
     single = [j for j, path in paths.items() if not twins & set(path) and not side_of(rig.names[j])]
     candidates = single or list(paths)
     if not candidates:

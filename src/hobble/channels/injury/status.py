@@ -35,7 +35,9 @@ HIGHEST_SEVERITY = 10.0
 # A file may have at most this many spells. Three minutes at 120 Hz have about as many frames.
 MOST_SPELLS = 20_000
 SPELL_LINE = re.compile(r"(\d{1,12})\s*-\s*(\d{1,12})\s+(.*)")  # first frame, last frame, links
-LINK_SEVERITY = re.compile(r"\s*(.+?)\s*\[\s*([^\]]*?)\s*\]\s*")  # link, severity
+# At most this many spells may share a frame. Only one of them counts for a link, and warnings compare them.
+MOST_AT_ONCE = 100
+MOST_WARNINGS = 100
 
 
 @dataclass(frozen=True)
@@ -104,10 +106,11 @@ def parse_links(
     for part in text.split(";"):
         if not part.strip():
             continue
-        match = LINK_SEVERITY.fullmatch(part)
-        if match is None:
+        name, _, rest = part.partition("[")
+        value, closing, after = rest.partition("]")
+        name, value = name.strip(), value.strip()
+        if not (name and closing) or after.strip():
             raise InputError(path, f"{part.strip()[:80]!r} does not read as Joint-Joint[severity]", line=line)
-        name, value = match[1], match[2]
         check_link(path, line, name, links)
         pairs.append((name, parse_severity(path, line, name, value)))
     if not pairs:
@@ -186,7 +189,7 @@ def parse_severity(path: str | Path, line: int | None, link: str, text: str) -> 
 
 def _similar_links(name: str, links: Sequence[str]) -> str:
     """Advice on a wrong name: the links with similar names, or all links if none is similar."""
-    near = difflib.get_close_matches(name, links)
+    near = difflib.get_close_matches(name[:200], links)
     return f"Did you mean {' or '.join(near)}?" if near else f"The links are {', '.join(links)}."
 
 
@@ -207,10 +210,11 @@ def severity_matrix(status: Status, links: Sequence[str]) -> Array:
 def range_warnings(status: Status, path: str | Path) -> list[str]:
     """A warning for each range that starts at 0, goes past the last frame or contradicts an earlier line.
 
-    status: the content of the status file `path`.
+    status: the content of the status file `path`. Of many warnings, the first MOST_WARNINGS are returned, and
+    how many there are. Raises InputError if more than MOST_AT_ONCE ranges share a frame.
     """
-    warnings = []
-    overlaps = _overlaps(status.spells)
+    warnings: list[str] = []
+    overlaps = _overlaps(status.spells, path)
     for i, spell in enumerate(status.spells):
         place = f"{Path(path).name}, line {spell.line}: the range {spell.first}-{spell.last}"
         if spell.first > status.frames:
@@ -224,15 +228,22 @@ def range_warnings(status: Status, path: str | Path) -> list[str]:
                 warnings.append(
                     f"{place} overlaps the range of line {earlier.line}. The later line counts for {links}."
                 )
+    if more := len(warnings) - MOST_WARNINGS:
+        warnings[MOST_WARNINGS:] = [f"{Path(path).name}: {more} more ranges like these."] * (more > 0)
     return warnings
 
 
-def _overlaps(spells: Sequence[InjurySpell]) -> dict[int, list[InjurySpell]]:
+def _overlaps(spells: Sequence[InjurySpell], path: str | Path) -> dict[int, list[InjurySpell]]:
     """Index of a spell -> the spells before it in the list that share frames with it, in their order."""
     found: dict[int, list[int]] = {}  # index of a spell -> indices of such spells
     lasting: list[int] = []  # indices of spells that last at the first frame of spell i
     for i in sorted(range(len(spells)), key=lambda i: spells[i].first):
         lasting = [j for j in lasting if spells[j].last >= spells[i].first]
+        if len(lasting) >= MOST_AT_ONCE:
+            problem = f"more than {MOST_AT_ONCE} ranges share frame {spells[i].first}"
+            raise InputError(
+                path, problem, line=spells[i].line, fix="Leave out those that later lines replace."
+            )
         for j in lasting:
             found.setdefault(max(i, j), []).append(min(i, j))
         lasting.append(i)

@@ -1,0 +1,98 @@
+"""Checks what a file holds against a declaration, once, where the file is opened.
+
+Arrays are declared by shape, type and range. JSON is declared by a class: a dataclass or a pydantic model.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from functools import lru_cache
+from pathlib import Path
+from typing import Any, NamedTuple, TypeVar
+
+import numpy as np
+from pydantic import TypeAdapter, ValidationError
+
+from hobble.core.errors import InputError
+from hobble.core.untrusted import printable
+
+Declared = TypeVar("Declared")
+
+
+class Numbers(NamedTuple):
+    """An array of finite numbers.
+
+    shape: the length of each axis, or a letter for a length that all arrays of the file with this letter
+    share. kinds: the codes of NumPy's allowed types: f floats, i and u integers, b truth values. low, high:
+    smallest and largest number that is allowed.
+    """
+
+    shape: tuple[int | str, ...]
+    kinds: str = "f"
+    low: float = -math.inf
+    high: float = math.inf
+
+
+def check_arrays(
+    path: str | Path,
+    arrays: Mapping[str, np.ndarray],
+    declared: Mapping[str, Numbers],
+    lengths: Mapping[str, int] | None = None,
+    fix: str | None = None,
+) -> dict[str, int]:
+    """Raise InputError unless each declared array is there and is as declared. Further arrays are ignored.
+
+    path, fix: for the message. lengths: those of letters that are known before. Returns those of all letters.
+    """
+    known: dict[Any, int] = dict(lengths or {})
+    for name, numbers in declared.items():
+        if name not in arrays:
+            raise InputError(path, f"no {name}", fix=fix)
+        array = np.asarray(arrays[name])
+        if array.ndim == len(numbers.shape):
+            for axis, length in zip(numbers.shape, array.shape, strict=True):
+                known.setdefault(axis, length)
+        expected = tuple(axis if isinstance(axis, int) else known.get(axis, axis) for axis in numbers.shape)
+        if array.shape != expected or array.dtype.kind not in numbers.kinds:
+            wanted = f"({', '.join(map(str, expected))}) numbers of kind {numbers.kinds}"
+            raise InputError(
+                path, f"{name} has shape {array.shape} and type {array.dtype}, expected {wanted}", fix=fix
+            )
+        _check_range(path, name, array, numbers, fix)
+    return known
+
+
+def _check_range(path: str | Path, name: str, array: np.ndarray, numbers: Numbers, fix: str | None) -> None:
+    if not array.size:
+        return
+    low, high = float(array.min()), float(array.max())  # NaN if there is one
+    if not (math.isfinite(low) and math.isfinite(high)):
+        raise InputError(path, f"{name} holds numbers that are not finite", fix=fix)
+    if low < numbers.low or high > numbers.high:
+        wrong, limit = (low, numbers.low) if low < numbers.low else (high, numbers.high)
+        side = "below" if low < numbers.low else "above"
+        raise InputError(path, f"{name} holds {wrong:.3g}, {side} the limit of {limit:g}", fix=fix)
+
+
+@lru_cache(maxsize=64)
+def _adapter(declared: Any) -> TypeAdapter[Any]:
+    return TypeAdapter(declared)
+
+
+def read_declared(
+    path: str | Path, what: str, declared: type[Declared], data: Any, fix: str | None = None
+) -> Declared:
+    """The content `data` of a JSON or YAML file as an object of the class `declared`.
+
+    path, what, fix: for the message, such as "its skeleton". Raises InputError that names the first value
+    which is missing or not as declared.
+    """
+    try:
+        return _adapter(declared).validate_python(data)  # type: ignore[arg-type, no-any-return]
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        key = ".".join(str(part) for part in first["loc"])
+        problem = first["msg"].removeprefix("Value error, ")
+        place = f"{what}: {key}" if key else what
+        raise InputError(path, printable(f"{place}: {problem}", 300), fix=fix) from None
