@@ -21,7 +21,7 @@ from hobble.channels.injury.status import parse_links
 from hobble.core.clip import Clip
 from hobble.core.errors import HobbleError
 from hobble.core.files import load_npz
-from hobble.gait.__main__ import read_clip
+from hobble.cli.gait import read_clip
 from hobble.gait.cycles import join_walks, measure_clip
 from hobble.gait.profile import (
     GAITS,

@@ -42,7 +42,9 @@ def upward_arrows(imports: Mapping[str, Set[str]]) -> list[str]:
         f"{module} imports {imported}"
         for module, all_imported in sorted(imports.items())
         for imported in sorted(all_imported)
-        if "." in module and "." in imported and _floor(imported) > _floor(module)
+        # A `__main__` runs a command; no module imports it.
+        if "." in module and "." in imported and not module.endswith(".__main__")
+        if _floor(imported) > _floor(module)
     ]
 
 

@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
+import json
+import re
+import shlex
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 import yaml
 
-from hobble.cli.__main__ import main
+from hobble.channels.injury.status import read_status
+from hobble.cli import clips
+from hobble.cli.__main__ import COMMANDS, GROUPS, main
 from hobble.motion.read import read_bvh
 from hobble.synthetic.generate_clip import write_clip
 from hobble.synthetic.options import Synthetic
@@ -75,9 +82,80 @@ def test_a_missing_report_is_named_with_the_command_that_makes_it(tmp_path, monk
     assert capsys.readouterr().out.strip() == page.as_uri() + "#play"
 
 
-def test_help_lists_every_command(capsys):
+def test_help_lists_every_command_once_in_its_group(capsys):
     with pytest.raises(SystemExit) as stop:
         main(["--help"])
     assert stop.value.code == 0
     text = capsys.readouterr().out
-    assert all(name in text for name in ("motion", "labels", "injury", "play"))
+    assert [len(re.findall(rf"^  {name} +[A-Z]", text, re.M)) for name in COMMANDS] == [1] * len(COMMANDS)
+    assert {command.group for command in COMMANDS.values()} == GROUPS.keys()
+    with pytest.raises(SystemExit):
+        main(["--version"])
+    assert re.fullmatch(r"hobble \d+\.\d+\.\d+\n", capsys.readouterr().out)
+
+
+def test_what_a_machine_reads_is_json(folder, tmp_path, capsys):
+    assert main(["look", str(folder), "--json"]) == 1
+    clips = {clip["name"]: clip for clip in json.loads(capsys.readouterr().out)["clips"]}
+    assert clips["broken"]["refused"]
+    assert clips["one"]["fps"] == 120.0
+    assert main(["labels", str(folder), str(tmp_path), "--json"]) == 1
+    results = {result["clip"]: result for result in json.loads(capsys.readouterr().out)}
+    assert "broken.bvh" in results["broken"]["error"]
+    assert "cycles" in results["two"]["notes"][0]
+
+
+def test_the_settings_of_a_data_set_are_options(folder, tmp_path, capsys):
+    """Each remedy that a refusal names is an option."""
+    source = str(folder / "one.bvh")
+    assert main(["motion", source, str(tmp_path), "--unit", "2"]) == 0
+    once, twice = (read_bvh(path) for path in (folder / "one.bvh", tmp_path / "one.bvh"))
+    np.testing.assert_allclose(twice.offsets[1:], 2 * once.offsets[1:], atol=1e-4)
+    assert main(["look", source, "--unit", "-1"]) == 1
+    assert "hobble: unit" in capsys.readouterr().err
+
+
+def test_a_clip_is_hurt_and_its_status_file_says_how(folder, tmp_path, holden31, capsys):
+    source = str(folder / "one.bvh")
+    assert main(["hurt", source, str(tmp_path), "--injury", "LeftUpLeg-LeftLeg[8]", "--unit", "1"]) == 0
+    clip = read_bvh(tmp_path / "one_limps.bvh")
+    status = read_status(tmp_path / "one_limps_injuries.txt", holden31.link_names)
+    assert status.frames == len(clip.values) > len(read_bvh(folder / "one.bvh").values), "it walks slower"
+    assert status.spells[0].links == (("LeftUpLeg-LeftLeg", 8.0),)
+    assert main(["hurt", source, str(tmp_path), "--injury", "LeftLeg-Tail[8]"]) == 1
+    assert "no such link: LeftLeg-Tail" in capsys.readouterr().err
+
+
+def test_a_bug_is_one_line_with_the_file_and_a_log(folder, tmp_path, monkeypatch, capsys):
+    def broken(*arguments):
+        raise KeyError("left knee")
+
+    monkeypatch.setattr(clips, "make_clip", broken)
+    assert main(["labels", str(folder / "one.bvh"), str(tmp_path)]) == 1
+    monkeypatch.setattr(clips, "summarise_clips", broken)
+    assert main(["look", str(folder)]) == 1
+    said = capsys.readouterr()
+    for line, name in ((said.out.splitlines()[0], "one.bvh"), (said.err.strip(), str(folder))):
+        log = re.fullmatch(r".*: KeyError: 'left knee'\. .*report it with the log (\S+)", line)[1]
+        assert name in line
+        assert "Traceback" in Path(log).read_text()
+        Path(log).unlink()
+
+
+def test_a_reader_that_has_read_enough_ends_the_command_quietly(folder):
+    command = [sys.executable, "-m", "hobble.motion", "look", str(folder)]
+    done = subprocess.run(f"{shlex.join(command)} | true", shell=True, capture_output=True, text=True)
+    assert done.stderr == ""
+
+
+@pytest.mark.parametrize("shell", ["bash", "fish", "zsh"])
+def test_a_shell_completes_commands_and_their_options(shell, capsys):
+    assert main(["completion", shell]) == 0
+    script = capsys.readouterr().out
+    assert all(name in script for name in COMMANDS)
+    if shell == "bash":
+        for words, wanted in (("hobble mo", "motion"), ("hobble gait --hea", "--healthy --heading")):
+            asked = words.split()
+            call = f"COMP_WORDS=({words}); COMP_CWORD={len(asked) - 1}; _hobble; echo ${{COMPREPLY[*]}}"
+            done = subprocess.run(["bash", "-c", f"{script}\n{call}"], capture_output=True, text=True)
+            assert done.stdout.strip() == wanted

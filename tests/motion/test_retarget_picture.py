@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import re
 import shutil
-import sys
 from xml.etree import ElementTree
 
 import pytest
 
+from hobble.cli.__main__ import main
 from hobble.core.bvh import write_bvh
-from hobble.motion.__main__ import main
 from hobble.motion.look import PICTURES, WRONG, retarget_picture
 from hobble.motion.skeleton_file import load_skeleton
 
@@ -38,9 +37,7 @@ def test_equal_clips_are_drawn_alike_and_at_their_own_height(walk):
     assert lowest == pytest.approx(0.0, abs=0.06)
 
 
-def test_a_wrong_map_is_refused_with_the_joint_and_a_picture(
-    root, walker, tmp_path, monkeypatch, capsys
-) -> None:
+def test_a_wrong_map_is_refused_with_the_joint_and_a_picture(root, walker, tmp_path, capsys) -> None:
     """Here the left arm follows the right one."""
     maps = tmp_path / "skeletons"
     shutil.copytree(root / "config/skeletons", maps)
@@ -50,8 +47,7 @@ def test_a_wrong_map_is_refused_with_the_joint_and_a_picture(
     clip = tmp_path / "clip.bvh"
     write_bvh(clip, walker(load_skeleton(file).skeleton, 120, 60.0), decimals=6)
     given = ["look", str(clip), "--skeletons", str(maps), "--picture", str(tmp_path / "apart.svg")]
-    monkeypatch.setattr(sys, "argv", ["motion", *given])
-    assert main() == 1
+    assert main(given) == 1
     said = capsys.readouterr().out
     found = re.search(r"the (left|right) (upper arm|forearm|elbow) is \d+ degrees off its source", said)
     assert found, said

@@ -11,6 +11,7 @@ import onnx
 import onnxruntime
 import pytest
 
+from hobble.cli.__main__ import main
 from hobble.core.errors import InputError
 from hobble.core.skeleton import Skeleton
 from hobble.models.forward import weights_at
@@ -19,7 +20,6 @@ from hobble.models.onnx_file import OPSET, TOLERANCE, check, export, write_check
 from hobble.models.pfnn import OPTIONS
 from hobble.models.pfnn.release import write_release
 from hobble.rows.layout import RowLayout
-from hobble.runtime.__main__ import main
 
 
 def run(path: Path, x: np.ndarray, phase: np.ndarray) -> np.ndarray:
@@ -99,17 +99,18 @@ def test_the_command_exports_onnx(
     write_release(tmp_path / "pfnn", hurtable)
     skeleton = ["--skeleton", str(root / "config" / "skeletons" / "holden31.yaml")]
     target = tmp_path / "out" / "network.onnx"
-    assert main(["onnx", str(tmp_path / "pfnn"), str(target), "--mode", "linear", *skeleton]) == 0
+    assert main(["export", "onnx", str(tmp_path / "pfnn"), str(target), "--mode", "linear", *skeleton]) == 0
     assert "network.onnx: differs from" in capsys.readouterr().out
     assert target.exists()
-    assert main(["bin", str(tmp_path / "pfnn"), str(tmp_path / "copy"), *skeleton]) == 0
+    assert main(["export", "bin", str(tmp_path / "pfnn"), str(tmp_path / "copy"), *skeleton]) == 0
     for path in (tmp_path / "pfnn").iterdir():
         a, b = (np.fromfile(p, "<f4") for p in (path, tmp_path / "copy" / path.name))
         np.testing.assert_allclose(a, b, atol=1e-6)
     capsys.readouterr()
-    assert main(["onnx", str(tmp_path), str(tmp_path / "x.onnx")]) == 1
+    assert main(["export", "onnx", str(tmp_path), str(tmp_path / "x.onnx")]) == 1
     assert "not a network" in capsys.readouterr().err
-    assert main(["bin", str(tmp_path / "pfnn"), str(tmp_path), "--skeleton", str(root / "Makefile")]) == 1
+    skeleton = ["--skeleton", str(root / "Makefile")]
+    assert main(["export", "bin", str(tmp_path / "pfnn"), str(tmp_path), *skeleton]) == 1
     assert "Makefile" in capsys.readouterr().err
 
 

@@ -4,53 +4,126 @@ from __future__ import annotations
 
 import argparse
 import inspect
+import os
+import signal
 import sys
-from collections.abc import Callable, Sequence
-from typing import Any
+from collections.abc import Mapping, Sequence
+from importlib.metadata import version
 
-from hobble.cli.commands import Injury, Labels, Motion, Play
+from hobble.cli import characters, clips, gait
+from hobble.cli.command import Command, report_bug
 from hobble.core.errors import HobbleError
-from hobble.measures import study
 
-COMMANDS: dict[str, Any] = {
-    "motion": Motion,
-    "labels": Labels,
-    "injury": Injury,
-    "study": study,
-    "play": Play,
+GROUPS = {
+    "clips": "BVH files",
+    "limps": "what hurts",
+    "characters": "a trained character",
+    "shell": "the shell",
 }
 
 
+def completion(options: argparse.Namespace) -> int:
+    """Print a script that completes the command in a shell.
+
+    source <(hobble completion bash)
+    hobble completion fish | source
+    """
+    words = {name: _words_of(parser) for name, parser in _parsers().items()}
+    if options.shell == "fish":
+        lines = [f"complete -c hobble -n __fish_use_subcommand -a '{' '.join(words)}'"]
+        for name, known in words.items():
+            lines.append(f"complete -c hobble -n '__fish_seen_subcommand_from {name}' -a '{known}'")
+    else:
+        # zsh has `complete` after `bashcompinit`.
+        lines = ["autoload -U +X bashcompinit && bashcompinit"] if options.shell == "zsh" else []
+        lines += ["_hobble() {", '  case "${COMP_WORDS[1]}" in']
+        lines += [f'    {name}) words="{known}" ;;' for name, known in words.items()]
+        lines += ["    *) words= ;;", "  esac"]
+        lines += [f'  [ "$COMP_CWORD" = 1 ] && words="{" ".join(words)} --help --version"']
+        lines += ['  COMPREPLY=($(compgen -W "$words" -- "${COMP_WORDS[COMP_CWORD]}"))', "}"]
+        lines += ["complete -o default -F _hobble hobble"]
+    print("\n".join(lines))
+    return 0
+
+
+def _words_of(parser: argparse.ArgumentParser) -> str:
+    """The options of a subcommand and the words that its arguments allow."""
+    actions = [action for action in parser._actions if action.help != argparse.SUPPRESS]
+    words = [word for action in actions for word in [*action.option_strings, *(action.choices or ())]]
+    return " ".join(map(str, words))
+
+
+def _completion_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("shell", choices=("bash", "zsh", "fish"))
+
+
+COMMANDS: Mapping[str, Command] = {
+    **clips.COMMANDS,
+    **gait.COMMANDS,
+    **characters.COMMANDS,
+    "completion": Command("shell", _completion_arguments, completion),
+}
+
+
+def _parsers(parent: argparse.ArgumentParser | None = None) -> dict[str, argparse.ArgumentParser]:
+    """Name of each subcommand -> its parser, below `parent`."""
+    parent = parent or argparse.ArgumentParser(prog="hobble")
+    commands = parent.add_subparsers(dest="command", required=True, metavar="COMMAND", help=argparse.SUPPRESS)
+    parsers = {}
+    for name, command in COMMANDS.items():
+        text = str(inspect.getdoc(command.run))
+        parser = commands.add_parser(
+            name, description=text, formatter_class=argparse.RawDescriptionHelpFormatter
+        )
+        command.add_arguments(parser)
+        parser.set_defaults(run=command.run)
+        parsers[name] = parser
+    return parsers
+
+
+def _description() -> str:
+    """What `hobble --help` says: the subcommands with the first line of their texts, in groups."""
+    lines = [
+        "Commands for single clips and networks. A Snakemake workflow trains a character: see README.md."
+    ]
+    for group, title in GROUPS.items():
+        lines += ["", f"{title}:"]
+        for name, command in COMMANDS.items():
+            if command.group == group:
+                lines.append(f"  {name:12}{str(inspect.getdoc(command.run)).splitlines()[0]}")
+    return "\n".join(lines)
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run a subcommand. Returns the exit status: 0, 1 if something failed, or 130 after Ctrl+C.
+    """Run a subcommand. Returns the exit status: 0, 1 if something failed, or 128 plus a signal's number.
 
     arguments: by default those of the command line. With wrong arguments, the process exits with status 2.
     """
     parser = argparse.ArgumentParser(
         prog="hobble",
-        description="Converts and labels clips, and opens a trained character. "
-        "A Snakemake workflow trains a character from clips: see README.md.",
+        usage="hobble [--help] [--version] COMMAND ...",
+        description=_description(),
+        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
-    for name, module in COMMANDS.items():
-        text = str(inspect.getdoc(module))  # its first line is the entry in the list of subcommands
-        command = commands.add_parser(
-            name,
-            help=text.splitlines()[0],
-            description=text,
-            formatter_class=argparse.RawDescriptionHelpFormatter,
-        )
-        module.add_arguments(command)
-        command.set_defaults(run=module.run)
+    parser.add_argument("--version", action="version", version=f"hobble {version('hobble')}")
+    _parsers(parser)
     options = parser.parse_args(arguments)
-    run: Callable[[argparse.Namespace], int] = options.run
     try:
-        return run(options)
+        status = int(options.run(options))
+        sys.stdout.flush()
+        return status
     except HobbleError as error:
         print(error, file=sys.stderr)
         return 1
     except KeyboardInterrupt:
-        return 130
+        return 128 + signal.SIGINT
+    except BrokenPipeError:  # the reader, such as `head`, has read enough
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 128 + signal.SIGPIPE
+    except Exception as error:
+        files = [str(value) for value in vars(options).values() if hasattr(value, "suffix")]
+        print(report_bug(error, f"hobble {options.command} {' '.join(files)}: "), file=sys.stderr)
+        return 1
 
 
 if __name__ == "__main__":

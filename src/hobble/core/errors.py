@@ -9,6 +9,15 @@ class HobbleError(Exception):
     """An error caused by the user's input. Its text is the whole message; no traceback is shown."""
 
 
+def unforeseen(error: Exception, log: str | Path) -> str:
+    """One line for an error that nobody foresaw. log: the file that has its traceback."""
+    reason = " ".join(str(error).split())
+    return (
+        f"{type(error).__name__}: {reason:.500}. This is a bug in Hobble, not a fault in your data. "
+        f"Please report it with the log {log}"
+    )
+
+
 class InputError(HobbleError):
     """Something is wrong with a file.
 

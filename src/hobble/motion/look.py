@@ -6,7 +6,7 @@ import html
 import json
 import re
 from collections import Counter
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from pathlib import Path
@@ -165,17 +165,21 @@ class FolderSummary:
 
 
 def summarise_clips(
-    folder: Path, skeleton: Path, skeleton_folder: Path, options: ClipMotion | None = None
+    folder: Path,
+    skeleton: Path,
+    skeleton_folder: Path,
+    options: ClipMotion | None = None,
+    progress: Callable[[Iterable[Path]], Iterable[Path]] = iter,
 ) -> FolderSummary:
     """Summarise each BVH file of a folder. Raises InputError if there is none.
 
     folder: the folder, or one BVH file. skeleton: file of the skeleton to which the clips are retargeted.
     skeleton_folder: the folder of the skeleton files. options: how the files are read (the section `motion`
-    of a data set).
+    of a data set). progress: shows how far the work has come, while it hands on the files.
     """
     files = list(clips_in(folder).values())
     clips = tuple(
-        _summary_of_file(file, skeleton, skeleton_folder, options or ClipMotion()) for file in files
+        _summary_of_file(file, skeleton, skeleton_folder, options or ClipMotion()) for file in progress(files)
     )
     unused = () if folder.is_file() else tuple(unused_file_notes(folder, [file.stem for file in files]))
     short, common = shared_warnings(clips)

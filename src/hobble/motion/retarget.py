@@ -406,8 +406,8 @@ def check_difference(path: Path, differences: dict[str, Any], rig: str) -> None:
     """
     name, degrees = most_different(differences)
     fix = (
-        f"Look at both (`python -m hobble.motion look {path} --picture apart.svg` draws them side by side), "
-        f"and correct the roles of its rig. `python -m hobble.motion rig {path}` writes a draft for "
+        f"Look at both (`hobble look {path} --picture apart.svg` draws them side by side), "
+        f"and correct the roles of its rig. `hobble rig {path}` writes a draft for "
         "config/skeletons/."
     )
     if degrees > MOST_DIFFERENCE:

@@ -343,7 +343,7 @@ def _doubt_error(path: Path, rig: Skeleton, doubt: Doubt) -> InputError:
     It shows a draft of the skeleton file, or only the beginning of a long draft. rig: the joints of the file.
     """
     text, hidden = draft_skeleton_file(rig, guess_roles(rig)), len(rig.joints) - MOST_SHOWN
-    command = f"python -m hobble.motion rig {path.name}"
+    command = f"hobble rig {path.name}"
     fix = (
         f"Put the right joints into this draft (`{command}` prints it, too), save it as "
         "config/skeletons/<name>.yaml, and run again:"

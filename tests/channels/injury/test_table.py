@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from hobble.channels.injury.__main__ import main
 from hobble.channels.injury.status import read_status
 from hobble.channels.injury.table import bvh_frames, read_table, status_by_clip, write_statuses
+from hobble.cli.__main__ import main
 from hobble.core.errors import InputError
 
 LINKS = ("LeftUpLeg-LeftLeg", "LowerBack-Spine")
@@ -85,17 +85,7 @@ def test_a_file_that_is_not_csv_is_refused_with_one_message(folder, root, capsys
     with pytest.raises(InputError, match=r"not CSV: field larger.*Look for a quotation mark") as caught:
         read_table(table(folder, text), LINKS)
     assert caught.value.line == line or line is None
-    assert (
-        main(
-            [
-                str(folder / "table.csv"),
-                str(folder),
-                "--skeleton",
-                str(root / "config/skeletons/holden31.yaml"),
-            ]
-        )
-        == 1
-    )
+    assert main(["injury", str(folder / "table.csv"), str(folder)]) == 1
     assert len(capsys.readouterr().err) < 300 + len(str(folder))
 
 
@@ -121,8 +111,8 @@ def test_clips_in_subfolders_and_in_capitals_are_found(folder):
 def test_the_command_writes_status_files_and_reports_an_unknown_link(folder, root, capsys):
     skeleton = str(root / "config/skeletons/holden31.yaml")
     path = table(folder, "walk,RightFoot-RightToeBase,5,,\n")
-    assert main([str(path), str(folder), "--skeleton", skeleton]) == 0
+    assert main(["injury", str(path), str(folder), "--skeleton", skeleton]) == 0
     assert "walk_injuries.txt" in capsys.readouterr().out
     path = table(folder, "walk,RightFoot,5,,\n")
-    assert main([str(path), str(folder), "--skeleton", skeleton]) == 1
+    assert main(["injury", str(path), str(folder), "--skeleton", skeleton]) == 1
     assert "no such link: RightFoot" in capsys.readouterr().err

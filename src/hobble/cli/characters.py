@@ -1,0 +1,97 @@
+"""The subcommands of `hobble` for a trained character: play, export, study."""
+
+from __future__ import annotations
+
+import argparse
+import webbrowser
+from pathlib import Path
+from typing import get_args
+
+from hobble.cli.command import Command
+from hobble.core.errors import HobbleError, InputError
+from hobble.core.section import PhaseMode
+from hobble.measures import study
+from hobble.models.load import load_network
+from hobble.runtime.options import Runtime
+from hobble.runtime.scenarios import write_motions
+
+
+def play(options: argparse.Namespace) -> int:
+    """Open the page on which you control a trained character with the keyboard.
+
+    hobble play                    opens the newest report under results/
+    hobble play results/injured    opens the report of the configuration `injured`
+    """
+    address = find_report(options.results).resolve().as_uri() + "#play"
+    print(address)
+    if not options.print and not webbrowser.open(address):
+        print("No browser could be started. Open the address above in one.")
+    return 0
+
+
+def _play_arguments(parser: argparse.ArgumentParser) -> None:
+    results = "results/<configuration>, or a report file; default: the newest report"
+    parser.add_argument("results", nargs="?", type=Path, help=results)
+    parser.add_argument("--print", action="store_true", help="print the address, open no browser")
+
+
+def find_report(results: Path | None) -> Path:
+    """The path of a report. results: a report, or the folder that holds it; None: the newest under results/.
+
+    If there is no report, raises InputError with the command that makes one.
+    """
+    if results is None:
+        found = sorted(Path("results").glob("*/report.html"), key=lambda path: path.stat().st_mtime)
+        if not found:
+            raise InputError("results", "holds no report", fix="`make report` makes one.")
+        return found[-1]
+    path = results / "report.html" if results.is_dir() or results.suffix != ".html" else results
+    if not path.is_file():
+        raise InputError(path, "no such report", fix=f"`snakemake -c2 {path}` makes it.")
+    return path
+
+
+def export(options: argparse.Namespace) -> int:
+    """Export a network (onnx, bin), or motions that it generates (bvh).
+
+    hobble export onnx results/holden/network holden.onnx --mode cubic
+    hobble export bin results/holden/network out/holden
+    hobble export bvh out/holden out/walks --skeleton config/skeletons/holden31.yaml
+    """
+    network = load_network(options.network, options.skeleton)
+    if options.to != "bvh":
+        print(network.export(options.to, options.target, options.mode))
+        return 0
+    if network.skeleton is None:
+        raise HobbleError("the network has no skeleton: pass one with --skeleton")
+    tracks = write_motions(network, options.target, Runtime(mode=options.mode))
+    print(f"{options.target}: {', '.join(track.scenario.name for track in tracks)}")
+    return 0
+
+
+def _export_arguments(parser: argparse.ArgumentParser) -> None:
+    add = parser.add_argument
+    to = (
+        "onnx: one file, checked with onnxruntime; bin: .bin files as in the release of Holden et al.; "
+        "bvh: a few walks that the network generates (straight, turning, ...), one BVH file each"
+    )
+    add("to", choices=("onnx", "bin", "bvh"), help=to)
+    add("network", help="weights.npz, the folder that holds it, or a folder of .bin files")
+    add("target", help="the file or folder to write")
+    mode = "how the network's weights are interpolated over the phase; cubic is exact"
+    add("--mode", choices=get_args(PhaseMode), default="cubic", help=mode)
+    add("--skeleton", help="a file of config/skeletons, for a network file that has no skeleton")
+
+
+def run_study(options: argparse.Namespace) -> int:
+    """Run `hobble study`. (Its text is that of hobble.measures.study.)"""
+    return study.run(options)
+
+
+run_study.__doc__ = study.__doc__
+
+COMMANDS = {
+    "play": Command("characters", _play_arguments, play),
+    "export": Command("characters", _export_arguments, export),
+    "study": Command("characters", study.add_arguments, run_study),
+}

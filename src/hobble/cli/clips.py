@@ -1,0 +1,276 @@
+"""The subcommands of `hobble` for BVH files: look, rig, motion, labels, hurt, injury."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hobble.channels.injury.status import FPS, InjurySpell, Status, parse_links, write_status
+from hobble.channels.injury.table import skeleton_links, write_statuses
+from hobble.cli.command import (
+    Command,
+    add_folders,
+    add_json,
+    add_motion_options,
+    motion_options,
+    print_result,
+    process_clips,
+    progress,
+)
+from hobble.core.bvh import write_bvh
+from hobble.core.clip import Clip
+from hobble.core.errors import InputError
+from hobble.core.files import write_text
+from hobble.hurt.hurt_clip import hurt_clip
+from hobble.labels.clip_labels import GAITS, Labels
+from hobble.labels.label import label_clip
+from hobble.labels.label_files import SourceTime, write_label_files
+from hobble.labels.options import LabelOptions
+from hobble.motion.edit import loop_clip, mirror_clip, resample
+from hobble.motion.limbs import Doubt, find_body
+from hobble.motion.look import format_table, picture_of_file, summarise_clips
+from hobble.motion.make import load_source, make_clip, raw_clip, rig_in_file
+from hobble.motion.read import read_bvh
+from hobble.motion.skeleton_file import (
+    draft_skeleton_file,
+    find_skeleton,
+    guess_roles,
+    load_skeleton,
+    skeleton_folder,
+)
+
+# Clips are retargeted to this skeleton before they are labelled; label files fit any skeleton, because they
+# name no joints. `hobble motion` without --skeleton uses its roles, such as hips and left heel, to recognise
+# the joints of each file.
+SKELETON = "holden31"
+
+
+def look(options: argparse.Namespace) -> int:
+    """Try to read each clip of a folder, and print a line about each: rig, frame rate, steps, warnings.
+
+    hobble look FOLDER
+    hobble look FILE.bvh --picture apart.svg
+    """
+    settings, target = motion_options(options), find_skeleton(options.skeleton)
+    folder = options.skeletons or skeleton_folder()
+    if options.picture:
+        write_text(options.picture, picture_of_file(options.folder, target, folder, settings))
+    summary = summarise_clips(options.folder, target, folder, settings, progress)
+    clips = [{key: value for key, value in vars(clip).items() if key != "digest"} for clip in summary.clips]
+    print_result(options, {"clips": clips, "notes": summary.notes}, format_table(summary))
+    return int(any(clip.refused for clip in summary.clips))
+
+
+def _look_arguments(parser: argparse.ArgumentParser) -> None:
+    add = parser.add_argument
+    add("folder", type=Path, help="a folder of BVH files, or one file")
+    _add_skeleton(parser, "skeleton to which the clips are retargeted")
+    add("--skeletons", type=Path, help="folder of the skeleton files (default config/skeletons)")
+    picture = (
+        "only if one file is given: the picture to write, which shows the motion before and after "
+        "retargeting, and in red the joint or limb that differs most"
+    )
+    add("--picture", type=Path, metavar="SVG", help=picture)
+    add_json(parser)
+    add_motion_options(parser)
+
+
+def rig(options: argparse.Namespace) -> int:
+    """Draft a skeleton file, which says which joint of a BVH file is which part of the body.
+
+    hobble rig FILE.bvh --to config/skeletons/mine.yaml
+    """
+    text = skeleton_draft(options.file)
+    write_text(options.to, text) if options.to else print(text, end="")
+    return 0
+
+
+def skeleton_draft(file: Path) -> str:
+    """A draft of a skeleton file for the rig of a BVH file, with `?` for roles whose joint is not known."""
+    bvh = read_bvh(file)
+    skeleton = rig_in_file(bvh)
+    try:
+        body, _ = find_body(skeleton.joints, skeleton.parents, raw_clip(bvh).positions)
+        roles = body.roles(skeleton.joints)
+    except Doubt as doubt:
+        print(f"{file}: {doubt}. The roles are guessed from the names of the joints.", file=sys.stderr)
+        roles = guess_roles(skeleton)
+    return draft_skeleton_file(skeleton, roles)
+
+
+def _rig_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("file", type=Path, help="a BVH file")
+    parser.add_argument("--to", type=Path, help="the file to write (default: print it)")
+
+
+def motion(options: argparse.Namespace) -> int:
+    """Turn a folder of BVH files into a folder of checked BVH files.
+
+    hobble motion FOLDER OUT --fps 60
+    hobble motion FOLDER OUT --skeleton holden31 --mirror
+
+    Files may have any rotation order, unit, axes and frame rate. Each file is checked, repaired if this is
+    safe, and written in centimetres, Y up. Rotations are interpolated as quaternions, not as Euler angles.
+    """
+
+    def convert(name: str, file: Path) -> list[str]:
+        clip, notes = convert_file(name, file, options)
+        write_bvh(options.out / f"{name}.bvh", clip)
+        if options.mirror:
+            write_bvh(options.out / f"{name}_mirror.bvh", mirror_clip(clip, f"{name}_mirror"))
+        return notes
+
+    return process_clips(options, convert)
+
+
+def convert_file(name: str, file: Path, options: argparse.Namespace) -> tuple[Clip, list[str]]:
+    """Convert a BVH file. Returns the clip and notes, such as what was repaired.
+
+    name: of the clip. options: the arguments of `hobble motion`. Raises InputError for a bad file.
+    """
+    settings = motion_options(options)
+    if options.skeleton:
+        target = find_skeleton(options.skeleton)
+        clip, report = make_clip(file, target, skeleton_folder(), name, target.stem, settings)
+        return resample(clip, options.fps), report["repairs"] + report["unsure"] + report["notes"]
+    source = load_source(read_bvh(file), load_skeleton(find_skeleton(SKELETON)), skeleton_folder(), settings)
+    clip = resample(source.clip, options.fps)
+    if settings.loops > 1:
+        clip = loop_clip(clip, settings.loops, settings.heading)
+    return replace(clip, name=name), source.repairs + source.unsure + source.notes
+
+
+def _motion_arguments(parser: argparse.ArgumentParser) -> None:
+    add_folders(parser, "the folder to write into; the clips keep their names")
+    add = parser.add_argument
+    add("--fps", type=float, default=60.0, help="frame rate to write (default 60)")
+    add("--skeleton", help="retarget to this skeleton: a name from config/skeletons, or a YAML file")
+    add("--mirror", action="store_true", help="also write each clip's mirror image, as CLIP_mirror.bvh")
+    # The earlier name of `--defects refuse`.
+    add("--refuse", dest="defects", action="store_const", const="refuse", help=argparse.SUPPRESS)
+
+
+def labels(options: argparse.Namespace) -> int:
+    """Label a folder of BVH files and write label files that you can correct.
+
+    hobble labels FOLDER OUT
+
+    For each clip, three files are written: CLIP_footsteps.txt, CLIP_gait.txt and CLIP.phase. They tell when
+    the feet land, and which gait and phase each frame has. Frame numbers are those of the clip's file.
+    Correct the files and put them beside the clip. The workflow then uses them instead of its own labels.
+    """
+    return process_clips(options, lambda name, file: write_labels(name, file, options))
+
+
+def write_labels(name: str, file: Path, options: argparse.Namespace) -> list[str]:
+    """Write the three label files of one clip. Returns notes and warnings.
+
+    file: the clip's BVH file. options: the arguments of `hobble labels`. Raises InputError if the clip cannot
+    be read, or if a label file exists already and is not to be overwritten.
+    """
+    paths = [options.out / f"{name}{end}" for end in ("_footsteps.txt", "_gait.txt", ".phase")]
+    existing = [path.name for path in paths if path.exists()]
+    if existing and not options.overwrite:
+        problem = f"{', '.join(existing)} would be replaced"
+        raise InputError(options.out, problem, fix="Use --overwrite, or write into another folder.")
+    clip, report, found, warnings = _labelled(name, file, options)
+    time = SourceTime(report["source_frames"], report["source_fps"], report["source_start"])
+    write_label_files(paths[0], paths[1], paths[2], found, time)
+    # Seconds of each gait, for the note.
+    seconds = np.bincount(found.gait.argmax(axis=1), minlength=len(GAITS)) / clip.fps
+    gaits = ", ".join(f"{s:.1f} s {g}" for s, g in zip(seconds, GAITS, strict=True) if s > 0)
+    return [f"{len(found.cycles)} cycles, {gaits}", *report["repairs"], *warnings]
+
+
+def _labelled(
+    name: str, file: Path, options: argparse.Namespace
+) -> tuple[Clip, dict[str, Any], Labels, tuple[str, ...]]:
+    """A clip on the skeleton SKELETON, its report, its labels, and warnings about these."""
+    # Without --ground the ground is unknown. It must not be called "flat", because on flat ground the height
+    # of the head alone decides whether a person crouches.
+    ground = options.ground or "rocky"
+    clip, report = make_clip(
+        file, find_skeleton(SKELETON), skeleton_folder(), name, SKELETON, motion_options(options)
+    )
+    gait = getattr(options, "gait", None)
+    found, label_report = label_clip(clip, [], report, gait, ground, LabelOptions())
+    return clip, report, found, label_report.warnings
+
+
+def _labels_arguments(parser: argparse.ArgumentParser) -> None:
+    add_folders(parser, "the folder to write into; if it is FOLDER, label files lie beside the clips")
+    gait = "the main gait of the clips; used where the gait is unclear"
+    parser.add_argument("--gait", choices=GAITS, help=gait)
+    parser.add_argument("--overwrite", action="store_true", help="replace existing label files")
+
+
+def hurt(options: argparse.Namespace) -> int:
+    """Write clips as a body with these injuries walks them, with the status files of what hurts.
+
+    hobble hurt FOLDER OUT --injury 'LeftUpLeg-LeftLeg[7];LeftArm-LeftForeArm[3]'
+
+    The clips are retargeted to the skeleton holden31, which has the links. Severities are 0 to 10.
+    """
+    links = skeleton_links(find_skeleton(SKELETON))
+    pairs = parse_links(options.injury, links, "--injury")
+    values = dict(pairs)
+
+    def make(name: str, file: Path) -> list[str]:
+        clip, _, found, warnings = _labelled(name, file, options)
+        severity = np.tile([values.get(link, 0.0) for link in clip.skeleton.link_names], (len(clip), 1))
+        result = hurt_clip(clip, found, severity, f"{name}_limps", flat=options.ground in (None, "flat"))
+        write_bvh(options.out / f"{name}_limps.bvh", result.clip)
+        frames = len(result.clip)
+        status = Status(frames, (InjurySpell(1, frames, pairs),))
+        write_status(options.out / f"{name}_limps_injuries.txt", status)
+        return [f"{len(clip) / FPS:.1f} s became {frames / FPS:.1f} s", *warnings]
+
+    return process_clips(options, make)
+
+
+def _hurt_arguments(parser: argparse.ArgumentParser) -> None:
+    add_folders(parser, "the folder to write into: CLIP_limps.bvh and CLIP_limps_injuries.txt")
+    parser.add_argument("--injury", required=True, help="what hurts: Joint-Joint[severity];...")
+
+
+def injury(options: argparse.Namespace) -> int:
+    """Write status files from a table. A status file says which links hurt in a clip, when and how much.
+
+    hobble injury TABLE.csv FOLDER
+
+    TABLE.csv has the columns clip, link (such as LeftLeg-LeftFoot), severity (0 to 10), from, to. `from` and
+    `to` are frames of the clip's file, counted from 1. An empty `from` means the first frame, an empty `to`
+    the last. FOLDER has the clips' BVH files. For each clip of the table, the command writes a file
+    CLIP_injuries.txt beside the clip's BVH file, where the workflow looks for it.
+    """
+    links = skeleton_links(find_skeleton(options.skeleton))
+    paths = [str(path) for path in write_statuses(options.table, options.folder, links)]
+    print_result(options, paths, "\n".join(paths))
+    return 0
+
+
+def _injury_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("table", type=Path, help="CSV with the columns clip, link, severity, from, to")
+    parser.add_argument("folder", type=Path, help="folder with the clips' BVH files")
+    _add_skeleton(parser, "skeleton that lists the links")
+    add_json(parser)
+
+
+def _add_skeleton(parser: argparse.ArgumentParser, text: str) -> None:
+    help_text = f"{text}: a name from config/skeletons, or a YAML file (default {SKELETON})"
+    parser.add_argument("--skeleton", default=SKELETON, help=help_text)
+
+
+COMMANDS = {
+    "look": Command("clips", _look_arguments, look),
+    "rig": Command("clips", _rig_arguments, rig),
+    "motion": Command("clips", _motion_arguments, motion),
+    "labels": Command("clips", _labels_arguments, labels),
+    "hurt": Command("limps", _hurt_arguments, hurt),
+    "injury": Command("limps", _injury_arguments, injury),
+}
