@@ -1,30 +1,32 @@
 # This workflow turns motion-capture clips into a character that can be hurt. Its usual target is the report of a
 # configuration: results/<configuration>/report.html
-import os
 import sys
-from pathlib import Path
 
-from hobble.core.errors import HobbleError
+import snakemake_logger_plugin_hobble
+from hobble.core.errors import HobbleError, keep_traceback
 from hobble.workflow import lifetime
-from hobble.workflow.project import Project
-from hobble.workflow.targets import check_targets, notes_on_unused_files
+from hobble.workflow.estimate import sentences_about_trainings
+from hobble.workflow.targets import open_project
 
 lifetime.ensure_user_name()
 try:
-    # Params of rules contain this path. It is relative, so that no job runs again after the checkout is moved.
-    project = Project(Path(os.path.relpath(workflow.basedir)), config)
-    if workflow.is_main_process:
-        targets = [
-            argument for argument in sys.argv[1:] if argument.startswith("results/")
-        ]
-        check_targets(project, targets)
-        for note in notes_on_unused_files(project, targets):
-            logger.warning(note)
+    project = open_project(workflow, config, sys.argv[1:], logger.warning)
 except HobbleError as error:
     raise WorkflowError(str(error)) from None
+except Exception as error:
+    raise WorkflowError(keep_traceback(error)) from None
 
 # Jobs read this variable, so that they end when this run of Snakemake ends.
 lifetime.set_run_variable()
+
+
+def about_plan(jobs):
+    """Sentences about a plan: how long its trainings take. jobs: rule and wildcards of each job."""
+    names = [wildcards["configuration"] for rule, wildcards in jobs if rule == "training"]
+    return sentences_about_trainings(demands, names)
+
+
+snakemake_logger_plugin_hobble.ABOUT_PLAN.append(about_plan)
 
 
 onstart:
@@ -34,6 +36,9 @@ onstart:
         except HobbleError as error:
             raise WorkflowError(str(error)) from None
         lifetime.end_jobs_on_signal()
+        jobs = [(job.rule.name, job.wildcards_dict) for job in workflow.dag.needrun_jobs()]
+        for sentence in about_plan(jobs):
+            logger.warning(sentence)
 
 
 rule all:

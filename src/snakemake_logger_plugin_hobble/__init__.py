@@ -1,4 +1,4 @@
-"""The Snakemake logger plugin `hobble`: a line of progress, each failure once, a summary.
+"""The Snakemake logger plugin `hobble`: the plan and its reasons, progress, each failure once, a summary.
 
 With `snakemake -p` it prints all records, in Snakemake's form.
 """
@@ -7,10 +7,12 @@ from __future__ import annotations
 
 import logging
 import re
+import shutil
 import sys
+import threading
 import time
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TextIO
@@ -18,12 +20,15 @@ from typing import Any, TextIO
 from snakemake.logging import DefaultFilter, DefaultFormatter
 from snakemake_interface_logger_plugins.base import LogHandlerBase
 
-PROGRESS_SECONDS = 10.0  # between lines of progress if the output goes to a file
-WIDTH = 100  # columns of the line of progress on a terminal
+TICK_SECONDS = 1.0  # between two updates of the line of progress on a terminal
+PROGRESS_SECONDS = 30.0  # between lines of progress if the output goes to a file
+LONG_SECONDS = 15.0  # the log of a job that runs longer than this is named
 MAX_FAILURES_LISTED = 20  # the summary lists at most this many failed jobs
 TAIL_BYTES = 1 << 16  # an error message is searched for in this many bytes at the end of a job's log
 # A line of a job's log that reports an error: date, time, ERROR and the message.
 ERROR_LINE = re.compile(r"^\S+ \S+ ERROR (.*)$", re.M)
+# A line of a job's log that says how far the job has come, such as "section 1: 34 % done, 8 min left".
+SHARE_LINE = re.compile(r"^\S+ \S+ INFO .*?(\d+ % done.*)$", re.M)
 # Snakemake's messages about a failed job and about the end of a run in which jobs failed. They are not shown,
 # because this module reports the same in fewer words.
 JOB_ENDED = re.compile(r"CalledProcessError|Command 'set -euo pipefail|returned non-zero exit status")
@@ -32,36 +37,52 @@ SUPERFLUOUS = re.compile(
     r"^At least one job did not complete|^WorkflowError:\s*At least one job did not complete"
 )
 # Snakemake's messages that are shown although they are no warnings.
-SHOWN_MESSAGES = re.compile(r"^Nothing to be done|^Reasons:|^This was a dry-run|^Unlocking|^Touching|^Error")
+SHOWN_MESSAGES = re.compile(r"^Nothing to be done|^This was a dry-run|^Unlocking|^Touching|^Error")
 # The rule `clip_file` finds its file already there, because a batch made it. Snakemake warns of this.
 FOUND_OUTPUT = "were not present when the DAG was created"
 STOP_MESSAGE = "Terminating processes on user request"  # Snakemake prints this when the user stops the run
-# A line in Snakemake's message about why it runs jobs. It is removed, because jobs are not listed above it.
-JOB_HINT = re.compile(r"^ *\(check individual jobs above for details\)\n", re.M)
+STAGES = (  # in the order in which data passes through them
+    *("synthetic", "motion", "labels", "channels", "terrain", "database", "training", "runtime"),
+    *("evaluation", "report"),
+)
+FOLLOWS = "Input files updated by another job"  # a reason that is left out if there is another
+MANY_REASONS = 3  # at most this many reasons are listed for a rule
+# The Snakefile adds functions: (rule, wildcards) of each planned job -> sentences about the plan.
+ABOUT_PLAN: list[Callable[[Sequence[tuple[str, Mapping[str, str]]]], list[str]]] = []
 
 
 @dataclass(frozen=True)
 class Job:
     """What is printed about a job.
 
-    rule: the rule's name. about: the job's wildcards. log: path of its log, or several with commas.
+    rule: the rule's name. wildcards: name -> value. log: path of its log, or several with commas. began: when
+    it started, seconds. reason: why it has to run.
     """
 
     rule: str
-    about: str
+    wildcards: Mapping[str, str]
     log: str
+    began: float
+    reason: str = ""
 
     @property
     def name(self) -> str:
         """The job's name in messages: its rule, then its wildcards."""
-        return f"{self.rule} {self.about}".strip()
+        return " ".join([self.rule, *map(str, self.wildcards.values())])
+
+    @property
+    def stage(self) -> str:
+        """The stage of the workflow, from the folder of the log: results/.../logs/<stage>/..."""
+        parts = Path(self.log).parts
+        return parts[parts.index("logs") + 1] if "logs" in parts else ""
 
 
 class Terminal:
     """Prints the output of one run.
 
     live: whether to overwrite the line of progress, as on a terminal, instead of printing a new line every
-    PROGRESS_SECONDS. dryrun: whether the run is a dry run. now: function that returns the time in seconds.
+    PROGRESS_SECONDS. dryrun: whether the run is a dry run. now: function that returns the time in seconds. A
+    thread calls `tick`, so the public methods take turns.
     """
 
     def __init__(
@@ -74,7 +95,9 @@ class Terminal:
         self.failed: list[Job] = []
         self.done = self.total = 0  # numbers of finished jobs and of all jobs
         self.stopped = False  # whether the user has stopped the run
-        self.announced = False  # whether the number of jobs has been printed
+        self.stats: Counter[str] = Counter()  # rule -> number of its jobs
+        self.named: set[int] = set()  # the jobs whose logs have been named
+        self.lock = threading.RLock()
         self.progress_shown = False  # whether the line of progress is on the terminal now
         self.closed = False  # whether the summary has been printed
 
@@ -82,17 +105,29 @@ class Terminal:
         """Print what users need of a record of Snakemake's logger, and note what it says about jobs."""
         event = str(getattr(record, "event", None) or "")
         method_of_event = getattr(self, f"_{event}", None)
-        if method_of_event is not None:
-            method_of_event(record.__dict__)
-        elif event in ("", "error"):
-            self._show_message(record)
+        with self.lock:
+            if method_of_event is not None:
+                method_of_event(record.__dict__)
+            elif event in ("", "error"):
+                self._show_message(record)
+
+    def tick(self) -> None:
+        """Show how far the running jobs have come."""
+        with self.lock:
+            if self.running and not self.closed:
+                self._progress({})
 
     def close(self) -> None:
-        """Print the summary if jobs have run, but only once: `logging` calls this again at exit."""
-        self._clear_progress()
-        if self.closed or self.dryrun or not (self.jobs or self.failed):
+        """Print the summary, or the plan of a dry run, but only once: `logging` calls this again at exit."""
+        with self.lock:
+            self._clear_progress()
+            if not self.closed:
+                self.closed = bool(self.jobs or self.failed or self.stats)
+                self._print_plan() if self.dryrun else self._print_summary()
+
+    def _print_summary(self) -> None:
+        if not (self.jobs or self.failed):
             return
-        self.closed = True
         took = _format_duration(self.now() - self.began)
         count = f"{self.done} of {self.total or len(self.jobs)} jobs done in {took}"
         if self.failed:
@@ -110,21 +145,39 @@ class Terminal:
     # The methods for Snakemake's events. The method _<event> gets the fields of the event's log record.
 
     def _run_info(self, data: Mapping[str, Any]) -> None:
-        """The jobs are planned: print how many jobs each rule has."""
+        """The jobs are planned: print how many each rule has. A dry run prints its plan at the end."""
         stats = data.get("stats") or {}  # name of a rule, or "total" -> number of jobs
         self.total = stats.get("total", self.total)
-        rules = Counter({rule: count for rule, count in stats.items() if rule != "total"})
-        if self.dryrun and not self.announced:
-            self._print_line(_format_table(rules))
-        elif not self.announced:
-            largest = ", ".join(f"{count} {rule}" for rule, count in rules.most_common(6))
-            self._print_line(f"{self.total} jobs: {largest}{', ...' if len(rules) > 6 else ''}")
-        self.announced = True
+        first, self.stats = not self.stats, Counter({r: n for r, n in stats.items() if r != "total"})
+        if self.dryrun:
+            if not first:  # now all jobs are known
+                self.close()
+        elif first:
+            largest = ", ".join(f"{count} {rule}" for rule, count in self.stats.most_common(6))
+            self._print_line(f"{self.total} jobs: {largest}{', ...' if len(self.stats) > 6 else ''}")
+
+    def _print_plan(self) -> None:
+        """Print the plan of a dry run: a table of the rules by stage, and why they have to run."""
+        if not self.stats:
+            return
+        of_rule: dict[str, list[Job]] = {}
+        for job in self.jobs.values():
+            of_rule.setdefault(job.rule, []).append(job)
+        rows = [("stage", "job", "count", "reason")]
+        for rule, count in self.stats.items():
+            mine = of_rule.get(rule, [])
+            rows.append((mine[0].stage if mine else "", rule, str(count), _reasons(mine)))
+        rows[1:] = sorted(rows[1:], key=lambda row: [*STAGES, row[0]].index(row[0]))
+        rows.append(("total", "", str(sum(self.stats.values())), ""))
+        wide = [max(len(row[column]) for row in rows) for column in range(3)]
+        lines = [f"{a:{wide[0]}}  {b:{wide[1]}}  {c:>{wide[2]}}  {d}".rstrip() for a, b, c, d in rows]
+        self._print_line("\n".join(["Job stats:", *lines]))
+        for about in ABOUT_PLAN:
+            self._print_line("\n".join(about([(job.rule, job.wildcards) for job in self.jobs.values()])))
 
     def _job_info(self, data: Mapping[str, Any]) -> None:
-        """A job starts."""
-        job = _job_of_event(data)
-        self.jobs[data["jobid"]] = self.running[data["jobid"]] = job
+        """A job starts, or a dry run lists it."""
+        self.jobs[data["jobid"]] = self.running[data["jobid"]] = self._job_of_event(data)
         self._progress({})
 
     def _job_finished(self, data: Mapping[str, Any]) -> None:
@@ -136,11 +189,15 @@ class Terminal:
         self.done, self.total = data.get("done", self.done), data.get("total", self.total)
         if self.dryrun or not self.total:
             return
-        took = self.now() - self.began
-        rules = ", ".join(Counter(job.rule for job in self.running.values()))  # each rule once
-        line = f"{self.done}/{self.total} jobs, {_format_duration(took)}" + (f": {rules}" if rules else "")
+        for number, job in self.running.items():
+            if job.log and number not in self.named and self.now() - job.began > LONG_SECONDS:
+                self.named.add(number)
+                self._print_line(f"{job.name}: its log is {job.log}")
+        doing = list(dict.fromkeys(_doing(job) for job in self.running.values()))
+        took = _format_duration(self.now() - self.began)
+        line = f"{self.done}/{self.total} jobs, {took}" + (f": {'; '.join(doing)}" if doing else "")
         if self.live:
-            self.stream.write(f"\r\x1b[K{line[:WIDTH]}")
+            self.stream.write(f"\r\x1b[K{line[: shutil.get_terminal_size((100, 24)).columns - 1]}")
             self.stream.flush()
             self.progress_shown = True
         elif self.now() - self.last_line >= PROGRESS_SECONDS:
@@ -149,15 +206,21 @@ class Terminal:
 
     def _job_error(self, data: Mapping[str, Any]) -> None:
         """A job has failed."""
-        job = self.jobs.get(data["jobid"]) or _job_of_event(data)
+        job = self.jobs.get(data["jobid"]) or self._job_of_event(data)
         self.running.pop(data["jobid"], None)
         if self.stopped:
             return
         self.failed.append(job)
-        if not _last_error(job.log):  # if there is an error in the log, the job has printed it
+        if not _last_match(job.log, ERROR_LINE):  # if there is an error in the log, the job has printed it
             self._print_line(
                 f"{job.name}: ended without a message; it may have been killed. Its log: {job.log}"
             )
+
+    def _job_of_event(self, data: Mapping[str, Any]) -> Job:
+        """The job that an event of Snakemake is about. data: fields of the event's log record."""
+        logs = ", ".join(str(log) for log in data.get("log") or ())
+        wildcards = dict(data.get("wildcards") or {})
+        return Job(str(data["rule_name"]), wildcards, logs, self.now(), str(data.get("reason") or ""))
 
     def _show_message(self, record: logging.LogRecord) -> None:
         """Print the text of a record if it is an error, a warning or one of SHOWN_MESSAGES."""
@@ -169,7 +232,7 @@ class Terminal:
             if not (JOB_ENDED.search(text) or SUPERFLUOUS.search(text)) and text:
                 self._print_line(text)
         elif FOUND_OUTPUT not in text and (record.levelno >= logging.WARNING or SHOWN_MESSAGES.search(text)):
-            self._print_line(JOB_HINT.sub("", text))
+            self._print_line(text)
 
     def _print_line(self, text: str) -> None:
         """Print a line of text, in place of the line of progress if this is shown."""
@@ -184,31 +247,35 @@ class Terminal:
             self.progress_shown = False
 
 
-def _job_of_event(data: Mapping[str, Any]) -> Job:
-    """The job that an event of Snakemake is about. data: fields of the event's log record."""
-    rule, logs = str(data["rule_name"]), [str(log) for log in data.get("log") or ()]
-    about = " ".join(str(value) for value in dict(data.get("wildcards") or {}).values())
-    return Job(rule, about, ", ".join(logs))
+def _reasons(jobs: Sequence[Job]) -> str:
+    """Why the jobs of a rule have to run: Snakemake's reasons, each with one of the files that it names."""
+    found: dict[str, str] = {}
+    for job in jobs:
+        for reason in job.reason.split("; "):
+            what, _, files = reason.partition(": ")
+            found.setdefault(what.strip(), files.split(", ")[0].strip())
+    if len(found) > 1:
+        found.pop(FOLLOWS, None)
+    listed = [f"{what} ({file})" if file else what for what, file in found.items() if what]
+    return "; ".join(listed[:MANY_REASONS]) + ("; ..." if len(listed) > MANY_REASONS else "")
 
 
-def _format_table(rules: Mapping[str, int]) -> str:
-    """A table with the number of jobs of each rule, in Snakemake's form. rules: rule -> this number."""
-    width = max(map(len, [*rules, "total"]))
-    counts = [*rules.items(), ("total", sum(rules.values()))]
-    lines = [f"{rule:<{width}}  {count:>7}" for rule, count in counts]
-    return "\n".join(["Job stats:", f"{'job':<{width}}    count", f"{'-' * width}  -------", *lines])
+def _doing(job: Job) -> str:
+    """The job's rule, and if its log says how far it has come, the last such words."""
+    said = _last_match(job.log, SHARE_LINE)
+    return f"{job.name} {said}" if said else job.rule
 
 
-def _last_error(log: str) -> str:
-    """The last error message in a job's log, or "" if there is none."""
+def _last_match(log: str, pattern: re.Pattern[str]) -> str:
+    """What the last line of this pattern in a job's log says, or "" if there is none."""
     try:
         with open(Path(log), "rb") as file:
             file.seek(0, 2)
             file.seek(max(0, file.tell() - TAIL_BYTES))
-            messages = ERROR_LINE.findall(file.read().decode(errors="replace"))
+            found = pattern.findall(file.read().decode(errors="replace"))
     except OSError:
         return ""
-    return messages[-1] if messages else ""
+    return found[-1] if found else ""
 
 
 def _format_duration(seconds: float) -> str:
@@ -234,6 +301,12 @@ class LogHandler(LogHandlerBase):
         self.snakemake_filter = DefaultFilter(quiet, *debug)
         self.snakemake_formatter = DefaultFormatter(quiet, settings.show_failed_logs)
         self.terminal = Terminal(stream, stream.isatty(), settings.dryrun)
+        threading.Thread(target=self._tick, daemon=True).start()
+
+    def _tick(self) -> None:
+        while not self.terminal.closed:
+            time.sleep(TICK_SECONDS)
+            self.terminal.tick()
 
     def emit(self, record: logging.LogRecord) -> None:
         """Print a record, in short or in full."""

@@ -66,7 +66,7 @@ class Workflow:
         """Rule -> number of jobs that a dry run plans."""
         text = self.run("-n", *arguments)
         table = re.search(r"^Job stats:\n(.*?)\ntotal", text, re.M | re.S)
-        rows = re.findall(r"^(\w+) +(\d+)$", table[1], re.M) if table else []
+        rows = re.findall(r"^\w+ +(\w+) +(\d+) ", table[1], re.M) if table else []
         return {rule: int(count) for rule, count in rows}
 
     def edit(self, file: str, old: str, new: str) -> None:

@@ -11,7 +11,8 @@ from pathlib import Path
 
 import pytest
 
-from snakemake_logger_plugin_hobble import Terminal
+import snakemake_logger_plugin_hobble as plugin
+from snakemake_logger_plugin_hobble import PROGRESS_SECONDS, Terminal
 
 CALLED = (
     "RuleException:\nCalledProcessError in file x.smk, line 3:\nCommand 'set -euo pipefail;  python s.py'"
@@ -34,8 +35,8 @@ class Run:
             record.event = event
         self.terminal.show_record(record)
 
-    def job(self, number: int, rule: str, log: str = "", **wildcards: str) -> None:
-        self.say("job_info", jobid=number, rule_name=rule, wildcards=wildcards, log=[log])
+    def job(self, number: int, rule: str, log: str = "", reason: str = "", **wildcards: str) -> None:
+        self.say("job_info", jobid=number, rule_name=rule, wildcards=wildcards, log=[log], reason=reason)
 
     def finish(self, number: int, done: int, total: int) -> None:
         self.say("job_finished", job_id=number)
@@ -63,8 +64,8 @@ def test_a_run_prints_its_plan_some_progress_and_a_summary() -> None:
     assert run.lines[0] == "31 jobs: 30 motion_clips, 1 training"
     assert run.lines[-1] == "31 of 31 jobs done in 3 min 20 s."
     assert len([line for line in run.lines if "jobs done in" in line]) == 1
-    assert run.lines[1].startswith("9/31 jobs, 10 s: motion_clips")
-    assert len(run.lines) <= 2 + 200 / 10
+    assert run.lines[1].startswith("29/31 jobs, 30 s: motion_clips")
+    assert len(run.lines) <= 2 + 200 / PROGRESS_SECONDS
 
 
 def test_on_a_terminal_one_line_is_overwritten_and_cleared() -> None:
@@ -122,43 +123,67 @@ def test_jobs_of_a_stopped_run_do_not_count_as_failed() -> None:
     ]
 
 
-def test_a_dry_run_prints_its_table_once_and_the_reasons() -> None:
+def test_a_dry_run_lists_its_jobs_by_stage_with_reasons(monkeypatch: pytest.MonkeyPatch) -> None:
+    told = []
+    monkeypatch.setattr(plugin, "ABOUT_PLAN", [lambda jobs: told.append(jobs) or ["It takes long."]])
     run = Run(dryrun=True)
-    for _ in range(2):
-        run.say("run_info", "Job stats: ...", stats={"training": 1, "total": 1})
-        run.job(1, "training")
+    stats = {"training": 1, "motion_clips": 2, "total": 3}
+    run.say("run_info", "Job stats: ...", stats=stats)
+    for batch in ("00", "01"):
+        reason = f"Missing output files: results/{batch}; Input files updated by another job: x"
+        log = f"results/datasets/d/logs/motion/motion_clips/{batch}.log"
+        run.job(int(batch), "motion_clips", log, reason=reason, batch=batch)
+    reason = "Input files updated by another job: y, z"
+    run.job(2, "training", "results/c/logs/training/training.log", reason=reason, configuration="c")
+    run.say("run_info", "Job stats: ...", stats=stats)
     run.say(None, "Reasons:\n    (check individual jobs above for details)\n    code: training")
-    run.terminal.close()
+    for _ in range(2):
+        run.terminal.close()
     assert run.lines == [
         "Job stats:",
-        "job         count",
-        "--------  -------",
-        "training        1",
-        "total           1",
-        "Reasons:",
-        "    code: training",
+        "stage     job           count  reason",
+        "motion    motion_clips      2  Missing output files (results/00)",
+        "training  training          1  Input files updated by another job (y)",
+        "total                       3",
+        "It takes long.",
     ]
+    assert told == [
+        [*(("motion_clips", {"batch": b}) for b in ("00", "01")), ("training", {"configuration": "c"})]
+    ]
+
+
+def test_a_long_job_shows_its_share_its_errors_and_its_log_while_the_time_moves(tmp_path: Path) -> None:
+    log = tmp_path / "training.log"
+    run = Run()
+    run.say("run_info", "", stats={"training": 1, "total": 65})
+    run.finish(0, 51, 65)
+    run.job(1, "training", str(log), configuration="holden")
+    for said in (
+        "",
+        "INFO begin",
+        "INFO pass 1: 34 % done, 8 min left, error 0.41",
+        "INFO pass 2: 36 % done, 7 min left",
+    ):
+        with log.open("a") as file:
+            file.write(f"2026-01-01 00:00:00,000 {said}\n" if said else "")
+        run.clock += PROGRESS_SECONDS
+        run.terminal.tick()
+    assert run.lines[1:] == [
+        f"training holden: its log is {log}",
+        "51/65 jobs, 30 s: training",
+        "51/65 jobs, 1 min 00 s: training",
+        "51/65 jobs, 1 min 30 s: training holden 34 % done, 8 min left, error 0.41",
+        "51/65 jobs, 2 min 00 s: training holden 36 % done, 7 min left",
+    ]
+    run.finish(1, 52, 65)
+    run.clock += PROGRESS_SECONDS
+    run.terminal.tick()
+    assert len(run.lines) == 6, "nothing runs"
 
 
 def test_the_batches_of_a_rule_are_one_line() -> None:
-    stats = {"motion_clips": 12, "training": 1, "total": 13}
-    run = Run(dryrun=True)
-    run.say("run_info", "Job stats: ...", stats=stats)
-    run.say(
-        None,
-        "Reasons:\n    code:\n        motion_clips, training\nx, y",
-    )
-    assert run.lines[3:] == [
-        "motion_clips       12",
-        "training            1",
-        "total              13",
-        "Reasons:",
-        "    code:",
-        "        motion_clips, training",
-        "x, y",
-    ]
     run = Run()
-    run.say("run_info", "", stats=stats)
+    run.say("run_info", "", stats={"motion_clips": 12, "training": 1, "total": 13})
     log = "results/datasets/cmu-ava/logs/motion/motion_clips/07.log"
     run.job(1, "motion_clips", log, dataset="cmu-ava", batch="07")
     run.say("job_error", "", logging.ERROR, jobid=1, rule_name="motion_clips", log=[log])

@@ -11,8 +11,8 @@ from collections.abc import Mapping, Sequence
 from importlib.metadata import version
 
 from hobble.cli import characters, clips, gait
-from hobble.cli.command import Command, report_bug
-from hobble.core.errors import HobbleError
+from hobble.cli.command import Command
+from hobble.core.errors import HobbleError, keep_traceback
 
 GROUPS = {
     "clips": "BVH files",
@@ -122,7 +122,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 128 + signal.SIGPIPE
     except Exception as error:
         files = [str(value) for value in vars(options).values() if hasattr(value, "suffix")]
-        print(report_bug(error, f"hobble {options.command} {' '.join(files)}: "), file=sys.stderr)
+        print(keep_traceback(error, f"hobble {options.command} {' '.join(files)}: "), file=sys.stderr)
         return 1
 
 

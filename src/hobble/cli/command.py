@@ -5,8 +5,6 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-import tempfile
-import traceback
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,7 +14,7 @@ from tqdm import tqdm
 
 from hobble.config.load_configuration import validate
 from hobble.core.clip_files import clips_in
-from hobble.core.errors import HobbleError, unforeseen
+from hobble.core.errors import HobbleError, keep_traceback
 from hobble.motion.options import ClipMotion
 
 MOTION_KEYS = tuple(name for name in ClipMotion.model_fields if name != "fps")
@@ -86,7 +84,7 @@ def process_clips(options: argparse.Namespace, process: Callable[[str, Path], li
         except HobbleError as refused:
             error = str(refused)
         except Exception as bug:
-            error = report_bug(bug, f"{file}: ")
+            error = keep_traceback(bug, f"{file}: ")
         results.append({"clip": name, "notes": notes, "error": error})
         for note in [] if options.json else [*notes, *([error] if error else [])]:
             # An error message already begins with the path of the file.
@@ -100,12 +98,3 @@ def process_clips(options: argparse.Namespace, process: Callable[[str, Path], li
 def progress(items: Iterable[Any]) -> Iterable[Any]:
     """The items, with a bar of progress on standard error if it is a terminal."""
     return tqdm(items, unit=" clips", disable=None, file=sys.stderr)
-
-
-def report_bug(error: Exception, what: str) -> str:
-    """The message for an error that nobody foresaw. The traceback goes to a log file, which it names."""
-    with tempfile.NamedTemporaryFile(
-        "w", prefix="hobble-", suffix=".log", delete=False, encoding="utf-8"
-    ) as file:
-        file.write(f"{' '.join(sys.argv)}\n{''.join(traceback.format_exception(error))}")
-    return f"{what}{unforeseen(error, file.name)}"

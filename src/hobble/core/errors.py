@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import sys
+import tempfile
+import traceback
 from pathlib import Path
 
 
@@ -16,6 +19,16 @@ def unforeseen(error: Exception, log: str | Path) -> str:
         f"{type(error).__name__}: {reason:.500}. This is a bug in Hobble, not a fault in your data. "
         f"Please report it with the log {log}"
     )
+
+
+def keep_traceback(error: Exception, what: str = "") -> str:
+    """Write the traceback of an error that nobody foresaw into a log file. Returns the line for the user.
+
+    what: what failed, such as "walk.bvh: ".
+    """
+    with tempfile.NamedTemporaryFile("w", prefix="hobble-", suffix=".log", delete=False) as file:
+        file.write(f"{' '.join(sys.argv)}\n{''.join(traceback.format_exception(error))}")
+    return f"{what}{unforeseen(error, file.name)}"
 
 
 class InputError(HobbleError):

@@ -13,7 +13,6 @@ import time
 from pathlib import Path
 
 import numpy as np
-from tqdm import tqdm
 
 from hobble.core.errors import HobbleError
 from hobble.database.reader import Database
@@ -135,8 +134,6 @@ def _run(
             roll_out.remember(step.error)
             if symmetry:
                 symmetry.after_step(state.adam.steps)
-            if recorder:
-                recorder.bar.update(batch.total)
         if symmetry:
             symmetry.enforce()
         train_mse = watch.mean()
@@ -164,7 +161,7 @@ def section_seed(seed: int, index: int) -> int:
 
 
 class TrainingRecorder:
-    """Records a training: held-out errors, history, checkpoints, progress bar, and one log line a section."""
+    """Records a training: held-out errors, history, checkpoints, and one log line a section."""
 
     def __init__(self, state: State, database: Database, training: Training, saver: Saver) -> None:
         self.state, self.saver = state, saver
@@ -173,9 +170,6 @@ class TrainingRecorder:
         self.goal = round(training.passes * samples)  # samples of the whole training
         self.samples_before, self.seconds_before = state.samples, state.seconds  # before this process began
         self.began = time.perf_counter()
-        self.bar = tqdm(
-            total=self.goal, initial=state.samples, unit=" samples", unit_scale=True, disable=None
-        )
 
     def end_section(self, where: str, place: list[int], train_mse: float) -> None:
         """Measure the network on the held-out clips, add a row to the history, save a checkpoint, log.
@@ -193,7 +187,6 @@ class TrainingRecorder:
 
     def close(self) -> None:
         """Wait until everything is on disk."""
-        self.bar.close()
         self.saver.wait()
 
     def _report(self, where: str) -> None:
@@ -203,5 +196,6 @@ class TrainingRecorder:
         left = duration((self.goal - state.samples) / speed)
         train_mse, held_out_mse = state.history[-1][4:6]
         errors = f"error {train_mse:.4f}, held out {held_out_mse:.4f}"
-        log.info("%s: %s, %s samples/s, %s left", where, errors, f"{speed:,.0f}", left)
-        self.bar.set_postfix_str(errors, refresh=False)
+        # The terminal shows the share done and what follows it, see snakemake_logger_plugin_hobble.
+        share = 100 * state.samples // self.goal
+        log.info("%s: %d %% done, %s left, %s, %s samples/s", where, share, left, errors, f"{speed:,.0f}")

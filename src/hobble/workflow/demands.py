@@ -160,11 +160,24 @@ class Demands:
         four parameters for each weight.
         """
         training = self.project.configurations.section(configuration, "training")
-        dataset = self.project.configurations.dataset(configuration)
-        frames = 1e3 * self.all_thousands_of_frames(dataset) * MEASURED_JOINTS / self._joints(dataset)
-        samples = frames * VISITS_PER_PASS * training["passes"]
-        seconds = samples * self.parameter_count(configuration) / 4 / 6.4e9
+        seconds = (
+            self.training_samples(configuration, training["passes"])
+            * self.parameter_count(configuration)
+            / 4
+            / 6.4e9
+        )
         return _minutes(seconds / self.machines(configuration).count, attempt, least=60)
+
+    def training_samples(self, configuration: str, passes: float) -> float:
+        """About how many samples a training sees in a number of passes."""
+        dataset = self.project.configurations.dataset(configuration)
+        every = self.project.datasets.hurt_row_step(dataset)  # of the rows of hurt versions
+        frames = sum(
+            self._frames(dataset, original(clip)) / (every if self.project.clips.is_hurt_version(clip) else 1)
+            for clip, split in self.project.configurations.splits(configuration).items()
+            if split == "train"
+        )
+        return frames * VISITS_PER_PASS * passes
 
     def machines(self, configuration: str) -> Machines:
         """The machines on which a configuration trains; one process if its network is built, not trained."""

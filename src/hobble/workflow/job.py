@@ -22,7 +22,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from hobble.core.errors import HobbleError, InputError
+from hobble.core.errors import HobbleError, InputError, unforeseen
 from hobble.core.files import failed_write_error, write_text
 from hobble.workflow.clips import MIRROR_SUFFIX, original
 from hobble.workflow.lifetime import ends_with_run
@@ -30,7 +30,6 @@ from hobble.workflow.lifetime import ends_with_run
 if TYPE_CHECKING:
     from hobble.measures.measure import Measure, MeasureInputs
 
-BUG = "This is a bug in Hobble, not a fault in your data. Please report it with the log."
 # The disk is full, a quota is used up, or the disk is read-only. Every other clip would fail, too.
 DISK_ERRORS = (errno.ENOSPC, errno.EDQUOT, errno.EROFS)
 CLOCK_TICK = 0.02  # seconds; two writes that are this far apart get different modification times
@@ -165,7 +164,7 @@ def make_each(
             try:
                 kept += maker.make(params, log.logger)
             except Exception as error:
-                log.error(error)
+                log.error(error, f"{params['clip']}: ")
                 failed += 1
                 cause = error.__cause__ if isinstance(error, InputError) else error
                 if isinstance(cause, OSError) and cause.errno in DISK_ERRORS:
@@ -353,10 +352,11 @@ class _Log:
         self.logger.handlers = [file_handler, self.terminal]
         logging.captureWarnings(True)
 
-    def error(self, error: Exception) -> None:
-        """Log an error. The log file also gets the traceback, except for a HobbleError or a lack of memory.
+    def error(self, error: Exception, what: str = "") -> None:
+        """Log an error. what: the clip that failed.
 
-        The message of a HobbleError says everything that a user needs.
+        The log file also gets the traceback, except for a lack of memory and for a HobbleError, whose message
+        says everything that a user needs.
         """
         if isinstance(error, HobbleError):
             self.logger.error("%s", error)
@@ -367,7 +367,7 @@ class _Log:
                 path, reason = error.filename or "a file", error.strerror or error
                 self.logger.error("%s: %s. See %s", path, reason, self.path)
             else:
-                self.logger.error("%s: %s. %s See %s", type(error).__name__, error, BUG, self.path)
+                self.logger.error("%s%s", what, unforeseen(error, self.path))
             self.logger.removeHandler(self.terminal)  # the traceback goes only to the file
             self.logger.error("%s", "".join(traceback.format_exception(error)))
             self.logger.addHandler(self.terminal)

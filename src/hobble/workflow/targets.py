@@ -6,9 +6,10 @@ results/datasets/<data set>/... or results/compare/...
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+import os
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, get_args
+from typing import TYPE_CHECKING, Any, get_args
 
 from hobble.channels import all_channels
 from hobble.config.sections import PhaseMode
@@ -20,6 +21,33 @@ if TYPE_CHECKING:
     from hobble.config.models import ClipEntry, Configuration, Dataset, SkeletonFile
 
 PAGE = "page"  # the folder in results/ with the files that all reports share
+
+
+def open_project(workflow: Any, config: Mapping[str, Any], words: Sequence[str], note: Callable) -> Project:
+    """The project of the Snakefile that Snakemake reads now.
+
+    workflow, config: Snakemake's own. words: the command line; the targets among them are checked. note:
+    prints a sentence. If another workflow imports this one as a module, nothing is checked, because the
+    targets are its own. Raises HobbleError for a mistake in the targets or in what they need, and for
+    `--configfile`.
+    """
+    base = Path(workflow.current_basedir.get_path_or_uri(secret_free=True))
+    if not workflow.modifier.is_main_snakefile():
+        return Project(base, config)
+    # Params of rules contain this path. It is relative, so that no job runs again after a checkout is moved.
+    project = Project(Path(os.path.relpath(base)), config)
+    if workflow.is_main_process:
+        if files := workflow.overwrite_configfiles:
+            raise HobbleError(
+                f"--configfile {Path(files[0]).name} would put its values into every configuration, so that "
+                "results/holden/ held another network. For a configuration of this name in config/, type "
+                f"results/{Path(files[0]).stem}/report.html. For single keys, use --config."
+            )
+        targets = [word for word in words if word.startswith("results/")]
+        check_targets(project, targets)
+        for sentence in notes_on_unused_files(project, targets):
+            note(sentence)
+    return project
 
 
 def check_targets(project: Project, targets: Iterable[str]) -> None:
