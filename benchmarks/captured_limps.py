@@ -12,8 +12,8 @@ import argparse
 from pathlib import Path
 
 from hobble.channels.injury.status import read_status
-from hobble.core.errors import InputError
 from hobble.cli.gait import read_clip
+from hobble.core.errors import InputError
 from hobble.gait.cycles import measure_cycles
 from hobble.gait.profile import NO_CYCLE
 from hobble.measures.limp_run import INJURY, CapturedWalk, compare_held_out

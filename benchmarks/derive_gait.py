@@ -20,11 +20,11 @@ from pathlib import Path
 
 import numpy as np
 
+from hobble.cli.gait import read_clip
 from hobble.core.clip import Clip
 from hobble.core.errors import InputError
 from hobble.core.files import load_npz, save_npz
 from hobble.core.quat import Array
-from hobble.cli.gait import read_clip
 from hobble.gait.cycles import CURVES, SCALARS, WalkCycles, measure_clip
 from hobble.gait.profile import (
     GAITS,

@@ -18,10 +18,10 @@ import yaml
 from derive_gait import REFERENCE, healthy_windows
 
 from hobble.channels.injury.status import parse_links
+from hobble.cli.gait import read_clip
 from hobble.core.clip import Clip
 from hobble.core.errors import HobbleError
 from hobble.core.files import load_npz
-from hobble.cli.gait import read_clip
 from hobble.gait.cycles import join_walks, measure_clip
 from hobble.gait.profile import (
     GAITS,
