@@ -22,7 +22,9 @@ lifetime.set_run_variable()
 
 def about_plan(jobs):
     """Sentences about a plan: how long its trainings take. jobs: rule and wildcards of each job."""
-    names = [wildcards["configuration"] for rule, wildcards in jobs if rule == "training"]
+    names = [
+        wildcards["configuration"] for rule, wildcards in jobs if rule == "training"
+    ]
     return sentences_about_trainings(demands, names)
 
 
@@ -36,7 +38,10 @@ onstart:
         except HobbleError as error:
             raise WorkflowError(str(error)) from None
         lifetime.end_jobs_on_signal()
-        jobs = [(job.rule.name, job.wildcards_dict) for job in workflow.dag.needrun_jobs()]
+        jobs = [
+            (job.rule.name, job.wildcards_dict)
+            for job in workflow.dag.needrun_jobs()
+        ]
         for sentence in about_plan(jobs):
             logger.warning(sentence)
 

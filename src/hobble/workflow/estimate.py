@@ -16,6 +16,7 @@ from hobble.workflow.demands import Demands
 # quiet cores of an AMD EPYC 9005: 10,200 samples a second at a batch of 32, 35,600 at 256, 2.4 million
 # parameters (docs/training.md).
 STEP_SECONDS, SAMPLE_SECONDS = 1.07e-9, 7.6e-12
+SLOWEST = 2.7  # two quiet cores of a Zen 4 machine took this many times as long
 FAST = "fast"  # the configuration with the recipe that is named if it is much faster
 LONG_SECONDS = 300.0  # for a training that takes longer than this
 
@@ -31,15 +32,12 @@ def sentences_about_trainings(demands: Demands, names: Sequence[str]) -> list[st
         training = catalogue.configuration(name).training
         if demands.gpus(name) or not demands.parameter_count(name):
             continue
-        seconds = expected_seconds(demands, name, training.model_dump()) * (measured or 1.0) / training.count
-        speed = (
-            "at the speed of earlier trainings here" if measured else "on two fast cores, longer on others"
-        )
-        sentence = f"training {name}: about {_minutes(seconds)} {speed}"
-        if fast and seconds > LONG_SECONDS:
-            faster = expected_seconds(demands, name, fast) * (measured or 1.0) / training.count
+        seconds = expected_seconds(demands, name, training.model_dump()) / training.count
+        sentence = f"training {name}: {_range(seconds, measured)}"
+        if fast and seconds * (measured or SLOWEST) > LONG_SECONDS:
+            faster = expected_seconds(demands, name, fast) / training.count
             if faster < seconds / 2:
-                sentence += f"; about {_minutes(faster)} with --config training={FAST} (docs/training.md)"
+                sentence += f"; with --config training={FAST} {_range(faster, measured)} (docs/training.md)"
         sentences.append(f"{sentence}.")
     return sentences
 
@@ -65,5 +63,12 @@ def slowness(demands: Demands) -> float | None:
     return median(ratios) if ratios else None
 
 
-def _minutes(seconds: float) -> str:
-    return f"{max(1, round(seconds / 60))} min"
+def _range(seconds: float, measured: float | None) -> str:
+    """A time as text: for a machine that has trained before, or from the fastest to the slowest known one."""
+    if measured:
+        return f"about {_minutes(seconds * measured)} min"
+    return f"{_minutes(seconds)} to {_minutes(seconds * SLOWEST)} min on two quiet cores"
+
+
+def _minutes(seconds: float) -> int:
+    return max(1, round(seconds / 60))
