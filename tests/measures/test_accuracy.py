@@ -15,6 +15,7 @@ from hobble.core.errors import HobbleError, InputError
 from hobble.core.files import write_csv
 from hobble.measures.accuracy_run import (
     QUANTILES,
+    at_stored_phases,
     clip_errors,
     clips_table,
     joint_errors,
@@ -102,6 +103,9 @@ def test_the_released_network_on_the_original_rows(shared):
     errors = joint_errors(RowLayout(31), y, predicted, range(31))
     assert round(float(errors[..., 0].mean()), 4) == 0.0438
     assert 2.3 < errors[..., 1].mean() < 2.7
+    # The exact prediction at the phases that the mode constant stores is the same prediction.
+    stored = at_stored_phases(network, predict_function(network))(x, p.astype(float))
+    np.testing.assert_allclose(stored, predicted, atol=1e-3)
     smooth = joint_errors(RowLayout(31), y, network.predict(x, p), range(31))
     assert (
         round(float(smooth[..., 0].mean()), 4) == 0.0436
@@ -178,6 +182,15 @@ def test_accuracy_per_clip_and_split(weights, tmp_path):
         k: c[k] for k in ("frames", "mean", "sd")
     }
     assert by_name["none"]["mean"] is None
+    # Nearly the same in the mode constant, and with n - 1.
+    means = [e["as_published"]["mean"] for e in (a, b)]
+    assert means == pytest.approx([a["mean"], b["mean"]], rel=0.05)
+    assert means != [a["mean"], b["mean"]]
+    assert result["train"]["as_published"] == {
+        "mean_of_clips": pytest.approx(np.mean(means)),
+        "sd_of_clips": pytest.approx(np.std(means, ddof=1)),
+    }
+    assert result["held_out"]["as_published"]["sd_of_clips"] is None
     json.dumps(result, allow_nan=False)
     write_csv(tmp_path / "clips.csv", clips_table(result))
     with open(tmp_path / "clips.csv", newline="") as file:
@@ -185,6 +198,20 @@ def test_accuracy_per_clip_and_split(weights, tmp_path):
     assert [row["clip"] for row in table] == ["a", "b", "c", "none"]
     assert float(table[2]["mean"]) == c["mean"]
     assert result == measure_accuracy(weights, clips, splits, "injured")
+
+
+def test_only_the_first_positions_of_a_clip_count_as_published(weights, tmp_path, monkeypatch) -> None:
+    """Of three joints, 30 positions are those of ten frames; a frame counts with all its fits."""
+    rows = make_rows("a", 40, 10, 0)
+    save_clip_rows(tmp_path / "a.npz", rows)
+    monkeypatch.setattr("hobble.measures.accuracy_run.PUBLISHED_POSITIONS", 32)
+    (clip,) = measure_accuracy(weights, {"a": tmp_path / "a.npz"}, {"a": "train"}, "x")["clips"]
+    network = load_network(weights)
+    constant = at_stored_phases(network, predict_function(network))
+    expected = clip_errors(network, rows.part(slice(10)), [0, 1, 2], constant).to_dict()
+    assert clip["frames"] == 40
+    assert clip["as_published"] == {key: expected[key] for key in ("frames", "mean", "sd")}
+    assert clip["as_published"]["frames"] == 10
 
 
 def test_equivalent_joints_leave_out_joints_of_larger_skeletons(weights, tmp_path):

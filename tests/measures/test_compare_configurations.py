@@ -19,7 +19,7 @@ from hobble.measures.compare import (
     comparison_tables,
     read_results,
 )
-from hobble.measures.responsivity_run import parameter_counts
+from hobble.measures.responsivity_run import LAP_COLUMNS, parameter_counts
 
 SIZES = {
     "holden": (342, 512, 512, 311),
@@ -56,8 +56,8 @@ def timed(ms: float) -> dict[str, Any]:
         **steps,
         "predict": ms / 2,
         "total": ms,
-        "spread": {"sd": 0.1, "median": ms / 4},
-        "sd": {"predict": 0.1},
+        "spread": {"sd": 0.1, "median": ms / 4, "p99": ms, "whole_call": ms},
+        "sd": {**steps, "predict": 0.1},
     }
 
 
@@ -67,8 +67,15 @@ def left_behind(folder: Path, name: str, clips: dict[str, float], sizes: tuple[i
     modes = []
     for k, mode in enumerate(MODES, 1):
         ms = timed(k * (0.1 + 1e-6 * counts["true"]))
-        lap = {"lap": 1, "frames": 10, "milliseconds": ms}
-        modes.append({"mode": mode, "laps": [lap], "milliseconds": ms, "laps_finished": 1})
+        laps = [
+            {
+                **dict.fromkeys(LAP_COLUMNS),
+                "lap": n,
+                "milliseconds": {**ms, "total": (n + 0.5) * ms["total"] / 2},
+            }
+            for n in (1, 2)
+        ]
+        modes.append({"mode": mode, "laps": laps, "milliseconds": ms, "laps_finished": 1})
     files: dict[str, Any] = {
         "accuracy": {
             "joints": 31,
@@ -156,18 +163,54 @@ def test_equation_3_2_divides_by_the_deviations_of_frames_and_of_means(compared)
     found = {(d["a"], d["b"], d["over"]): d for d in compared["difference"]}
     row = found["holden", "holden-xl", "train"]  # clips of .04 and .02, and of .03 and .02
     assert (row["sd_a"], row["sd_b"]) == (0.02, 0.02)
-    assert (row["sd_of_means_a"], row["sd_of_means_b"]) == (pytest.approx(0.01), pytest.approx(0.005))
+    assert (row["sd_of_means_a"], row["sd_of_means_b"]) == pytest.approx((0.0002**0.5, 0.00005**0.5))
     assert row["difference"] == pytest.approx(2 * 0.005 / 0.04)
-    assert row["difference_of_means"] == pytest.approx(2 * 0.005 / 0.015)
+    assert row["difference_of_means"] == pytest.approx(2 * 0.005 / (0.0002**0.5 + 0.00005**0.5)), "n - 1"
     assert found["holden", "ava", "train"]["difference_of_means"] is None, "one clip does not spread"
     assert found["holden", "holden-xl", "a"]["difference_of_means"] is None
     ours = {
         (r["measure"], r["configuration"]): (r["published"], r["ours"]) for r in compared["against_published"]
     }
     what = "standard deviation of the means of training clips"
-    assert ours[what, "holden"] == (0.00954, pytest.approx(0.01))
-    laps = [r for r in compared["milliseconds"]["against_published"] if r["measure"].startswith("standard")]
-    assert [(r["configuration"], r["published"], r["ours"]) for r in laps] == [("holden", 0.0173, None)]
+    assert ours[what, "holden"] == (0.00954, pytest.approx(0.0002**0.5))
+    assert ours["eq. 3.2, error", "holden to holden-xl"] == (0.0093, row["difference_of_means"])
+    assert ours["eq. 3.2, error", "holden to holden-xt"] == (0.072, None)
+
+
+def test_published_times_are_those_of_whole_laps_in_the_mode_constant(compared) -> None:
+    """Two laps of .75 and 1.25 times .1 ms plus 1 ns a computation."""
+    rows = {(r["measure"], r["configuration"]): r for r in compared["milliseconds"]["against_published"]}
+    ms = 0.1 + 1e-6 * 597_815
+    assert rows["a frame", "holden"]["ours"] == pytest.approx(ms)
+    what = "standard deviation of the means of laps"
+    assert rows[what, "holden"]["ours"] == pytest.approx(0.5 * ms / 2**0.5)
+    assert rows["eq. 3.2, milliseconds", "holden-xt to ava"]["other_figure"] == "39; 36 is of XL"
+    regression = rows["milliseconds for each computation of Table 6.1", "all"]
+    assert (regression["published"], regression["unit"]) == (9.6e-7, "")
+    counts = [335_501, 598_157, 1_566_701]
+    times = [0.1 + 1e-6 * parameter_counts(sizes)["true"] for sizes in SIZES.values()]
+    assert regression["ours"] == pytest.approx(np.polyfit(counts, times, 1)[0])
+
+
+def test_the_published_data_are_consistent_with_what_the_text_says_of_them(published) -> None:
+    """Means and deviations of Tables 5.1 and 5.2 follow from those of the appendix, but for AVA and AVA-M."""
+    for row in published["accuracy"]:
+        means = np.array(published["clip_means"][row["configuration"]])
+        assert len(means) == 80
+        same = np.allclose((means.mean(), means.std(ddof=1)), (row["mean"], row["sd"]), atol=6e-5)
+        assert same != ("other_figure" in row)
+    for row in published["responsivity"]:
+        laps = np.array(published["laps"][row["configuration"]])
+        same = np.allclose((laps.mean(), laps.std(ddof=1)), (row["milliseconds"], row["sd"]), atol=6e-4)
+        assert same != ("other_figure" in row)
+        assert len(laps) == 19
+    of = {name: {r["configuration"]: r for r in published[name]} for name in ("accuracy", "responsivity")}
+    for row in published["differences"]:
+        a, b = (of["accuracy" if row["over"] == "error" else "responsivity"][row[key]] for key in "ab")
+        key = "mean" if row["over"] == "error" else "milliseconds"
+        value = 2 * abs(a[key] - b[key]) / (a["sd"] + b["sd"])
+        assert (abs(value - row["value"]) < 0.03 * row["value"]) != ("slip" in row), row
+    assert {len(curve) for curve in published["curves"].values()} == {200}
 
 
 def test_a_published_figure_is_listed_with_its_own_configuration_only(compared, published) -> None:
@@ -179,12 +222,19 @@ def test_a_published_figure_is_listed_with_its_own_configuration_only(compared, 
         if isinstance(value, float | int)
     }
     rows = [*compared["against_published"], *compared["milliseconds"]["against_published"]]
-    rows = [row for row in rows if not row["measure"].startswith("hurt part")]
+    rows = [
+        r
+        for r in rows
+        if not r["measure"].startswith(("hurt part", "eq. 3.2")) and r["configuration"] != "all"
+    ]
     assert [row for row in rows if (row["configuration"], row["published"]) not in of] == []
     compared_ones = {row["configuration"] for row in rows if row["ours"] is not None}
     assert compared_ones == set(SIZES)
     predictions = [row for row in rows if row["measure"].startswith("a prediction")]
-    assert {(row["configuration"], row["ours"]) for row in predictions} == {("ferre", None)}
+    assert {(row["configuration"], row["ours"]) for row in predictions} == {
+        ("ferre-normal", None),
+        ("ferre-light", None),
+    }
 
 
 def test_tables_with_different_columns_survive_csv(compared, tmp_path) -> None:
@@ -202,7 +252,9 @@ def test_tables_with_different_columns_survive_csv(compared, tmp_path) -> None:
         ("holden-xl", "b"),
         ("ava", "b"),
     ]
-    assert [(r["mode"], r["lap"]) for r in rows["responsivity"]] == [(m, "1") for _ in SIZES for m in MODES]
+    assert [(r["mode"], r["lap"]) for r in rows["responsivity"]] == [
+        (m, lap) for _ in SIZES for m in MODES for lap in "12"
+    ]
     lengths = [(r["length"], r["split"]) for r in rows["rollouts"]]
     assert lengths == 3 * [("1", "train"), ("1", "held_out"), ("60", "train"), ("60", "held_out")]
     assert [tuple(r.values()) for r in rows["recognition"]][-1] == (
@@ -230,10 +282,16 @@ def test_published_clips_are_listed_with_ours_of_the_same_name(tmp_path, publish
         [read_results(*left_behind(tmp_path, "a", clips, SIZES["holden"]))], published
     )
     rows = [r for r in found["against_published"] if "LocomotionFlat04" in r["measure"]]
-    assert [(r["source"], r["published"], r["ours"]) for r in rows] == [
-        ("segerstedt", 0.0448, 0.03),
-        ("release", 0.0396, 0.03),
-    ]
+    assert [(r["source"], r["published"], r["ours"]) for r in rows] == [("release", 0.0396, 0.03)]
+    name = "holden"
+    found = compare_configurations(
+        [read_results(*left_behind(tmp_path, name, clips, SIZES[name]))], published
+    )
+    table = {(r["configuration"], r["clip"]): r for r in comparison_tables(found)["published-clips"]}
+    assert len(table) == 5 * 80
+    row = table[name, "LocomotionFlat04_000_mirror"]
+    assert (row["index"], row["published_mean"], row["published_sd"]) == (9, 0.0474, 0.0498)
+    assert table["ava", "LocomotionFlat04_000"]["published_sd"] is None
 
 
 def test_published_times_and_sizes_are_listed_with_their_measure(compared) -> None:

@@ -45,9 +45,8 @@ def without_times(value: Any) -> Any:
 
 
 def run(network, track, laps=2, seconds=10.0) -> dict[str, Any]:
-    return measure_responsivity(
-        network, configuration="x", runtime=RUNTIME, laps=laps, lap_seconds=seconds, track=track
-    )
+    options = Options(laps=laps, lap_seconds=seconds)
+    return measure_responsivity(network, options, configuration="x", runtime=RUNTIME, track=track)
 
 
 def test_finished_laps_are_counted_and_timed(steady) -> None:
@@ -108,8 +107,9 @@ def test_the_way_to_the_waypoint_where_a_lap_begins_does_not_belong_to_it(steady
     """Of three laps on a line of 40 m, the third starts 5 m ahead of its waypoint. It glides by, so it counts
     from within a metre of it."""
     line = (Waypoint((0.0, 4000.0), "walk", 1.5), Waypoint((0.0, 0.0), "walk", 1.5))
-    (*_, (lap, path)) = walk_laps(steady, RUNTIME, 3, 300, line)
+    (*_, (lap, path, before)) = walk_laps(steady, RUNTIME, 3, 300, line)
     assert (lap["frames"], lap["waypoints_reached"]) == (300, 0)
+    assert before > 200, "it walks 4 m at 1.5 cm a frame before its lap begins"
     assert path["z"][0] == pytest.approx(1.0, abs=0.03)
     # The last place that is kept is 285 frames later. The next waypoint is behind it, so it glides at half
     # the speed.
@@ -121,15 +121,18 @@ def test_a_lap_is_the_same_alone_and_in_a_crowd(network) -> None:
     assert walk_laps(network, RUNTIME, 5, 200, AHEAD)[0] == alone[0]
 
 
-def test_no_more_frames_are_timed_than_a_lap_may_take_or_its_part_of_all(
-    steady, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(module, "TIMED_OF_LAP", 8)
-    monkeypatch.setattr(module, "TIMED_OF_ALL", 20)
-    for laps, longest, expected in ((2, 100, 8), (4, 100, 5), (2, 3, 3)):
-        found = module.timed_frames(steady, RUNTIME, laps, longest, AHEAD)
-        assert [len(each) for each in found] == [expected] * laps
-        assert (np.array(found) > 0).all()
+def test_every_frame_of_a_lap_is_timed_and_none_before_it(steady) -> None:
+    found = module.timed_frames(steady, RUNTIME, [(5, 8), (0, 3)], AHEAD)
+    assert [times.shape for times in found] == [(8, len(STEPS) + 1), (3, len(STEPS) + 1)]
+    for times in found:
+        assert (times > 0).all()
+        assert (times[:, -1] >= times[:, :-1].sum(axis=1)).all()
+
+
+def test_there_are_as_many_laps_in_the_published_mode_as_in_the_own() -> None:
+    options = Options(laps=19, laps_other_modes=3)
+    laps = [module.laps_in_mode(options, mode, "cubic") for mode in ("constant", "linear", "cubic")]
+    assert laps == [19, 3, 19]
 
 
 def test_each_mode_runs_its_own_laps(network) -> None:
@@ -141,15 +144,11 @@ def test_each_mode_runs_its_own_laps(network) -> None:
     # Weights looked up otherwise move the figure a little otherwise.
     ways = {mode: entry["laps"][0]["path_distance_cm"] for mode, entry in modes.items()}
     assert len(set(ways.values())) == 3
-    some = measure_responsivity(
-        network,
-        configuration="x",
-        runtime=RUNTIME.model_copy(update={"mode": "linear"}),
-        laps=1,
-        lap_seconds=3.0,
-        modes=(),
-        track=AHEAD,
+    options, runtime = (
+        Options(laps=1, lap_seconds=3.0, modes=()),
+        RUNTIME.model_copy(update={"mode": "linear"}),
     )
+    some = measure_responsivity(network, options, configuration="x", runtime=runtime, track=AHEAD)
     assert [entry["mode"] for entry in some["modes"]] == ["linear"]
     assert without_times(some["laps"]) == without_times(modes["linear"]["laps"])
 

@@ -1,4 +1,4 @@
-"""The questionnaire's films, and the tables of made-up answers."""
+"""The questionnaire's films, and the tables of answers beside those of the published study."""
 
 from __future__ import annotations
 
@@ -13,143 +13,155 @@ import pytest
 
 from hobble.cli.__main__ import main
 from hobble.core.errors import InputError
-from hobble.measures.films import (
-    CHANGE_OF_GAIT,
-    FILMS,
-    FPS,
-    ONE_PART,
-    PARTS,
-    SEVERAL_PARTS,
-    hurts_and_gait,
-)
+from hobble.core.untrusted import read_yaml
+from hobble.measures.films import CHANGE_OF_GAIT, FILMS, FPS, ONE_PART, SEVERAL_PARTS
 from hobble.measures.study import (
+    ASKED,
+    MARKS,
     NUMERALS,
-    FilmAnswer,
-    Study,
-    answer_rows_by_numeral,
+    PARTS,
+    QUESTIONS,
+    published_part,
     read_answers,
     read_study,
+    study_tables,
 )
+from hobble.report.gather import PUBLISHED
+
+PRINTED = read_yaml(PUBLISHED)
+PEOPLE = 10
 
 
-@pytest.fixture
-def folder(tmp_path: Path) -> Path:
+def write_study(folder: Path, parts: str = "published") -> Path:
     """films.json as the rule writes it."""
-    films = [{"film": f.number, "kind": f.kind, "parts": list(f.parts)} for f in FILMS]
-    study = {"study": "abc", "configuration": "limp", "parts": PARTS, "films": films}
-    (tmp_path / "films.json").write_text(json.dumps(study))
-    return tmp_path
+    films = [
+        {"film": f.number, "kind": f.kind, "parts": [*f.severities], "severities": [*f.severities.values()]}
+        for f in FILMS
+    ]
+    study = {"study": "abc", "configuration": "limp", "parts": PARTS[parts], "films": films}
+    (folder / "films.json").write_text(json.dumps(study))
+    return folder / "films.json"
 
 
-@pytest.fixture
-def study(folder: Path) -> Study:
-    return read_study(folder / "films.json")
-
-
-def write(folder: Path, name: str, says: Callable[[Any], tuple[list[str], int]], **changed: Any) -> Path:
+def write(folder: Path, name: str, says: Callable[[Any], dict[str, Any]]) -> Path:
     """The answers of a person: `says(film)` for each film. The films are shown in reverse order."""
-    answers = [dict(zip(("parts", "fluid"), says(f), strict=True)) | {"film": f.number} for f in FILMS[::-1]]
-    data = {"study": "abc", "person": name, "order": [], "answers": answers} | changed
-    path = folder / f"{name}.json"
-    path.write_text(json.dumps(data))
-    return path
+    answers = [{"film": film.number, "plays": 1, **says(film)} for film in FILMS[::-1]]
+    (folder / f"{name}.json").write_text(json.dumps({"study": "abc", "person": name, "answers": answers}))
+    return folder / f"{name}.json"
 
 
-def test_the_thirteen_films_have_the_kinds_of_the_study() -> None:
+def printed_answer(person: int) -> Callable[[Any], dict[str, Any]]:
+    """Ten people whose counts are those of Tables III to XV. Who left out a question says no."""
+
+    def says(film: Any) -> dict[str, Any]:
+        row = PRINTED["questionnaire"][film.number - 1]
+        given = {"noticed": "yes" if person < row["noticed"][0] else "no"}
+        for key in ("fluidity", "progress", "realism"):
+            given[key] = [mark for mark, n in zip(MARKS, row[key], strict=True) for _ in range(n)][person]
+        ticked = [p for p, n in zip(PARTS["published"], row["parts"], strict=True) if person < n]
+        return given | {"parts": ticked}
+
+    return says
+
+
+def tables_of(folder: Path, people: list[Callable[[Any], dict[str, Any]]]) -> dict[str, list[dict[str, Any]]]:
+    study = read_study(folder / "films.json")
+    answers = [read_answers(write(folder, f"p{i}", says), study) for i, says in enumerate(people)]
+    return study_tables(study, answers, PRINTED)
+
+
+def test_the_films_hurt_what_the_captions_of_the_published_tables_name() -> None:
     assert Counter(film.kind for film in FILMS) == {ONE_PART: 4, SEVERAL_PARTS: 5, CHANGE_OF_GAIT: 4}
-    assert [film.number for film in FILMS] == list(range(1, 14))
-    assert len({(film.parts, film.gaits) for film in FILMS}) == 13
+    assert [set(f.severities) for f in FILMS] == [
+        {"left shank"}, {"right thigh"}, {"right shank"}, {"left forearm"},
+        {"left shank", "right thigh"}, {"left shank", "right thigh"},
+        {"left shank", "right shank"}, {"left shank", "right shank"}, {"right thigh", "right shank"},
+        {"left shank"}, {"right thigh"}, {"right shank"}, {"left forearm"},
+    ]  # fmt: skip
+    assert [next(iter(FILMS[i].severities.values())) for i in (4, 5, 6, 7)] == [5, 10, 5, 10]
     for film in FILMS:
-        assert set(film.parts) <= set(PARTS)
-        assert (len(film.parts) == 1) if film.kind == ONE_PART else True
-        assert (len(film.parts) > 1) if film.kind == SEVERAL_PARTS else True
         assert (film.gaits[0] != film.gaits[1]) == (film.kind == CHANGE_OF_GAIT)
-    assert any("forearm" in part for film in FILMS for part in film.parts)
 
 
-@pytest.mark.parametrize("film", FILMS)
-def test_each_film_starts_healthy_and_changes_gait_only_while_hurt(film) -> None:
-    states = [hurts_and_gait(film, f) for f in range(round(film.seconds * FPS))]
-    hurts = [hurt for hurt, _ in states]
-    assert hurts.index(True) == 3 * FPS
-    assert all(hurts[3 * FPS :])
-    gaits = [gait for _, gait in states]
-    assert (gaits[0], gaits[-1]) == film.gaits
-    assert len(set(gaits[: 5 * FPS])) == 1, "two seconds hurt before the gait changes"
+@pytest.mark.parametrize("film", FILMS, ids=lambda film: str(film.number))
+def test_injuries_begin_one_after_the_other_and_rise_before_the_gait_changes(film) -> None:
+    states = [film.at(f) for f in range(-60, round(film.seconds * FPS))]
+    begins = [next(i for i, (hurt, _) in enumerate(states) if part in hurt) for part in film.severities]
+    assert begins[0] == 60 + 3 * FPS + 1
+    assert begins == sorted(set(begins))
+    assert states[-1] == (dict(film.severities), film.gaits[1])
+    for part, severity in film.severities.items():
+        values = [hurt.get(part, 0) for hurt, _ in states]
+        assert values == sorted(values)
+        assert values[-1] == severity
+    changes = [i for i, (_, gait) in enumerate(states) if gait != film.gaits[0]]
+    assert all(states[i][0] == film.severities for i in changes)
 
 
-def right(film) -> tuple[list[str], int]:
-    return list(film.parts), 5
+def test_the_published_answers_give_the_published_tables(tmp_path: Path) -> None:
+    write_study(tmp_path)
+    made = tables_of(tmp_path, [printed_answer(i) for i in range(PEOPLE)])
+    assert tuple(made) == (*NUMERALS, "scores")
+    for numeral in NUMERALS[:-1]:
+        for row in made[numeral]:
+            if row["about"] != "noticed" or row["choice"] == "yes":
+                assert row["people"] == row["published_people"], (numeral, row)
+    summary = {row["about"]: row for row in made["XVI"]}
+    # As counted from Tables III to XV by hand; Table XVI prints 3.6 and .69, 3.2 and .84, 3.5 and .70.
+    by_hand = {"fluidity": (3.63077, 0.64857), "progress": (3.27692, 0.81051), "realism": (3.56154, 0.72977)}
+    for about, (average, sd) in by_hand.items():
+        assert (summary[about]["average"], summary[about]["sd"]) == (average, sd)
+    assert summary["noticed"]["published_average"] == 0.7857
+    everything = made["scores"][-1]
+    assert everything["answers"] == 130
+    assert everything["seen"] == everything["published_seen"] == 132 / 160
+    assert everything["seen_with_side"] is None
+    assert [row["kind"] for row in made["scores"][13:]] == [ONE_PART, SEVERAL_PARTS, CHANGE_OF_GAIT, "all"]
 
 
-def mirrored(film) -> tuple[list[str], int]:
-    swap = {"left": "right", "right": "left"}
-    return [f"{swap[part.split()[0]]} {part.split(' ', 1)[1]}" for part in film.parts], 3
+def good(parts: list[str]) -> dict[str, Any]:
+    return {**{key: choices[-1] for key, (_, choices) in QUESTIONS.items()}, "parts": parts}
 
 
-def back(film) -> tuple[list[str], int]:
-    return ["lower back"], 1
+def test_sides_count_only_where_people_were_asked_for_them(tmp_path: Path) -> None:
+    """Of three people one names all parts, one confuses the sides, and one says the neck."""
+    write_study(tmp_path, "sided")
+    other = {"left": "right", "right": "left"}
+
+    def mirrored(film: Any) -> dict[str, Any]:
+        return good([f"{other[part.split()[0]]} {part.split(' ', 1)[1]}" for part in film.severities])
+
+    made = tables_of(tmp_path, [lambda film: good([*film.severities]), mirrored, lambda _: good(["neck"])])
+    rows = {row["film"]: row for row in made["scores"][:13]}
+    assert rows["1"]["seen"] == rows["1"]["exact"] == round(2 / 3, 5)
+    assert rows["1"]["seen_with_side"] == round(1 / 3, 5)
+    assert rows["7"]["seen_with_side"] == round(2 / 3, 5), "both shanks hurt, so a mirror names them, too"
+    assert rows["1"]["wrong"] == round(1 / 3, 5)
+    head = [row for row in made["III"] if row["choice"] == "head"]
+    assert [row["people"] for row in head] == [1]
+    assert {published_part(part) for part in PARTS["sided"]} == set(PARTS["published"])
 
 
-def test_known_answers_give_known_tables(folder: Path, study: Study) -> None:
-    """Of three people one names all parts, one confuses the sides, and one always says the back."""
-    people = [read_answers(write(folder, says.__name__, says), study) for says in (right, mirrored, back)]
-    made = answer_rows_by_numeral(study, people)
-    assert tuple(made) == NUMERALS
-    for numeral, film in zip(NUMERALS, FILMS, strict=False):
-        rows = {row["part"]: row for row in made[numeral]}
-        assert {part for part, row in rows.items() if row["hurts"]} == set(film.parts)
-        opposite = mirrored(film)[0]
-        for part, row in rows.items():
-            expected = (part in film.parts) + (part in opposite) + (part == "lower back")
-            assert row["people"] == expected, (numeral, part)
-            assert row["share"] == pytest.approx(expected / 3, abs=1e-5)
-    summary = made["XVI"]
-    assert [row["film"] for row in summary] == [*map(str, range(1, 14)), "all", "all", "all", "all"]
-    assert [row["kind"] for row in summary[13:]] == [ONE_PART, SEVERAL_PARTS, CHANGE_OF_GAIT, "all"]
-    everything = summary[-1]
-    # Film 8 hurts two right parts, films 6 and 9 parts of both sides: none is named in a mirror.
-    assert everything["answers"] == 39
-    assert everything["seen"] == pytest.approx(1 / 3, abs=1e-5)
-    assert everything["seen_without_side"] == pytest.approx(2 / 3, abs=1e-5)
-    assert everything["exact"] == pytest.approx(1 / 3, abs=1e-5)
-    assert everything["exact_without_side"] == pytest.approx(2 / 3, abs=1e-5)
-    parts = sum(len(film.parts) for film in FILMS)
-    assert everything["wrong"] == pytest.approx((0 + parts + 13) / 39, abs=1e-5)
-    assert everything["fluid"] == 3.0
-    assert everything["fluid_sd"] == pytest.approx((4 * 26 / 38) ** 0.5, abs=1e-5)
-
-
-def test_naming_one_of_three_hurt_parts_counts_a_third(study: Study) -> None:
-    """In film 9 three parts hurt, and one of two people ticks one of them. In film 1 both tick one part too
-    many.
-    """
-    first = [FilmAnswer(f.number, f.parts[:1] if f.number == 9 else f.parts, 4) for f in FILMS]
-    second = [FilmAnswer(f.number, () if f.number == 9 else f.parts, 2) for f in FILMS]
-    rows = {row["film"]: row for row in answer_rows_by_numeral(study, [first, second])["XVI"][:13]}
-    assert rows["9"]["seen"] == pytest.approx(1 / 6, abs=1e-5)
-    assert rows["9"]["exact"] == 0
-    assert rows["9"]["wrong"] == 0
-    assert rows["1"]["seen"] == rows["1"]["exact"] == 1
-    assert rows["1"]["fluid"] == 3
-    assert rows["1"]["fluid_sd"] == pytest.approx(2**0.5, abs=1e-5)
-
-
-def test_the_command_writes_fourteen_tables(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    files = [str(write(folder, says.__name__, says)) for says in (right, mirrored)]
-    assert main(["study", str(folder / "films.json"), *files, "--out", str(folder / "out")]) == 0
-    assert "2 people, 26 answers" in (said := capsys.readouterr().out)
-    assert "ticked: 50 % (Ferre 2019: 82 %), 100 % if left and right count as the same." in said
-    assert "Fluid: 4.00 of 5." in said
-    names = {f"table-{numeral}.csv" for numeral in NUMERALS} | {"tables.md"}
-    assert {path.name for path in (folder / "out").iterdir()} == names
-    with open(folder / "out" / "table-IX.csv") as file:
-        ticked = {row["part"]: row["people"] for row in csv.DictReader(file)}
-    assert ticked["left shank"] == ticked["left forearm"] == ticked["right shank"] == "1"
-    assert sum(map(int, ticked.values())) == 4
-    text = (folder / "out" / "tables.md").read_text()
-    assert "## Table IX: film 7, several parts: left shank, left forearm" in text
-    assert "## Table XVI: all films" in text
+def test_the_command_writes_fourteen_tables_with_the_published_beside_ours(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    films = write_study(tmp_path)
+    files = [str(write(tmp_path, f"p{i}", printed_answer(i))) for i in range(PEOPLE)]
+    assert main(["study", str(films), *files, "--out", str(tmp_path / "out")]) == 0
+    said = capsys.readouterr().out
+    assert "10 people, 130 answers" in said
+    assert "ticked: 82 % (Ferre et al. 2019: 82.5 % by their tables, 82 % in their text)" in said
+    names = {f"table-{numeral}.csv" for numeral in NUMERALS} | {"scores.csv", "tables.md"}
+    assert {path.name for path in (tmp_path / "out").iterdir()} == names
+    with open(tmp_path / "out" / "table-IX.csv") as file:
+        rows = list(csv.DictReader(file))
+    assert [row["choice"] for row in rows] == [c for _, choices in ASKED.values() for c in choices]
+    assert rows[-1]["people"] == rows[-1]["published_people"] == "8"
+    text = (tmp_path / "out" / "tables.md").read_text()
+    assert "## Table VIII: film 6, several parts: left shank 10, right thigh 10" in text
+    assert "| Ferre et al. (2019) | yes: 5 (62 %) | no: 3 (38 %) | | | |" in text.replace(
+        "|  |", "| |"
+    ).replace("  ", " ")
 
 
 @pytest.mark.parametrize(
@@ -159,8 +171,8 @@ def test_the_command_writes_fourteen_tables(folder: Path, capsys: pytest.Capture
         (lambda d: d | {"answers": d["answers"][1:]}, "film 13 is not answered"),
         (lambda d: d | {"answers": [d["answers"][0], *d["answers"]]}, "film 13 is answered twice"),
         (lambda d: d | {"answers": [d["answers"][0] | {"parts": ["tail"]}]}, "answer 1: no such part: tail"),
-        (lambda d: d | {"answers": [d["answers"][0] | {"fluid": 6}]}, "answer 1: fluid: .* 5"),
-        (lambda d: d | {"answers": [d["answers"][0] | {"fluid": True}]}, "answer 1: fluid: "),
+        (lambda d: d | {"answers": [d["answers"][0] | {"fluidity": 6}]}, "answer 1: fluidity: .* 'fair'"),
+        (lambda d: d | {"answers": [d["answers"][0] | {"noticed": True}]}, "answer 1: noticed: "),
         (lambda d: d | {"answers": [d["answers"][0] | {"film": 14}]}, "there is no film 14"),
         (lambda d: d | {"answers": ["\x1b[31m"]}, "answer 1: "),
         (lambda d: d | {"answers": 3}, "has no list `answers`"),
@@ -168,9 +180,10 @@ def test_the_command_writes_fourteen_tables(folder: Path, capsys: pytest.Capture
     ],
 )
 def test_a_malformed_file_of_answers_is_refused_with_its_place(
-    folder: Path, study: Study, change: Callable[[Any], Any], message: str
+    tmp_path: Path, change: Callable[[Any], Any], message: str
 ) -> None:
-    path = write(folder, "someone", right)
+    study = read_study(write_study(tmp_path))
+    path = write(tmp_path, "someone", printed_answer(0))
     path.write_text(json.dumps(change(json.loads(path.read_text()))))
     with pytest.raises(InputError, match=message) as error:
         read_answers(path, study)

@@ -15,8 +15,8 @@ import pytest
 from hobble.core.errors import HobbleError
 from hobble.core.skeleton import Skeleton
 from hobble.measures import films
-from hobble.measures.films import FILMS, PARTS, list_doubts, part_links, write_questionnaire
-from hobble.measures.study import read_answers, read_study
+from hobble.measures.films import FILMS, list_doubts, part_links, write_questionnaire
+from hobble.measures.study import PARTS, QUESTIONS, read_answers, read_study
 from hobble.models.load import load_network
 from hobble.models.network import Network
 
@@ -32,7 +32,9 @@ def made(
     with pytest.MonkeyPatch.context() as patch:
         for name, seconds in (("WARM_UP_SECONDS", 0.1), ("HEALTHY_SECONDS", 0.1), ("HURT_SECONDS", 0.3)):
             patch.setattr(films, name, seconds)
-        return folder, write_questionnaire(network, folder, examples.RUNTIME, "example", SHORT, size=48)
+        return folder, write_questionnaire(
+            network, folder, examples.RUNTIME, "example", SHORT, "sided", size=48
+        )
 
 
 @pytest.mark.slow
@@ -45,7 +47,9 @@ def test_films_drawn_at_once_are_those_drawn_one_by_one(
 ) -> None:
     for name, seconds in (("WARM_UP_SECONDS", 0.1), ("HEALTHY_SECONDS", 0.1), ("HURT_SECONDS", 0.3)):
         monkeypatch.setattr(films, name, seconds)
-    again = write_questionnaire(network, tmp_path, examples.RUNTIME, "example", SHORT, size=48, threads=3)
+    again = write_questionnaire(
+        network, tmp_path, examples.RUNTIME, "example", SHORT, "sided", size=48, threads=3
+    )
     assert again == made[1]
     assert (tmp_path / "questionnaire.html").read_text() == (made[0] / "questionnaire.html").read_text()
 
@@ -65,10 +69,18 @@ def again(tab: Any, forget: bool = False) -> None:
     assert tab.until("!!globalThis.Study")
 
 
+def answer_first(tab: Any) -> None:
+    """Give the first answer to each question, and go on."""
+    tab.run(
+        "document.querySelectorAll('#questions fieldset').forEach((f) => f.querySelector('input').click())"
+    )
+    tab.run("document.getElementById('next').click()")
+
+
 def test_injuries_are_listed_in_a_file_and_not_in_the_page(made: tuple[Path, dict[str, Any]]) -> None:
     folder, written = made
     assert json.loads((folder / "films.json").read_text()) == json.loads(json.dumps(written))
-    assert [row["parts"] for row in written["films"]] == [list(film.parts) for film in SHORT]
+    assert [row["parts"] for row in written["films"]] == [list(film.severities) for film in SHORT]
     assert written["films"][0]["links"] == ["LeftForeArm-LeftHand"]
     assert all(row["from_healthy_cm"] > 0 for row in written["films"])
     page = (folder / "questionnaire.html").read_text()
@@ -90,14 +102,16 @@ def test_each_film_is_asked_about_once_and_the_answers_can_be_counted(
     for i in range(4):
         assert tab.run("document.getElementById('which').textContent") == f"Film {i + 1} of 4"
         assert tab.run(disabled)
-        part = PARTS[i]
-        if i == 2:  # "nothing hurts" takes the ticks back
+        part = PARTS["sided"][i]
+        if i == 2:  # "none of these" takes the ticks back
             tab.run(f"{box.format(part)}.click(); {box.format('nothing')}.click()")
             part = None
         else:
             tab.run(f"{box.format(part)}.click()")
-        assert tab.run(disabled), "it is not said yet how fluid it is"
-        tab.run(f"document.querySelectorAll('#marks input')[{i}].click()")
+        for key, (_, choices) in QUESTIONS.items():
+            assert tab.run(disabled), f"{key} is not answered yet"
+            choice = choices[i % len(choices)]
+            tab.run(f"document.querySelector(`#questions-asked input[name={key}][value='{choice}']`).click()")
         assert not tab.run(disabled)
         tab.run("document.getElementById('again').click()")
         tab.run("document.getElementById('next').click()")
@@ -109,10 +123,11 @@ def test_each_film_is_asked_about_once_and_the_answers_can_be_counted(
     assert [row["plays"] for row in data["answers"]] == [2] * 4
     (tmp_path / "answers.json").write_text(text)
     answers = read_answers(tmp_path / "answers.json", read_study(made[0] / "films.json"))
-    assert [a.film for a in answers] == data["order"]
-    assert sorted(data["order"]) == [film.number for film in SHORT]
+    assert sorted(data["order"]) == [a.film for a in answers] == [film.number for film in SHORT]
+    answers.sort(key=lambda a: data["order"].index(a.film))
     assert [a.parts for a in answers] == ticked
-    assert [a.fluid for a in answers] == [1, 2, 3, 4]
+    assert [a.realism for a in answers] == ["very poor", "poor", "fair", "good"]
+    assert [a.noticed for a in answers] == ["yes", "no", "yes", "no"]
     assert tab.console == []
     assert all(url.startswith(("file:", "data:", "blob:", "about:")) for url in tab.requests)
 
@@ -125,8 +140,7 @@ def test_orders_differ_and_a_reopened_page_continues(tab: Any) -> None:
         tab.run("document.getElementById('begin').click()")
         orders.add(tuple(tab.run("Study.state.order")))
     assert len(orders) > 3
-    tab.run("document.querySelector('#parts input').click(); document.querySelector('#marks input').click()")
-    tab.run("document.getElementById('next').click()")
+    answer_first(tab)
     order = tab.run("Study.state.order")
     again(tab)
     assert tab.until("document.getElementById('resumed').textContent.includes('answered 1 of 4')")
@@ -142,10 +156,7 @@ def test_axe_finds_no_accessibility_problem_in_any_of_the_three_parts(tab: Any, 
     tab.run("document.getElementById('begin').click()")
     assert tab.violations(modules) == []
     for _ in range(4):
-        tab.run(
-            "document.querySelector('#parts input').click(); document.querySelector('#marks input').click()"
-        )
-        tab.run("document.getElementById('next').click()")
+        answer_first(tab)
     assert not tab.run("document.getElementById('done').hidden")
     assert tab.violations(modules) == []
 

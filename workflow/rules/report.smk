@@ -171,6 +171,7 @@ rule questionnaire:
         runtime=30,
     params:
         configuration=lambda w: w.configuration,
+        parts=lambda w: catalogue.configuration(w.configuration).report.parts,
         runtime=lambda w: configurations.section(w.configuration, "runtime"),
         code=lambda w: package.code(
             "questionnaire",

@@ -14,6 +14,7 @@ with job(snakemake) as log:
         folder,
         Runtime.model_validate(snakemake.params.runtime),
         snakemake.params.configuration,
+        parts=snakemake.params.parts,
         threads=snakemake.threads,
     )
     for doubt in list_doubts(solution):

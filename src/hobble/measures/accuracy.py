@@ -23,8 +23,10 @@ from hobble.measures.compare import (
     ComparisonAddition,
     ConfigurationResults,
     compare_series,
+    mean_and_sd,
+    published_clips,
+    published_differences,
     published_row,
-    published_sd,
 )
 from hobble.measures.measure import SPLITS, Cost, JointOptions, Measure, Row, SampleOptions, sample_in_words
 from hobble.report.parts import SPLITS as SPLIT_LABELS
@@ -46,10 +48,10 @@ from hobble.report.parts import (
     citation,
     configuration_colours,
     configuration_names,
-    dot_trace,
     format_duration,
     format_number,
     heatmap,
+    line_trace,
     marker_trace,
     ordered_axis,
     reference_line,
@@ -118,6 +120,10 @@ def clip_bars(found: Json, material: ReportMaterial) -> Chart | None:
         sds = {"array": [100 * (row.get("sd") or 0) for row in chosen], "arrayminus": [0 for _ in chosen]}
         whiskers = {"type": "data", "symmetric": False, "color": "@faint", "thickness": 1, "width": 2, **sds}
         traces.append({**bars, "orientation": "h", "error_x": whiskers})
+    theirs = _published_means(material.published, material.name)
+    if shown := [row["clip"] for row in rows if row["clip"] in theirs]:
+        diamond = {"symbol": "diamond-open", "size": 7, "color": "@ink"}
+        traces.append(marker_trace("published", [100 * theirs[clip] for clip in shown], shown, diamond))
     published = material.published_entry("accuracy")
     line = reference_line(100 * published["mean"], f"{published['label']}, published") if published else {}
     held_out = any(row["split"] == "held_out" for row in rows)
@@ -187,24 +193,36 @@ def accuracy_table(found: Json, name: str) -> Table:
 
 
 def published_table(found: Json, material: ReportMaterial) -> Table:
-    """The errors of our network on both splits, followed by the published means."""
+    """Means and standard deviations of the clips' mean errors: ours on both splits, then the published ones.
+
+    Ours are measured as the published ones were, see `measure_accuracy` in `hobble.measures.accuracy_run`.
+    """
     rows: list[list[Any]] = []
-    for split in ("held_out", "train"):
+    for split, name in NAMES.items():
         part = found.get(split) or {}
-        if part.get("mean") is not None:
-            what = f"{material.name}, {NAMES[split]} clips"
-            rows.append([what, part["mean"], part.get("sd"), part.get("position_error_cm"), "this report"])
+        if ours := part.get("as_published"):
+            row = [ours["mean_of_clips"], ours["sd_of_clips"], part.get("position_error_cm")]
+            rows.append([f"{material.name}, {name} clips", *row, "this report"])
     sources = material.published["sources"]
     for entry in material.published["accuracy"]:
-        rows.append([entry["label"], entry["mean"], None, None, citation(entry, sources)])
+        rows.append([entry["label"], entry["mean"], entry["sd"], None, citation(entry, sources)])
     columns = [
         Column("network"),
-        Column.number("mean error, as a fraction"),
-        Column.number("sd"),
-        Column.number("position error, cm"),
+        Column.number("mean error of the clips, as a fraction"),
+        Column.number("sd of these means"),
+        Column.number("position error, cm (all frames, exact phase)"),
         Column("source", kind="long"),
     ]
-    return Table(f"{material.name}-published", columns, rows, "Comparison with published results")
+    title = (
+        "Comparison with published results (phase mode constant, at most 500,000 joint positions of a clip)"
+    )
+    return Table(f"{material.name}-published", columns, rows, title)
+
+
+def _published_means(published: Json, configuration: str) -> dict[str, float]:
+    """Clip -> published mean error of the network of a configuration; {} if there are none."""
+    means = published["clip_means"].get(configuration)
+    return dict(zip(published_clips(published), means, strict=True)) if means else {}
 
 
 def section(found: Json, material: ReportMaterial) -> PageSection:
@@ -357,28 +375,56 @@ def compared(all_measured: Sequence[ConfigurationResults], published: Json) -> C
 
     all_measured: the results of each configuration. published: the content of published.yaml.
     """
+    differences = accuracy_differences(all_measured)
+    on_training = [row for row in differences if row["over"] == "train"]
     return ComparisonAddition(
         entries=[{"dataset": m.dataset, **m.results_of(NAME), "configuration": m.name} for m in all_measured],
         about={m.name: {"joints": m.results_of(NAME)["joints"]} for m in all_measured},
-        differences=accuracy_differences(all_measured),
+        differences=differences,
         against_published=[
             *_published_splits(all_measured, published),
+            *published_differences("error", on_training, published),
             *_published_clips(all_measured, published),
         ],
     )
 
 
 def tables(compared: Json) -> dict[str, list[Row]]:
-    """Name -> rows of a CSV table: the errors of every clip in every configuration.
+    """Name -> rows of a CSV table: the errors of every clip in every configuration; Tables A.4 and A.5.
 
     compared: the content of compare.json.
     """
     rows: list[Row] = [
-        {"configuration": entry["configuration"], **row}
+        {"configuration": entry["configuration"], **{key: clip.get(key) for key in CLIP_COLUMNS}}
         for entry in compared[NAME]
-        for row in ({key: clip.get(key) for key in CLIP_COLUMNS} for clip in entry["clips"])
+        for clip in entry["clips"]
     ]
-    return {NAME: rows}
+    return {NAME: rows, "published-clips": published_clip_rows(compared)}
+
+
+def published_clip_rows(compared: Json) -> list[Row]:
+    """Tables A.4 and A.5 of Segerstedt (2021): a row for each clip and network, with ours beside it."""
+    published, ours, rows = compared["published"], {}, list[Row]()
+    for entry in compared[NAME]:
+        for clip in entry["clips"]:
+            ours[entry["configuration"], clip["clip"]] = clip.get("as_published") or {}
+    for configuration, means in published["clip_means"].items():
+        sds = published["clip_sds"].get(configuration, [None] * len(means))  # table A.5 has none for AVA
+        clips = enumerate(zip(published_clips(published), means, sds, strict=True))
+        for index, (clip, mean, sd) in clips:
+            found = ours.get((configuration, clip), {})
+            rows.append(
+                {
+                    "index": index,
+                    "clip": clip,
+                    "configuration": configuration,
+                    "published_mean": mean,
+                    "published_sd": sd,
+                    "mean": found.get("mean"),
+                    "sd": found.get("sd"),
+                }
+            )
+    return rows
 
 
 def accuracy_differences(all_measured: Sequence[ConfigurationResults]) -> list[dict[str, Any]]:
@@ -403,44 +449,40 @@ def _series(found: Json) -> dict[str, Json]:
 
 
 def clip_means(found: Json, split: str) -> list[float]:
-    """The mean error of each clip of a split that has one. found: the content of accuracy.json."""
-    return [c["mean"] for c in found["clips"] if c["split"] == split and c["mean"] is not None]
+    """The mean error of each clip of a split that has one, as published ones were measured if possible.
+
+    found: the content of accuracy.json.
+    """
+    clips = [c for c in found["clips"] if c["split"] == split and c["mean"] is not None]
+    return [c.get("as_published", c)["mean"] for c in clips]
 
 
 def _published_splits(all_measured: Sequence[ConfigurationResults], published: Json) -> list[dict[str, Any]]:
-    """Published errors of each configuration, beside our errors on each split."""
+    """Published means and standard deviations of the clips' errors, beside ours on each split."""
     by_name = {m.name: m.results_of(NAME) for m in all_measured}
     out = []
     for row in published["accuracy"]:
         found = by_name.get(row["configuration"])
         for split in SPLITS:
             clips = f"{SPLIT_NAMES[split]} clips"
-            ours = found[split]["mean_of_clips"] if found else None
-            out.append(published_row(f"relative error, {clips}", row, row["mean"], ours))
-            means = clip_means(found, split) if found else []
-            out += published_sd(f"standard deviation of the means of {clips}", row, means)
+            mean, sd = mean_and_sd(clip_means(found, split) if found else [])
+            out.append(published_row(f"relative error, {clips}", row, row["mean"], mean))
+            out.append(published_row(f"standard deviation of the means of {clips}", row, row["sd"], sd))
     return out
 
 
 def _published_clips(all_measured: Sequence[ConfigurationResults], published: Json) -> list[dict[str, Any]]:
-    """Published errors of single clips, beside the errors of each configuration on the same clips.
-
-    The files of the clips that Holden et al. (2017) released have names that end in _000; the published names
-    do not. Segerstedt (2021) published the errors of two networks: "segerstedt" is his own, "release" is the
-    network that Holden et al. released.
-    """
+    """Errors of the network that Holden et al. released on three clips, beside ours on these clips."""
     return [
         published_row(
             f"relative error, {clip['clip']}",
-            {"configuration": results.name, "source": source},
-            row[source],
-            clip["mean"],
+            {"configuration": results.name, "source": "release"},
+            published["released_clips"][clip["clip"]],
+            clip.get("as_published", clip)["mean"],
         )
-        for row in published["clips"]
         for results in all_measured
         for clip in results.results_of(NAME)["clips"]
-        if clip["clip"].removesuffix("_000") == row["clip"]
-        for source in ("segerstedt", "release")
+        if clip["clip"] in published["released_clips"]
     ]
 
 
@@ -472,7 +514,8 @@ def compared_section(compared: Compared) -> PageSection:
             SectionPart(10, error_boxes(compared)),
             SectionPart(30, difference_map(compared)),
             SectionPart(40, difference_table(compared)),
-            SectionPart(50, clip_dots(compared), tall=True),
+            SectionPart(50, clip_lines(compared)),
+            SectionPart(60, published_clips_table(compared)),
         ],
         title="Accuracy",
         order=10,
@@ -512,17 +555,33 @@ def error_boxes(compared: Compared) -> Chart:
                 traces.append({**box, "x": [name], "boxmean": True, "line": line})
         if traces:
             options[label] = [*traces, marks] if published else traces
+        options |= _boxes_of_means(compared, split, f"{label}, a value for each clip")
     return Chart(
         "compare-boxes",
         "Spread of the error",
         "Each box holds the middle half of the relative errors of all frames (eq. 3.1 of Segerstedt). The "
         "solid line is the median, the dashed line the mean. Whiskers reach from the 5th to the 95th "
-        "percentile. Diamonds are published means, measured on other data.",
+        "percentile. Diamonds are published means, measured on other data. With a value for each clip, as in "
+        "Figure 5.8 of Segerstedt, boxes are of the means of clips, ours and those of his 80 clips.",
         layout={"yaxis": axis("relative error, %", rangemode="tozero"), "showlegend": False},
         height=400,
         choose="Clips",
         options=options,
     )
+
+
+def _boxes_of_means(compared: Compared, split: str, label: str) -> dict[str, list[Trace]]:
+    """{label: boxes of the means of clips}, published ones beside ours; {} without clips in the split."""
+    traces: list[Trace] = []
+    for entry in compared["accuracy"]:
+        name = entry["configuration"]
+        theirs = [("published", compared["published"]["clip_means"].get(name, ()), "@muted")]
+        for whose, means, colour in [("ours", clip_means(entry, split), "@accent"), *theirs]:
+            if len(means):
+                y = [100 * mean for mean in means]
+                box = {"type": "box", "name": f"{name}, {whose}", "y": y, "boxmean": True, "boxpoints": False}
+                traces.append({**box, "line": {"width": 1.6, "color": colour}})
+    return {label: traces} if any(clip_means(entry, split) for entry in compared["accuracy"]) else {}
 
 
 def difference_table(compared: Compared) -> Table:
@@ -542,23 +601,56 @@ def difference_table(compared: Compared) -> Table:
     return Table("compare-difference", columns, rows, "Differences between all pairs")
 
 
-def clip_dots(compared: Compared) -> Chart | None:
-    """The mean error of every clip, a dot for each configuration."""
-    clips = {(row["split"], row["clip"]) for entry in compared["accuracy"] for row in entry["clips"]}
-    # Plotly puts the first clip at the bottom, so held-out clips come last.
-    order = [clip for _, clip in sorted(clips, key=lambda pair: (pair[0] == "held_out", pair[1]))]
-    if not order:
+def clip_lines(compared: Compared) -> Chart | None:
+    """Mean and standard deviation of the error of every clip, as lines: Figures 5.6 and 5.7 of Segerstedt.
+
+    Our clips that are not among his 80 come first. Dotted lines are the published ones.
+    """
+    published, colours = compared["published"], configuration_colours(compared)
+    their_clips = published_clips(published)
+    measured = {(row["split"], row["clip"]) for entry in compared["accuracy"] for row in entry["clips"]}
+    if not measured:
         return None
-    traces = []
-    for entry in compared["accuracy"]:
-        rows = [row for row in entry["clips"] if row.get("mean") is not None]
-        means, names = [100 * row["mean"] for row in rows], [row["clip"] for row in rows]
-        colour = configuration_colours(compared)[entry["configuration"]]
-        traces.append(dot_trace(entry["configuration"], means, names, colour, "%{y}: %{x:.2f} %"))
-    layout = _clip_axes(order)
-    layout["yaxis"]["type"] = "category"
-    caption = "Each row is a clip, with one dot for each configuration. Held-out clips are at the top."
-    return Chart("compare-clips", "Error of each clip", caption, traces, layout, 130 + 19 * len(order))
+    own = [clip for _, clip in sorted(measured) if clip not in their_clips]
+    order = [*own, *their_clips]
+    options: dict[str, list[Trace]] = {}
+    for label, key, theirs in (("mean", "mean", "clip_means"), ("standard deviation", "sd", "clip_sds")):
+        traces = options.setdefault(label, [])
+        for entry in compared["accuracy"]:
+            name, means = entry["configuration"], published[theirs].get(entry["configuration"])
+            rows = {r["clip"]: r.get("as_published", r)[key] for r in entry["clips"] if r["mean"] is not None}
+            known = [clip for clip in order if clip in rows]
+            hover = {"hovertemplate": "%{x}: %{y:.2f} %<extra>%{fullData.name}</extra>"}
+            y = [100 * rows[clip] for clip in known]
+            traces.append(line_trace(name, known, y, colours[name], mode="lines+markers", **hover))
+            if means:
+                y = [100 * mean for mean in means]
+                whose = f"{name}, published"
+                traces.append(
+                    line_trace(whose, their_clips, y, colours[name], dash="dot", width=1.3, **hover)
+                )
+    caption = (
+        "The error of every clip in the phase mode constant, on its first 500,000 joint positions, as "
+        "Segerstedt measured it. Dotted lines are his, on the 80 clips of Holden et al. Ours are above the "
+        "same clips if we have them. (His table of standard deviations has none for AVA.)"
+    )
+    x = {"type": "category", **ordered_axis(order), "showticklabels": len(order) < 40}
+    layout = {"xaxis": x, "yaxis": axis("relative error, %", rangemode="tozero")}
+    return Chart(
+        "compare-clips", "Error of each clip", caption, (), layout, 420, choose="Shown", options=options
+    )
+
+
+def published_clips_table(compared: Compared) -> Table:
+    """Tables A.4 and A.5 of Segerstedt (2021), with ours of the same clips."""
+    rows = published_clip_rows(compared)
+    columns = {key: Column.number(key.replace("_", " "), 4) for key in rows[0]}
+    columns |= {
+        "clip": Column("clip"),
+        "configuration": Column("configuration"),
+        "index": Column.count("index"),
+    }
+    return Table.of("compare-published-clips", columns, rows, "Tables A.4 and A.5 of Segerstedt, and ours")
 
 
 def difference_map(compared: Compared) -> Chart:

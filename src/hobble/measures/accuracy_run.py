@@ -20,6 +20,7 @@ from hobble.core.quat import Array
 from hobble.database.statistics import Moments
 from hobble.measures.measure import SPLITS, JointOptions, MeasureInputs, Outcome, Row
 from hobble.measures.sample import Sample, clip_parts, sample_to_measure
+from hobble.measures.walks import mean_of_known
 from hobble.models.load import load_network
 from hobble.models.network import Network
 from hobble.rows.clip_rows import ClipRows, Excerpt, pair_batches
@@ -33,6 +34,8 @@ if TYPE_CHECKING:
 Predict = Callable[[Array, Array], Array]
 
 BATCH = 256  # frames predicted in one call; the inputs of more frames do not fit in the processor's cache
+# Segerstedt measured at most the first so many joint positions of a clip, in the phase mode `constant`.
+PUBLISHED_POSITIONS = 500_000
 LEAST_DISTANCE = 1e-3  # cm: a joint nearer to the root counts as this far from it
 # With the option `joints: equivalent`, only joints with a counterpart on this skeleton are measured.
 REFERENCE = "holden31"
@@ -125,17 +128,38 @@ def predict_function(network: Network) -> Predict:
     return predict
 
 
+def at_stored_phases(network: Network, predict: Predict) -> Predict:
+    """`predict` in the phase mode `constant`: phases are rounded down to those whose weights it stores.
+
+    The same function for a network without this mode.
+    """
+    if "constant" not in network.modes:
+        return predict
+    stored = network.stored_numbers("constant") // network.parameter_count
+
+    def predict_stored(x: Array, phase: Array) -> Array:
+        nearest_below = np.floor(phase.astype(np.float32) * stored)  # float32, as at run time
+        return predict(x, np.minimum(nearest_below, stored - 1) / stored)
+
+    return predict_stored
+
+
 def clip_errors(
-    network: Network, rows: ClipRows, joints: Sequence[int], predict: Predict | None = None
+    network: Network,
+    rows: ClipRows,
+    joints: Sequence[int],
+    predict: Predict | None = None,
+    first: int | None = None,
 ) -> Errors:
     """The errors in all frames of a clip.
 
     A frame may have several terrain fits (ground heights that suit the motion). It is predicted on each of
     them and counts once, with its mean error. joints: indices of the joints to measure. predict: how to
-    evaluate the network; by default `Network.predict`.
+    evaluate the network; by default `Network.predict`. first: only so many rows, from the beginning.
     """
     layout, predict = network.layout, predict or network.predict
     total, histogram = Moments.of_no_rows(2), np.zeros(len(EDGES) - 1)
+    rows = rows if first is None or len(rows) <= first else rows.part(slice(first))
     for pairs in pair_batches(rows, layout):
         errors = joint_errors(layout, pairs.y, predict(pairs.x, pairs.p), joints)
         weights = np.repeat(pairs.weight / len(joints), len(joints))  # all weights of a frame add up to 1
@@ -159,11 +183,15 @@ def measure_accuracy(
     joint_names: the joints to measure; all by default. sample: the excerpts to measure in place of all clips;
     then the result also has the size of the sample, confidence intervals, and `excerpts`, the errors of each
     excerpt. In the result, `mean_of_clips` is the mean of the mean errors of clips, as in the published
-    tables. Raises InputError if rows and network have different layouts.
+    tables. `as_published` has the errors as Segerstedt (2021) measured them: in the phase mode `constant`, on
+    the first PUBLISHED_POSITIONS of each clip; of a split, mean and standard deviation (n - 1) of the clips'
+    means. It is left out of a sample. Raises InputError if rows and network have different layouts.
     """
     network = load_network(weights)
     joints, predict = joint_indices(network, joint_names), predict_function(network)
+    constant, first_frames = at_stored_phases(network, predict), PUBLISHED_POSITIONS // network.layout.joints
     of_clip: dict[str, Errors] = {}
+    as_published: dict[str, Errors] = {}
     excerpts: dict[Excerpt, dict[str, Any]] = {}
     totals = dict.fromkeys(SPLITS, Errors())
     for part in clip_parts(clips, sample):
@@ -174,17 +202,29 @@ def measure_accuracy(
         totals[split] += errors * part.weight
         of_clip[part.clip] = of_clip.get(part.clip, Errors()) + errors * part.weight
         values = errors.to_dict()
+        if sample is None:
+            as_published[part.clip] = clip_errors(network, loaded.rows, joints, constant, first_frames)
         if part.excerpt is not None:
             first, last = loaded.first_and_last_frame
             place = {"clip": part.clip, "split": split, "first_frame": first, "last_frame": last}
             excerpts[part.excerpt] = {**place, **values}
         log.info("%s: %s", part.excerpt or part.clip, values)
     entries = [{"clip": name, "split": splits[name], **errors.to_dict()} for name, errors in of_clip.items()]
+    for entry in entries if sample is None else ():
+        values = as_published[entry["clip"]].to_dict()
+        entry["as_published"] = {key: values[key] for key in ("frames", "mean", "sd")}
     result: dict[str, Any] = {"configuration": configuration, "joints": len(joints), "clips": entries}
     for split, errors in totals.items():
-        means = [e["mean"] for e in entries if e["split"] == split and e["mean"] is not None]
-        of_clips = {"clips": len(means), "mean_of_clips": float(np.mean(means)) if means else None}
-        result[split] = {**errors.to_dict(), **of_clips}
+        clips_of_split = [e for e in entries if e["split"] == split and e["mean"] is not None]
+        result[split] = {
+            **errors.to_dict(),
+            "clips": len(clips_of_split),
+            "mean_of_clips": mean_of_known([e["mean"] for e in clips_of_split], 15),
+        }
+        if sample is None:
+            means = [e["as_published"]["mean"] for e in clips_of_split]
+            sd = float(np.std(means, ddof=1)) if len(means) > 1 else None
+            result[split]["as_published"] = {"mean_of_clips": mean_of_known(means, 15), "sd_of_clips": sd}
     if sample is not None:
         _add_intervals(result, sample, excerpts)
         result |= {"sample": sample.to_dict(), "excerpts": list(excerpts.values())}

@@ -14,9 +14,6 @@ from hobble.core.files import Json, read_json, read_numbers
 from hobble.measures.measure import Row, functions
 from hobble.models import network_options
 
-# Stage -> what the publications call its files.
-STORED = {"database": "database", "terrain": "patches"}
-
 
 def difference_in_sds(mean_a: float, sd_a: float, mean_b: float, sd_b: float) -> float | None:
     """The difference of two means, in units of the mean of both standard deviations.
@@ -111,13 +108,13 @@ def compare_series(a: Json, b: Json) -> dict[str, Any]:
 
     a, b: have `mean` and `sd` over single frames, and may have `means`, the mean of each clip or lap.
     `difference` is |mean_a - mean_b| in units of the average sd. `difference_of_means` is the same for the
-    means and the sd of `means`, as in the publication. It is None if a or b has fewer than two means.
+    means and the sd of `means` (with n - 1), as in the publication. It is None if a or b has fewer than two
+    means.
     """
-    means_a, means_b = (np.asarray(series.get("means", ()), float) for series in (a, b))
-    sd_a, sd_b = (float(means.std()) if len(means) > 1 else None for means in (means_a, means_b))
+    (mean_a, sd_a), (mean_b, sd_b) = (mean_and_sd(series.get("means", ())) for series in (a, b))
     difference_of_means = None
-    if sd_a is not None and sd_b is not None:
-        difference_of_means = difference_in_sds(float(means_a.mean()), sd_a, float(means_b.mean()), sd_b)
+    if mean_a is not None and mean_b is not None and sd_a is not None and sd_b is not None:
+        difference_of_means = difference_in_sds(mean_a, sd_a, mean_b, sd_b)
     return {
         **{f"{key}_{name}": series[key] for name, series in (("a", a), ("b", b)) for key in ("mean", "sd")},
         "difference": difference_in_sds(a["mean"], a["sd"], b["mean"], b["sd"]),
@@ -127,14 +124,20 @@ def compare_series(a: Json, b: Json) -> dict[str, Any]:
     }
 
 
+def mean_and_sd(values: Sequence[float]) -> tuple[float | None, float | None]:
+    """Mean and standard deviation (n - 1) of a sample; None for those that need more values."""
+    mean = float(np.mean(values)) if len(values) else None
+    return mean, float(np.std(values, ddof=1)) if len(values) > 1 else None
+
+
 def published_row(
     measure: str, row: Json, theirs: float, ours: float | None, unit: str = ""
 ) -> dict[str, Any]:
     """A published number (`theirs`) next to ours, which is None if it was not measured.
 
     measure: what was measured, in words. row: the entry of published.yaml. It has `configuration` and
-    `source`. It may have `table`, the number of the table that printed the value, and `other_figure`, a text
-    with a different value from the same publication.
+    `source`. It may have `table`, the number of the table that printed the value, and `other_figure` or
+    `slip`, a text with a different value from the same publication, or that follows from it.
     """
     return {
         "measure": measure,
@@ -144,18 +147,13 @@ def published_row(
         "ours": ours,
         "source": row["source"],
         "table": row.get("table"),
-        "other_figure": row.get("other_figure"),
+        "other_figure": row.get("other_figure", row.get("slip")),
     }
 
 
-def published_sd(measure: str, row: Json, means: Sequence[float], unit: str = "") -> list[dict[str, Any]]:
-    """The published standard deviation of means next to ours; [] if `row` has none. measure: see above.
-
-    It was printed in the text of the publication, not in its table. means: ours, one for each clip or lap.
-    """
-    ours = float(np.std(means)) if len(means) > 1 else None
-    in_text = {**row, "table": None}
-    return [published_row(measure, in_text, row["sd"], ours, unit)] if "sd" in row else []
+def published_clips(published: Json) -> list[str]:
+    """The names of the 80 clips of Tables A.4 and A.5 of Segerstedt (2021), as our files have them."""
+    return [f"{clip}{end}" for clip in published["clips"] for end in ("", "_mirror")]
 
 
 def compare_configurations(all_measured: Sequence[ConfigurationResults], published: Json) -> Json:
@@ -169,8 +167,8 @@ def compare_configurations(all_measured: Sequence[ConfigurationResults], publish
     `against_published`.
     """
     by_measure = {name: compared(all_measured, published) for name, compared in functions("compared")}
-    times = ComparisonAddition(milliseconds={"against_published": stage_times(all_measured, published)})
-    additions = [*by_measure.values(), times]
+    costs = published_costs(all_measured, published)
+    additions = [*by_measure.values(), costs]
     clock_keys = dict.fromkeys(key for added in additions for key in added.milliseconds)
     return {
         "configurations": [describe_configuration(m, by_measure.values()) for m in all_measured],
@@ -182,10 +180,7 @@ def compare_configurations(all_measured: Sequence[ConfigurationResults], publish
             for stage in m.pipeline["stages"]
         ],
         "difference": [row for added in by_measure.values() for row in added.differences],
-        "against_published": [
-            *(row for added in by_measure.values() for row in added.against_published),
-            *stage_sizes(all_measured, published),
-        ],
+        "against_published": [row for added in additions for row in added.against_published],
         "milliseconds": {
             key: [row for added in additions for row in added.milliseconds.get(key, ())] for key in clock_keys
         },
@@ -211,30 +206,43 @@ def describe_configuration(results: ConfigurationResults, additions: Iterable[Co
     }
 
 
-def stage_sizes(all_measured: Sequence[ConfigurationResults], published: Json) -> list[dict[str, Any]]:
-    """Published sizes of the database and of the terrain patches, next to ours. Sizes are in bytes."""
+def published_costs(all_measured: Sequence[ConfigurationResults], published: Json) -> ComparisonAddition:
+    """Published bytes and seconds of whole stages of the workflow, next to ours.
+
+    The bytes of the training are those of the network's weights, which `responsivity` compares.
+    """
     by_name = {m.name: m for m in all_measured}
-    out = []
+    sizes, times = [], []
     for row in published["stages"]:
-        m, ours = by_name.get(row["configuration"]), None
-        if m and row["stage"] == "database":
-            ours = (m.pipeline.get("database") or {}).get("bytes")
-        elif m:
-            ours = m.stage_value("terrain", "bytes")
-        if row["stage"] in STORED:
-            out.append(published_row(STORED[row["stage"]], row, row["bytes"], ours, "bytes"))
-    return out
+        m, stage = by_name.get(row["configuration"]), row["stage"]
+        if "bytes" in row and stage != "training":
+            ours = m.stage_value(stage, "bytes") if m else None
+            if m and stage == "database":
+                ours = (m.pipeline.get("database") or {}).get("bytes")
+            sizes.append(published_row(row["what"], row, row["bytes"], ours, "bytes"))
+        if "seconds" in row:
+            ours = m.stage_value(stage, "seconds") if m else None
+            times.append(published_row(f"{stage}, time", row, row["seconds"], ours, "s"))
+    return ComparisonAddition(against_published=sizes, milliseconds={"against_published": times})
 
 
-def stage_times(all_measured: Sequence[ConfigurationResults], published: Json) -> list[dict[str, Any]]:
-    """Published times of whole stages of the workflow, in seconds, next to ours."""
-    by_name = {m.name: m for m in all_measured}
-    out = []
-    for row in published["stages"]:
-        m = by_name.get(row["configuration"])
-        ours = m.stage_value(row["stage"], "seconds") if m else None
-        out.append(published_row(f"{row['stage']}, time", row, row["seconds"], ours, "s"))
-    return out
+def published_differences(over: str, rows: Sequence[Json], published: Json) -> list[dict[str, Any]]:
+    """Published values of eq. 3.2 next to ours, from the means of clips or laps.
+
+    over: key of published.yaml, "error" or "milliseconds". rows: ours, of the training clips or of the phase
+    mode `constant`.
+    """
+    ours = {frozenset((row["a"], row["b"])): row["difference_of_means"] for row in rows}
+    return [
+        published_row(
+            f"eq. 3.2, {over}",
+            {**row, "configuration": f"{row['a']} to {row['b']}"},
+            row["value"],
+            ours.get(frozenset((row["a"], row["b"]))),
+        )
+        for row in published["differences"]
+        if row["over"] == over
+    ]
 
 
 def comparison_tables(compared: Json) -> dict[str, Sequence[Row]]:

@@ -1,11 +1,8 @@
-"""The questionnaire: thirteen films of a character that begins to hurt, and an HTML page that asks where.
+"""The questionnaire: thirteen films of a character that begins to hurt, and a page that asks about them.
 
-In each film, a healthy character walks or jogs. Then one or more parts of its body begin to hurt. In some
-films the gait changes afterwards. People watch each film and say which parts hurt.
-
-Quentin Ferre (2019) showed thirteen films, each with the transition from healthy to hurt: four with one hurt
-part, five with several and four with a change of gait. We do not know which parts hurt in each of his films.
-In his injured clips, thigh, shank and forearm hurt, so these parts hurt in our films.
+The films and the five questions are those of Ferre et al. (2019). In each film, a healthy character walks.
+Then one or two parts of its body begin to hurt; in the last four films, the hurt character then breaks into a
+run.
 
 The looping picture at the top of the README is drawn here, too: a healthy and a hurt character side by side.
 """
@@ -34,6 +31,7 @@ from hobble.core.skeleton import Skeleton
 from hobble.core.smooth import gaussian
 from hobble.figure.mesh import body_mesh
 from hobble.figure.pack import links_of_bones
+from hobble.measures.study import PARTS, QUESTIONS
 from hobble.models.network import Network
 from hobble.report.parts import embedded
 from hobble.report.raster import BodyRenderer, Camera
@@ -45,17 +43,15 @@ from hobble.runtime.options import Runtime
 
 INJURY = "injury"  # the channel
 FPS = 60  # frames a second of the motion; every FRAME_STEP-th frame is shown
-SEVERITY = 10.0  # the highest severity, as in the films of Quentin Ferre (2019)
 SPEEDS = {"walk": 2.5, "jog": 6.0}  # gait -> target speed, cm a frame
 WARM_UP_SECONDS = 4.0  # of walking before a film begins
 HEALTHY_SECONDS, HURT_SECONDS = 3.0, 7.0  # of a film, before and after the injury begins
+# A second injury begins this many seconds after the first. The severity of each rises for RISE_SECONDS.
+SECOND_SECONDS, RISE_SECONDS = 2.0, 2.0
 # A film with a change of gait is this many seconds longer. The gait changes in the middle of the film.
 EXTRA_SECONDS_FOR_CHANGE = 5.0
 # The three kinds of films.
 ONE_PART, SEVERAL_PARTS, CHANGE_OF_GAIT = "one part", "several parts", "change of gait"
-# Parts that people can tick in the questionnaire. They include parts that hurt in no film, such as the neck.
-SIDED = ("thigh", "shank", "foot", "upper arm", "forearm")
-PARTS = (*(f"{side} {part}" for part in SIDED for side in ("left", "right")), "lower back", "neck")
 SIZE = 360  # default width and height of the films, and of each half of the looping picture, pixels
 QUALITY = 45  # of the WebP images, 0 to 100
 EFFORT = 2  # of the WebP encoder, 0 to 6; with 3 it needs twice the time, and files are only 6 % smaller
@@ -75,12 +71,13 @@ class Film:
     """One film.
 
     number: counted from 1; the tables of answers have this order. kind: ONE_PART, SEVERAL_PARTS or
-    CHANGE_OF_GAIT. parts: the parts that hurt. gaits: target gaits at the beginning and at the end.
+    CHANGE_OF_GAIT. severities: part that hurts -> its severity in the end, in the order in which they begin.
+    gaits: target gaits at the beginning and at the end.
     """
 
     number: int
     kind: str
-    parts: tuple[str, ...]
+    severities: Mapping[str, float]
     gaits: tuple[str, str] = ("walk", "walk")
 
     @property
@@ -89,21 +86,37 @@ class Film:
         extra = EXTRA_SECONDS_FOR_CHANGE if self.gaits[0] != self.gaits[1] else 0.0
         return HEALTHY_SECONDS + HURT_SECONDS + extra
 
+    def at(self, frame: int) -> tuple[dict[str, float], str]:
+        """Part -> severity at a frame, and the target gait. Frames of the warm-up are negative."""
+        seconds = frame / FPS - HEALTHY_SECONDS
+        risen = [(seconds - n * SECOND_SECONDS) / RISE_SECONDS for n in range(len(self.severities))]
+        now = {
+            part: severity * min(share, 1.0)
+            for share, (part, severity) in zip(risen, self.severities.items(), strict=True)
+            if share > 0
+        }
+        changed = seconds >= HURT_SECONDS - EXTRA_SECONDS_FOR_CHANGE / 2
+        return now, self.gaits[1] if changed else self.gaits[0]
 
+
+# The captions of Tables III to XV name the parts and the four films with a change of gait. Films 5 and 6, and
+# 7 and 8, have the same parts. We read them as the two experiments of Section IV: a second injury rises to 10
+# while the first stays at 5, then while it stays at 10. Of the parts of film 9, the upper leg is taken as the
+# first, at 10.
 FILMS = (
-    Film(1, ONE_PART, ("left thigh",)),
-    Film(2, ONE_PART, ("right thigh",)),
-    Film(3, ONE_PART, ("left shank",)),
-    Film(4, ONE_PART, ("left forearm",)),
-    Film(5, SEVERAL_PARTS, ("left thigh", "left shank")),
-    Film(6, SEVERAL_PARTS, ("right thigh", "left shank")),
-    Film(7, SEVERAL_PARTS, ("left shank", "left forearm")),
-    Film(8, SEVERAL_PARTS, ("right thigh", "right forearm")),
-    Film(9, SEVERAL_PARTS, ("right thigh", "left shank", "left forearm")),
-    Film(10, CHANGE_OF_GAIT, ("left shank",), ("walk", "jog")),
-    Film(11, CHANGE_OF_GAIT, ("right thigh",), ("walk", "jog")),
-    Film(12, CHANGE_OF_GAIT, ("left forearm",), ("walk", "jog")),
-    Film(13, CHANGE_OF_GAIT, ("left shank", "left forearm"), ("jog", "walk")),
+    Film(1, ONE_PART, {"left shank": 10}),
+    Film(2, ONE_PART, {"right thigh": 10}),
+    Film(3, ONE_PART, {"right shank": 10}),
+    Film(4, ONE_PART, {"left forearm": 10}),
+    Film(5, SEVERAL_PARTS, {"left shank": 5, "right thigh": 10}),
+    Film(6, SEVERAL_PARTS, {"left shank": 10, "right thigh": 10}),
+    Film(7, SEVERAL_PARTS, {"left shank": 5, "right shank": 10}),
+    Film(8, SEVERAL_PARTS, {"left shank": 10, "right shank": 10}),
+    Film(9, SEVERAL_PARTS, {"right thigh": 10, "right shank": 10}),
+    Film(10, CHANGE_OF_GAIT, {"left shank": 10}, ("walk", "jog")),
+    Film(11, CHANGE_OF_GAIT, {"right thigh": 10}, ("walk", "jog")),
+    Film(12, CHANGE_OF_GAIT, {"right shank": 10}, ("walk", "jog")),
+    Film(13, CHANGE_OF_GAIT, {"left forearm": 10}, ("walk", "jog")),
 )
 
 
@@ -147,8 +160,8 @@ def part_links(network: Network, parts: Sequence[str]) -> list[str]:
 
 def film_motion(network: Network, film: Film, runtime: Runtime) -> FilmMotion:
     """Generate the motion of a film. The character goes straight ahead."""
-    severities = dict.fromkeys(part_links(network, film.parts), SEVERITY)
-    positions, rotations = _walk(network, film, severities, runtime)
+    links = dict(zip(film.severities, part_links(network, list(film.severities)), strict=True))
+    positions, rotations = _walk(network, film, links, runtime)
     healthy, _ = _walk(network, film, {}, runtime)
     # Positions relative to the ground below the first joint, the root.
     own, others = (p - p[:, :1] * [1.0, 0.0, 1.0] for p in (positions, healthy))
@@ -156,33 +169,21 @@ def film_motion(network: Network, film: Film, runtime: Runtime) -> FilmMotion:
     return FilmMotion(positions, rotations, float(distances[round(HEALTHY_SECONDS * FPS) :].mean()))
 
 
-def hurts_and_gait(film: Film, frame: int) -> tuple[bool, str]:
-    """Whether the parts of a film hurt at a frame, and the target gait at this frame.
-
-    frame: 0 is the first frame of the film; frames of the warm-up are negative.
-    """
-    hurts = frame >= HEALTHY_SECONDS * FPS
-    changed = frame >= (HEALTHY_SECONDS + HURT_SECONDS) * FPS - EXTRA_SECONDS_FOR_CHANGE * FPS / 2
-    return hurts, film.gaits[1] if changed else film.gaits[0]
-
-
-def _walk(
-    network: Network, film: Film, severities: Mapping[str, float], runtime: Runtime
-) -> tuple[Array, Array]:
+def _walk(network: Network, film: Film, links: Mapping[str, str], runtime: Runtime) -> tuple[Array, Array]:
     """Positions and rotations, as in `FilmMotion`, of a character that does what a film shows.
 
-    severities: link -> its severity after the injury has begun.
+    links: part that hurts in it -> link; a part without a link stays healthy.
     """
     animation = ProceduralAnimation(network, **dict(runtime))
-    positions, rotations = [], []
+    poses = []
     for frame in range(-round(WARM_UP_SECONDS * FPS), round(film.seconds * FPS)):
-        hurts, gait = hurts_and_gait(film, frame)
-        injury = {INJURY: severities if hurts else {}}
-        pose = animation.next_pose(np.array([0.0, SPEEDS[gait]]), None, gait, **injury)
+        severities, gait = film.at(frame)
+        injury = {links[part]: severity for part, severity in severities.items() if part in links}
+        pose = animation.next_pose(np.array([0.0, SPEEDS[gait]]), None, gait, **{INJURY: injury})
         if frame >= 0:
-            positions.append(pose.positions)
-            rotations.append(pose.rotations)
-    return np.array(positions), np.array(rotations)
+            poses.append((pose.positions, pose.rotations))
+    positions, rotations = map(np.array, zip(*poses, strict=True))
+    return positions, rotations
 
 
 def write_questionnaire(
@@ -191,19 +192,20 @@ def write_questionnaire(
     runtime: Runtime,
     configuration: str,
     films: Sequence[Film] = FILMS,
+    parts: str = "published",
     size: int = SIZE,
     threads: int = 1,
 ) -> dict[str, Any]:
     """Write questionnaire.html (the page) and films.json (the right answers) into a folder.
 
-    Nothing on the page says what hurts in a film. configuration: its name, for films.json. size: width and
-    height of the films, pixels. threads: how many films are drawn at once; the files are the same for any
-    number. Returns the content of films.json. Raises HobbleError if the network has no injury channel, or if
-    the skeleton lacks a part that hurts in a film.
+    Nothing on the page says what hurts in a film. configuration: its name, for films.json. parts: the key in
+    PARTS of those that people can tick. size: width and height of the films, pixels. threads: how many films
+    are drawn at once; the files are the same for any number. Returns the content of films.json. Raises
+    HobbleError if the network has no injury channel, or if the skeleton lacks a part that hurts in a film.
     """
     folder = Path(folder)
     for film in films:
-        part_links(network, film.parts)  # raises an error before anything is drawn or written
+        part_links(network, list(film.severities))  # raises an error before anything is drawn or written
     assert network.skeleton is not None
     folder.mkdir(parents=True, exist_ok=True)
     renderer, skeleton = BodyRenderer(body_mesh(network.skeleton)), network.skeleton
@@ -222,15 +224,24 @@ def write_questionnaire(
     solution = {
         "study": study,
         "configuration": configuration,
-        "severity": SEVERITY,
-        "parts": PARTS,
+        "parts": PARTS[parts],
         "films": solutions,
     }
     page = load_template("questionnaire.html.j2").render(
         style=page_style(),
         script=questionnaire_script(),
-        embedded=embedded({"study": study, "parts": PARTS, "films": films_on_page, "size": size}),
+        embedded=embedded(
+            {
+                "study": study,
+                "questions": QUESTIONS,
+                "parts": PARTS[parts],
+                "films": films_on_page,
+                "size": size,
+            }
+        ),
         count=len(films),
+        questions=len(QUESTIONS) + 1,
+        sided=parts == "sided",
     )
     write_text(folder / "questionnaire.html", page)
     write_json(folder / "films.json", solution)
@@ -239,11 +250,12 @@ def write_questionnaire(
 
 def _solution_of(network: Network, film: Film, motion: FilmMotion) -> dict[str, Any]:
     """The entry of a film in films.json. untrained: links of the film never hurt in training."""
-    links = part_links(network, film.parts)
+    links = part_links(network, list(film.severities))
     return {
         "film": film.number,
         "kind": film.kind,
-        "parts": list(film.parts),
+        "parts": list(film.severities),
+        "severities": list(film.severities.values()),
         "gaits": list(dict.fromkeys(film.gaits)),
         "links": links,
         "untrained": [link for link in links if link not in network.trained_labels(INJURY)],

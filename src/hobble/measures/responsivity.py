@@ -26,9 +26,9 @@ from hobble.measures.compare import (
     ConfigurationResults,
     compare_series,
     fit_line,
-    flatten,
+    mean_and_sd,
+    published_differences,
     published_row,
-    published_sd,
 )
 from hobble.measures.measure import Cost, Measure, Row
 from hobble.report.parts import (
@@ -67,7 +67,9 @@ class Options(Section):
 
     laps: Positive = Field(19, description="laps in the phase mode of the section `runtime`")
     laps_other_modes: Positive = Field(
-        3, description="at most this many laps in each other phase mode; a small number saves time"
+        3,
+        description="at most this many laps in each other phase mode, to save time; in the mode constant "
+        "always `laps`, because the published times were measured in it",
     )
     lap_seconds: Annotated[float, Field(ge=1, allow_inf_nan=False)] = Field(
         400.0, description="seconds after which a lap is stopped"
@@ -127,7 +129,7 @@ def lap_chart(found: Json, material: ReportMaterial) -> Chart | None:
         "laps",
         "Milliseconds per frame, lap by lap",
         "Each bar is one lap of the track. Its segments are the stages of computing a frame, averaged over "
-        "the first seconds of the lap. Prepare: the target, the path and the ground; input: collect the "
+        "the lap. Prepare: the target, the path and the ground; input: collect the "
         "network's input; insert: standardise this input; predict: evaluate the network; output: turn its "
         "output into a pose; update: move on by a frame. A diamond is the median time of a whole frame. If "
         "another program delays a few frames, the bar becomes higher, but the diamond hardly moves. At 60 "
@@ -318,16 +320,23 @@ def _turn_figure(found: Json) -> KeyFigure:
 
 
 def speed_table(found: Json, material: ReportMaterial) -> Table | None:
-    """A table of milliseconds per frame: our median and mean, followed by the published means."""
+    """A table of milliseconds per frame: ours in each phase mode, followed by the published means.
+
+    Mean and standard deviation (n - 1) are those of the means of the laps, as published.
+    """
     if not found.get("milliseconds"):
         return None
-    sources, ours = material.published["sources"], frame_milliseconds(found)
-    whose = f"{material.name}, {found['mode']} phase"
-    rows: list[list[Any]] = [[whose, ours, found["milliseconds"]["total"], "this report"]]
+    sources = material.published["sources"]
+    rows: list[list[Any]] = []
+    for entry in found.get("modes", [found]):
+        whose = f"{material.name}, {entry['mode']} phase"
+        rows.append([whose, frame_milliseconds(entry), *mean_and_sd(lap_means(entry)), "this report"])
     for entry in (*material.published["responsivity"], *material.published["modes"]):
-        what = entry.get("label") or f"prediction alone, {entry['mode']} phase"
-        rows.append([what, None, entry["milliseconds"], citation(entry, sources)])
-    columns = [Column("network"), Column.number("median, ms per frame"), Column.number("mean, ms per frame")]
+        what = entry.get("label") or f"prediction alone, {entry['configuration']}, {entry['mode']} phase"
+        what += ", constant phase" if "label" in entry else ""
+        rows.append([what, None, entry["milliseconds"], entry.get("sd"), citation(entry, sources)])
+    columns = [Column("network"), Column.number("median of all frames, ms")]
+    columns += [Column.number("mean of the laps, ms per frame"), Column.number("sd of the laps, ms")]
     columns.append(Column("source", kind="long"))
     return Table(f"{material.name}-published-speed", columns, rows, "Comparison with published results")
 
@@ -395,24 +404,31 @@ COUNTS = ("true", "table_6_1", "table_6_1_as_printed")
 
 def compared(all_measured: Sequence[ConfigurationResults], published: Json) -> ComparisonAddition:
     """The laps of the track in each phase mode, the networks' sizes, and published sizes and times."""
-    sizes = {m.name: _sizes(m) for m in all_measured}
+    sizes, differences = {m.name: _sizes(m) for m in all_measured}, time_differences(all_measured)
+    constant = [row for row in differences if row["over"] == "constant"]
+    fits = fit_lines(all_measured, published)
     return ComparisonAddition(
         entries=[entry for m in all_measured for entry in mode_entries(m)],
         about=sizes,
         against_published=_published_sizes(sizes, published),
         milliseconds={
-            "difference": time_differences(all_measured),
-            "fit": fit_lines(all_measured, published),
-            "against_published": _published_times(all_measured, published),
+            "difference": differences,
+            "fit": fits,
+            "against_published": [
+                *_published_times(all_measured, published),
+                *published_differences("milliseconds", constant, published),
+                *_published_regression(fits, published["regression"]),
+            ],
         },
     )
 
 
 def tables(compared: Json) -> dict[str, Sequence[Row]]:
-    """Two tables: every lap; the lines of time over size, without their points."""
+    """Three tables: every lap; the published laps; the lines of time over size, without their points."""
     fit = compared["milliseconds"]["fit"]
     return {
         NAME: [lap for entry in compared[NAME] for lap in _lap_rows(entry)],
+        "published-laps": published_lap_rows(compared["published"]),
         "fit": [{k: v for k, v in row.items() if k not in ("x", "y")} for row in fit],
     }
 
@@ -501,44 +517,61 @@ def _published_sizes(sizes_of: Mapping[str, Json], published: Json) -> list[dict
         if row["stage"] == "training" and "bytes" in row:
             # The published weights are those of the constant mode, which stores the weights of 50 phases.
             ours = sizes_of.get(row["configuration"], {}).get("weights_bytes", {}).get("constant")
-            out.append(published_row("weights of 50 phases", row, row["bytes"], ours, "bytes"))
+            out.append(published_row(row["what"], row, row["bytes"], ours, "bytes"))
     return out
 
 
 def _published_times(all_measured: Sequence[ConfigurationResults], published: Json) -> list[dict[str, Any]]:
-    """Published times next to ours: of a frame, and of a prediction in each phase mode."""
-    by_name = {m.name: m for m in all_measured}
+    """Published times next to ours: of a frame, from whole laps in the mode constant, and of a prediction."""
+    modes = {m.name: {e["mode"]: e for e in mode_entries(m)} for m in all_measured}
     out = []
     for row in published["responsivity"]:
-        m = by_name.get(row["configuration"])
-        ours = m.results_of(NAME)["milliseconds"]["total"] if m else None
-        out.append(published_row("a frame", row, row["milliseconds"], ours, "ms"))
-        means = lap_means(m.results_of(NAME)) if m else []
-        out += published_sd("standard deviation of the means of laps", row, means, "ms")
+        entry = modes.get(row["configuration"], {}).get("constant")
+        mean, sd = mean_and_sd(lap_means(entry) if entry else [])
+        out.append(published_row("a frame", row, row["milliseconds"], mean, "ms"))
+        out.append(published_row("standard deviation of the means of laps", row, row["sd"], sd, "ms"))
     for row in published["modes"]:
-        m = by_name.get(row["configuration"])
-        times = {e["mode"]: e["milliseconds"]["predict"] for e in (mode_entries(m) if m else ())}
-        what = f"a prediction, {row['mode']}"
-        out.append(published_row(what, row, row["milliseconds"], times.get(row["mode"]), "ms"))
+        entry = modes.get(row["configuration"], {}).get(row["mode"])
+        ours, what = entry["milliseconds"]["predict"] if entry else None, f"a prediction, {row['mode']}"
+        out.append(published_row(what, row, row["milliseconds"], ours, "ms"))
     return out
+
+
+def _published_regression(fits: Sequence[Json], row: Json) -> list[dict[str, Any]]:
+    """The line of Figure 6.1 beside ours in the mode constant, both over the computations of Table 6.1."""
+    wanted = {"whose": "hobble", "mode": "constant", "step": "total", "computations": "table_6_1_as_printed"}
+    ours = next((fit for fit in fits if wanted.items() <= fit.items()), {"slope": None, "intercept": None})
+    row = {**row, "configuration": "all"}
+    per_computation = "milliseconds for each computation of Table 6.1"
+    return [
+        published_row(per_computation, row, row["slope"], ours["slope"]),
+        published_row("milliseconds at no computation", row, row["intercept"], ours["intercept"], "ms"),
+    ]
 
 
 def _lap_rows(entry: Json) -> list[Row]:
     """A row for each lap in one phase mode. entry: from `mode_entries`."""
-    head = {"configuration": entry["configuration"], "mode": entry["mode"]}
-    rows: list[Row] = []
-    for lap in entry["laps"]:
-        times = lap["milliseconds"]
-        row = {key: value for key, value in lap.items() if key != "milliseconds"}
-        row |= {f"milliseconds_{step}": times[step] for step in (*STEPS, "total")}
-        row |= {f"milliseconds_{step}_sd": sd for step, sd in times["sd"].items()}
-        rows.append({**head, **row, **{f"milliseconds_{k}": v for k, v in flatten(times["spread"]).items()}})
-    return rows
+    from hobble.measures.responsivity_run import lap_rows  # here, because planning need not load numba
+
+    return [{"configuration": entry["configuration"], **row} for row in lap_rows({"modes": [entry]})]
+
+
+def published_lap_rows(published: Json) -> list[Row]:
+    """Table A.3 of Segerstedt (2021): milliseconds a frame in each of 19 laps."""
+    return [
+        {"lap": lap, **dict(zip(published["laps"], times, strict=True))}
+        for lap, times in enumerate(zip(*published["laps"].values(), strict=True), 1)
+    ]
 
 
 def compared_section(compared: Compared) -> PageSection:
-    """Two charts: the times of the laps, and the time of a frame over the size of the network."""
-    parts = [SectionPart(10, lap_lines(compared)), SectionPart(20, fit_chart(compared))]
+    """Charts of the times of the laps, and of the time of a frame over the size of the network."""
+    parts = [
+        SectionPart(10, lap_lines(compared)),
+        SectionPart(15, lap_boxes(compared)),
+        SectionPart(20, fit_chart(compared)),
+        SectionPart(30, published_laps(compared)),
+    ]
     return PageSection("speed", parts, title="Time per frame", order=30)
 
 
@@ -607,31 +640,53 @@ def _bytes(compared: Compared) -> dict[str, float]:
 
 
 def lap_lines(compared: Compared) -> Chart:
-    """Milliseconds per frame, lap by lap, for each phase mode."""
+    """Milliseconds per frame, lap by lap, for each phase mode, and the published laps (Figure 5.1)."""
     options: dict[str, list[Trace]] = {}
     colours = configuration_colours(compared)
-    # The cubic mode comes first, because the chart begins with the first option.
-    for entry in sorted(compared["responsivity"], key=lambda entry: entry["mode"] != "cubic"):
-        laps = [lap for lap in entry["laps"] if isinstance(lap.get("milliseconds"), dict)]
-        x, y = [lap["lap"] for lap in laps], [lap["milliseconds"]["spread"]["median"] for lap in laps]
-        name = entry["configuration"]
+    # The published mode comes first, because the chart begins with the first option.
+    for entry in sorted(compared["responsivity"], key=lambda entry: entry["mode"] != "constant"):
+        x, y, name = [lap["lap"] for lap in entry["laps"]], lap_means(entry), entry["configuration"]
         trace = line_trace(name, x, y, colours[name], mode="lines+markers")
         options.setdefault(f"{entry['mode']} phase", []).append(trace)
-    published = [row for row in compared["published"]["responsivity"] if row["configuration"] in colours]
-    for traces, row in product(options.values(), published):
-        ends = [1, max((max(t["x"], default=1) for t in traces), default=1)]
-        label, mean = f"{row['label']}: published mean", [row["milliseconds"]] * 2
-        colour = colours[row["configuration"]]
-        traces.append(line_trace(label, ends, mean, colour, dash="dot", width=1.2))
+    for name, laps in compared["published"]["laps"].items():
+        if name in colours:
+            x, label = list(range(1, len(laps) + 1)), f"{name}, published"
+            published = line_trace(label, x, laps, colours[name], dash="dot", width=1.2)
+            options.setdefault("constant phase", []).append(published)
     return Chart(
         "compare-laps",
         "Milliseconds per frame, lap by lap",
-        "Median time of a whole frame in each lap of the track. Dotted lines are published means, measured "
-        "on another machine.",
+        "Mean time of a whole frame in each lap of the track. Dotted lines are the laps of Segerstedt "
+        "(2021), who used the mode constant, on another machine.",
         layout={"xaxis": axis("lap", dtick=1), "yaxis": axis("ms per frame", rangemode="tozero")},
         choose="Phase mode",
         options=options,
     )
+
+
+def lap_boxes(compared: Compared) -> Chart:
+    """A box over the laps of each configuration in the mode constant, ours and published (Figure 5.2)."""
+    ours = {e["configuration"]: lap_means(e) for e in compared["responsivity"] if e["mode"] == "constant"}
+    theirs, traces = compared["published"]["laps"], []
+    for name in configuration_names(compared):
+        for whose, laps, colour in (("ours", ours, "@accent"), ("published", theirs, "@muted")):
+            if name in laps:
+                box: Trace = {"type": "box", "name": f"{name}, {whose}", "y": laps[name], "boxmean": True}
+                traces.append({**box, "line": {"width": 1.6, "color": colour}})
+    return Chart(
+        "compare-lap-boxes",
+        "Spread of the laps",
+        "Boxes over the mean times of laps in the phase mode constant. Grey boxes are those of Segerstedt.",
+        traces,
+        {"yaxis": axis("ms per frame", rangemode="tozero"), "showlegend": False},
+    )
+
+
+def published_laps(compared: Compared) -> Table:
+    """Table A.3, unfolded on demand."""
+    rows = published_lap_rows(compared["published"])
+    columns = {key: Column.number(key, 6) for key in rows[0]} | {"lap": Column.count("lap")}
+    return Table.of("compare-published-laps", columns, rows, "Table A.3 of Segerstedt, ms per frame")
 
 
 def fit_chart(compared: Compared) -> Chart | None:

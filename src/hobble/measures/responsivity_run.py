@@ -5,7 +5,7 @@ at the next, and so on around the track. If there are more laps than waypoints, 
 waypoint. Their characters start at different distances before this waypoint. So they reach it at different
 moments of their gait and by slightly different paths, and no two laps are the same.
 
-To measure the times, one character alone walks the beginning of each lap again.
+To measure the times, one character alone walks each lap again.
 """
 
 from __future__ import annotations
@@ -35,8 +35,6 @@ if TYPE_CHECKING:
 PATH_STEP = 15  # of a path, the place in every 15th frame is stored
 STORED_PATHS = 5  # the paths of this many laps are stored
 RUN_UP = 1000.0  # cm; a character starts at most this far before the waypoint where its lap begins
-# The largest numbers of frames that are timed: in each lap, and in all laps together.
-TIMED_OF_LAP, TIMED_OF_ALL = 10 * FPS, 100 * FPS
 WARM_UP = 60  # the first frames are not measured, because compiled code is loaded in them
 # The first columns of the table of laps, and the statistics of a frame's time that come last.
 LAP_COLUMNS = (
@@ -101,11 +99,12 @@ def lap_starts(track: Sequence[Waypoint], laps: int) -> LapStarts:
 
 def walk_laps(
     network: Network, runtime: Runtime, laps: int, longest: int, track: Sequence[Waypoint]
-) -> list[tuple[dict[str, Any], dict[str, Any]]]:
-    """Walk `laps` laps of at most `longest` frames. Returns how each lap went, and its path.
+) -> list[tuple[Json, Json, int]]:
+    """Walk `laps` laps of at most `longest` frames.
 
-    If a character does not reach the waypoint where its lap begins within `longest` frames, its lap begins at
-    the character's start, with no waypoint reached.
+    Returns how each lap went, its path, and how many frames its character walked before it began. If a
+    character does not reach the waypoint where its lap begins within `longest` frames, its lap begins at the
+    character's start, with no waypoint reached.
     """
     starts = lap_starts(track, laps)
     animation = ProceduralAnimation(network, characters=laps, waypoints=track, **dict(runtime))
@@ -187,8 +186,8 @@ def turn_was_limited(predicted: Array, limited: Array) -> np.ndarray:
 
 def _measure_lap(
     recorded: _Recorded, c: int, first: int, waypoints: int, longest: int
-) -> tuple[dict[str, Any], dict[str, Any]]:
-    """How the lap of character c went, and its path.
+) -> tuple[Json, Json, int]:
+    """How the lap of character c went, its path, and its first frame.
 
     first: the value of `reached` with which the lap begins. waypoints: number of waypoints of the track.
     longest: the lap lasts at most this many frames.
@@ -215,7 +214,7 @@ def _measure_lap(
         "predicted_turn_degrees": round(float(recorded.predicted_turn[turned, c].max(initial=0.0)), 3),
         "turns_held_back": int(recorded.limited[span, c].sum()),
     }
-    return lap, _path(c + 1, recorded.places[span, c], off_track)
+    return lap, _path(c + 1, recorded.places[span, c], off_track), begin
 
 
 def _path(lap: int, places: Array, off_track: Array) -> dict[str, Any]:
@@ -235,31 +234,38 @@ def _path(lap: int, places: Array, off_track: Array) -> dict[str, Any]:
 
 
 def timed_frames(
-    network: Network, runtime: Runtime, laps: int, longest: int, track: Sequence[Waypoint]
+    network: Network, runtime: Runtime, spans: Sequence[tuple[int, int]], track: Sequence[Waypoint]
 ) -> list[Array]:
-    """For each lap, (F, steps + 1) seconds: of each step in its first F frames, then of the whole call.
+    """For each lap, (F, steps + 1) seconds: of each step in each of its frames, then of the whole call.
 
-    The laps begin as in `walk_laps`, but are walked one after another, with
-    one character at a time. A character alone does the same as among others, to the last bit. longest: the
-    largest number of frames of a lap. F is the least of three numbers: TIMED_OF_LAP, `longest`, and
-    TIMED_OF_ALL divided by the number of laps.
+    The laps are those of `walk_laps`, but are walked one after another. A character alone does the same as
+    among others, to the last bit. spans: for each lap, the number of frames before it and of its own frames.
     """
-    starts = lap_starts(track, laps)
+    starts = lap_starts(track, len(spans))
     animation = ProceduralAnimation(network, waypoints=track, **dict(runtime))
     for _ in range(WARM_UP):
         animation.next_pose()
-    frames = max(1, min(TIMED_OF_LAP, TIMED_OF_ALL // laps, longest))
     out: list[Array] = []
-    for lap in range(laps):
+    for lap, (before, frames) in enumerate(spans):
         starts.place_characters(animation, slice(lap, lap + 1))
+        for _ in range(before):
+            animation.next_pose()
         times = np.empty((frames, len(STEPS) + 1))
         for row in times:
-            before = perf_counter()
+            began = perf_counter()
             animation.next_pose()
-            row[-1] = perf_counter() - before
+            row[-1] = perf_counter() - began
             row[:-1] = animation.seconds
         out.append(times)
     return out
+
+
+def laps_in_mode(options: Options, mode: str, own: str) -> int:
+    """The number of laps in a phase mode. own: that of the section `runtime`.
+
+    There are as many in the mode `constant`, because the published times were measured in it.
+    """
+    return options.laps if mode in (own, "constant") else min(options.laps, options.laps_other_modes)
 
 
 def milliseconds(seconds: Array) -> dict[str, Any]:
@@ -285,22 +291,16 @@ def milliseconds(seconds: Array) -> dict[str, Any]:
 
 def measure_responsivity(
     network: Network,
+    options: Options,
     *,
     configuration: str,
     runtime: Runtime,
-    laps: int,
-    lap_seconds: float,
-    laps_other_modes: int | None = None,
-    modes: Sequence[str] | None = None,
     track: Sequence[Waypoint] = TRACK,
     done: Mapping[str, Json] | None = None,
 ) -> dict[str, Any]:
     """Laps of the track of Segerstedt (2021), in the phase mode of `runtime` and in other modes.
 
-    laps: number of laps in the mode of `runtime`. lap_seconds: simulated time after which a lap ends, even if
-    waypoints remain. laps_other_modes: number of laps in each other mode, at most `laps`; None: `laps`.
-    modes: the phase modes to run in addition to that of `runtime`; by default all modes of the network. done:
-    mode -> what `laps_of_mode` returned for it, if its laps have already been walked.
+    done: mode -> what `laps_of_mode` returned for it, if its laps have already been walked.
 
     The result is described in docs/artefacts.md. Its key `modes` has the laps and the summary of each mode.
     The laps and the summary of the mode of `runtime` are also at the top level. Only the values under
@@ -310,13 +310,12 @@ def measure_responsivity(
     first STORED_PATHS laps in the mode of `runtime`.
     """
     own = network.resolve_mode(runtime.mode)
-    laps_of_others = min(laps, laps_other_modes or laps)
     of_mode = dict(done or {})
-    for mode in dict.fromkeys((*map(network.resolve_mode, network.modes if modes is None else modes), own)):
+    for mode in dict.fromkeys((*map(network.resolve_mode, options.modes), own)):
         if mode not in of_mode:
             in_mode = runtime.model_copy(update={"mode": mode})
-            count = laps if mode == own else laps_of_others
-            of_mode[mode] = laps_of_mode(network, in_mode, count, lap_seconds, track)
+            laps = laps_in_mode(options, mode, own)
+            of_mode[mode] = laps_of_mode(network, in_mode, laps, options.lap_seconds, track)
     return {
         "configuration": configuration,
         "track": {
@@ -333,7 +332,7 @@ def measure_responsivity(
         "stored": {mode: network.stored_numbers(mode) for mode in network.modes},
         "bytes_each": np.dtype(network.default_storage).itemsize,
         "exact": network.resolve_mode(None),
-        "laps_other_modes": laps_of_others,
+        "laps_other_modes": min(options.laps, options.laps_other_modes),
         **of_mode[own]["laps"],
         "modes": [piece["laps"] for piece in of_mode.values()],
     }
@@ -346,13 +345,12 @@ def laps_of_mode(
     lap_seconds: float,
     track: Sequence[Waypoint] = TRACK,
 ) -> dict[str, Any]:
-    """All laps in the mode of `runtime`. For the arguments see `measure_responsivity`."""
-    longest = int(lap_seconds * FPS)
-    times = timed_frames(network, runtime, laps, longest, track)
-    walked = walk_laps(network, runtime, laps, longest, track)
+    """All laps in the mode of `runtime`. lap_seconds: simulated time after which a lap is stopped."""
+    walked = walk_laps(network, runtime, laps, int(lap_seconds * FPS), track)
+    times = timed_frames(network, runtime, [(before, lap["frames"]) for lap, _, before in walked], track)
     results = [
         {**lap, "milliseconds": milliseconds(seconds)}
-        for (lap, _), seconds in zip(walked, times, strict=True)
+        for (lap, *_), seconds in zip(walked, times, strict=True)
     ]
     entry = {
         "mode": runtime.mode,
@@ -368,7 +366,7 @@ def laps_of_mode(
         "turns_held_back": sum(lap["turns_held_back"] for lap in results),
         "milliseconds": milliseconds(np.concatenate(times)),
     }
-    return {"laps": entry, "runs": [run for _, run in walked[:STORED_PATHS]]}
+    return {"laps": entry, "runs": [path for _, path, _ in walked[:STORED_PATHS]]}
 
 
 def parameter_counts(sizes: Sequence[int]) -> dict[str, int]:
@@ -405,8 +403,8 @@ def lap_rows(result: Json) -> list[Row]:
 
 def run_piece(inputs: MeasureInputs, options: Options, piece: str) -> dict[str, Any]:
     """The laps in one phase mode. piece: the name of the mode."""
-    laps = options.laps if piece == inputs.runtime.mode else min(options.laps, options.laps_other_modes)
     runtime = inputs.runtime.model_copy(update={"mode": piece})
+    laps = laps_in_mode(options, piece, inputs.runtime.mode)
     return laps_of_mode(load_network(inputs.weights), runtime, laps, options.lap_seconds)
 
 
@@ -414,12 +412,9 @@ def run(inputs: MeasureInputs, options: Options) -> Outcome:
     """responsivity.json, and its laps as a table."""
     result = measure_responsivity(
         load_network(inputs.weights),
+        options,
         configuration=inputs.configuration,
         runtime=inputs.runtime,
-        laps=options.laps,
-        lap_seconds=options.lap_seconds,
-        laps_other_modes=options.laps_other_modes,
-        modes=options.modes,
         done=inputs.measured_pieces(),
     )
     reached = [

@@ -1,15 +1,13 @@
-"""Write tables of people's answers to the questionnaire, numbered III to XVI as in the study of Ferre (2019).
+"""Write tables of people's answers to the questionnaire, beside Tables III to XVI of Ferre et al. (2019).
 
 hobble study results/limp/questionnaire/films.json ANSWERS.json ... --out FOLDER
 
-On the page results/<configuration>/questionnaire/questionnaire.html, people see films of a hurt character,
-tick the parts of the body that hurt and mark how fluid the motion is. The page saves a file of answers for
-each person. From these files, the command writes a table for each film, with how many people ticked each part
-of the body, and a table for all films. It also writes tables.md, which has all tables.
+On the page results/<configuration>/questionnaire/questionnaire.html, people see thirteen films of a character
+that begins to hurt, and answer five questions about each. The page saves a file of answers for each person.
+From these files, the command writes a table for each film (III to XV), one over all films (XVI), and
+scores.csv, how often people ticked what hurts. It also writes tables.md, which has all tables. Published
+numbers stand beside ours.
 """
-
-# The numerals are those of the tables in the study of Quentin Ferre. We only know how many tables he has, and
-# that people named 82 % of the hurt parts. We assume one table for each film and one for all films.
 
 from __future__ import annotations
 
@@ -18,22 +16,56 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal, get_args
 
 import numpy as np
 from pydantic import Field
 
 from hobble.core.declared import read_declared
 from hobble.core.errors import InputError
-from hobble.core.files import read_json, write_csv, write_text
+from hobble.core.files import Json, read_json, write_tables, write_text
 from hobble.core.untrusted import printable, read_yaml
 from hobble.report.gather import PUBLISHED
 
-FLUID_MARKS = range(1, 6)  # 1 to 5, for how fluid a motion is
+# Parts that people can tick: those of Ferre et al., and as an option (`report.parts: sided`) more exact ones.
+# They include parts that hurt in no film.
+PARTS = {
+    "published": ("head", "arm", "stomach", "upper leg", "lower leg"),
+    "sided": (
+        *(
+            f"{side} {part}"
+            for part in ("thigh", "shank", "foot", "upper arm", "forearm")
+            for side in ("left", "right")
+        ),
+        "lower back",
+        "neck",
+    ),
+}
+# A part without its side -> the part that stands for it in the published questionnaire.
+PUBLISHED_PART = {
+    "thigh": "upper leg",
+    "shank": "lower leg",
+    "foot": "lower leg",
+    "upper arm": "arm",
+    "forearm": "arm",
+    "lower back": "stomach",
+    "neck": "head",
+}
+Mark = Literal["very poor", "poor", "fair", "good", "very good"]
+MARKS = get_args(Mark)
+# Key of an answer -> the question, as the page asks it, and its choices. The last question is about parts.
+QUESTIONS = {
+    "noticed": ("Did the motion change?", ("yes", "no")),
+    "fluidity": ("How fluid was the transition?", MARKS),
+    "progress": ("How well did the transition progress, from its start to its end?", MARKS),
+    "realism": ("How realistic was the motion in the end?", MARKS),
+}
 NUMERALS = ("III", "IV", "V", "VI", "VII", "VIII", "IX", "X", "XI", "XII", "XIII", "XIV", "XV", "XVI")
 ALL = "all"  # stands for the number or the kind of a film in a row for several films or for all kinds
 USE_FILMS_JSON = "Use the films.json in the folder of questionnaire.html."
 USE_SAVED_FILE = "Use the file that the page saved, unchanged."
+# Key of an answer -> the question and its choices, in the order of the published tables. The last are parts.
+ASKED = {**QUESTIONS, "parts": ("Which part of the body is injured?", PARTS["published"])}
 Rows = list[dict[str, Any]]  # the rows of a table: column -> value
 
 
@@ -41,13 +73,25 @@ Rows = list[dict[str, Any]]  # the rows of a table: column -> value
 class ShownFilm:
     """A film of the questionnaire, as films.json describes it.
 
-    number: from 1. kind: "one part", "several parts" or "change of gait". parts: the parts of the body that
-    hurt in it.
+    number: from 1. kind: "one part", "several parts" or "change of gait". parts: those that hurt in it, with
+    their severities in the end.
     """
 
-    number: Annotated[int, Field(alias="film", strict=True)]
+    number: Annotated[int, Field(alias="film", strict=True, ge=1, le=13)]
     kind: str
     parts: tuple[str, ...]
+    severities: tuple[float, ...]
+
+    @property
+    def hurts(self) -> set[str]:
+        """The parts that hurt, as those of the published questionnaire, which have no side."""
+        return set(map(published_part, self.parts))
+
+    @property
+    def in_words(self) -> str:
+        """The hurt parts with their severities, such as "left shank 5, right thigh 10"."""
+        pairs = zip(self.parts, self.severities, strict=True)
+        return ", ".join(f"{part} {severity:g}" for part, severity in pairs)
 
 
 @dataclass(frozen=True)
@@ -67,14 +111,19 @@ class Study:
 
 @dataclass(frozen=True)
 class FilmAnswer:
-    """One person's answer to a film.
-
-    film: the film's number. parts: the ticked parts. fluid: mark for how fluid the motion is, from 1 to 5.
-    """
+    """One person's answer to a film. film: its number. The other fields are keys of ASKED."""
 
     film: Annotated[int, Field(strict=True)]
+    noticed: Literal["yes", "no"]
+    fluidity: Mark
+    progress: Mark
+    realism: Mark
     parts: tuple[str, ...]
-    fluid: Annotated[int, Field(strict=True, ge=FLUID_MARKS[0], le=FLUID_MARKS[-1])]
+
+    @property
+    def ticked(self) -> set[str]:
+        """The ticked parts, as those of the published questionnaire, which have no side."""
+        return set(map(published_part, self.parts))
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -89,18 +138,20 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Write the tables and print the scores over all films. Returns the exit status."""
-    study = read_study(options.films)
+    """Write the tables and print the main result. Returns the exit status."""
+    study, published = read_study(options.films), read_yaml(PUBLISHED)
     people = [read_answers(path, study) for path in options.answers]
-    published = read_yaml(PUBLISHED)["recognition"]["share"]
-    write_tables(options.out, study, answer_rows_by_numeral(study, people), published)
-    films = {film.number: film for film in study.films}
-    overall = score_answers([(films[answer.film], answer) for answers in people for answer in answers])
+    tables = study_tables(study, people, published)
+    write_tables(
+        options.out, {name if name == "scores" else f"table-{name}": t for name, t in tables.items()}
+    )
+    write_text(options.out / "tables.md", tables_as_text(study, tables))
+    overall = tables["scores"][-1]
     print(f"{len(people)} people, {overall['answers']} answers. Tables: {options.out}/tables.md")
-    seen, seen_without_side = (100 * overall[key] for key in ("seen", "seen_without_side"))
     print(
-        f"Hurt parts that were ticked: {seen:.0f} % (Ferre 2019: {100 * published:.0f} %), "
-        f"{seen_without_side:.0f} % if left and right count as the same. Fluid: {overall['fluid']:.2f} of 5."
+        f"Hurt parts that were ticked: {100 * overall['seen']:.0f} % (Ferre et al. 2019: "
+        f"{100 * overall['published_seen']:.1f} % by their tables, "
+        f"{100 * published['recognition']['share']:.0f} % in their text)."
     )
     return 0
 
@@ -108,16 +159,16 @@ def run(options: argparse.Namespace) -> int:
 def read_study(path: str | Path) -> Study:
     """Read films.json, which the workflow's rule `questionnaire` writes.
 
-    Raises InputError if the file is damaged.
+    Raises InputError if the file is damaged, or was made for the two questions of older versions.
     """
     return read_declared(path, "the questionnaire", Study, read_json(path), USE_FILMS_JSON)
 
 
 def read_answers(path: str | Path, study: Study) -> list[FilmAnswer]:
-    """One person's answers, in the order in which the films were shown.
+    """One person's answers to the films, in the order of the films.
 
-    Raises InputError for answers to another questionnaire, a film with no answer or with two, an unknown film
-    or part, or a mark that is not 1 to 5.
+    Raises InputError for answers to another questionnaire, a film with no answer or with two, and an unknown
+    film, choice or part.
     """
     data = read_json(path)
     if not isinstance(data, dict) or data.get("study") != study.name:
@@ -130,12 +181,13 @@ def read_answers(path: str | Path, study: Study) -> list[FilmAnswer]:
     if not isinstance(rows := data.get("answers"), list):
         raise InputError(path, "has no list `answers`", fix=USE_SAVED_FILE)
     answers = [_read_answer(path, f"answer {i}", row, study) for i, row in enumerate(rows, 1)]
-    numbers = [answer.film for answer in answers]
-    if twice := [n for n, answered in Counter(numbers).items() if answered > 1]:
+    numbers = Counter(answer.film for answer in answers)
+    if twice := [n for n, answered in numbers.items() if answered > 1]:
         raise InputError(path, f"film {min(twice)} is answered twice", fix=USE_SAVED_FILE)
-    if missing := [film.number for film in study.films if film.number not in numbers]:
+    order = [film.number for film in study.films]
+    if missing := [number for number in order if number not in numbers]:
         raise InputError(path, f"film {missing[0]} is not answered", fix="Answer all films and save again.")
-    return answers
+    return sorted(answers, key=lambda answer: order.index(answer.film))
 
 
 def _read_answer(path: str | Path, where: str, row: Any, study: Study) -> FilmAnswer:
@@ -149,125 +201,144 @@ def _read_answer(path: str | Path, where: str, row: Any, study: Study) -> FilmAn
     return replace(answer, parts=tuple(dict.fromkeys(answer.parts)))
 
 
-def answer_rows_by_numeral(study: Study, people: Sequence[Sequence[FilmAnswer]]) -> dict[str, Rows]:
-    """Numeral -> rows of the table with this numeral. The last table is for all films.
+def study_tables(study: Study, people: Sequence[Sequence[FilmAnswer]], published: Json) -> dict[str, Rows]:
+    """Numeral -> rows of the published table with this numeral, and "scores" -> rows of `score_rows`.
 
-    people: the answers of each person. With more than thirteen films, the numerals continue as XVI+1, XVI+2
-    and so on.
+    people: the answers of each person, from `read_answers`. published: the content of published.yaml.
     """
-    # Film number -> the answers to this film.
-    answers: dict[int, list[FilmAnswer]] = {
-        film.number: [a for of_person in people for a in of_person if a.film == film.number]
-        for film in study.films
+    theirs = {row["film"]: row for row in published["questionnaire"]}
+    answers = [list(of_film) for of_film in zip(*people, strict=True)]
+    tables = {
+        NUMERALS[film.number - 1]: film_rows(of_film, theirs[film.number])
+        for film, of_film in zip(study.films, answers, strict=True)
     }
-    numerals = [*NUMERALS, *(f"XVI+{i}" for i in range(1, len(study.films)))]
-    tables = [*(film_rows(study, film, answers[film.number]) for film in study.films)]
-    return dict(zip(numerals, [*tables, summary_rows(study, answers)], strict=False))
+    summary = summary_rows(list(tables.values()), published["questionnaire_summary"])
+    return {**tables, NUMERALS[-1]: summary, "scores": score_rows(study.films, answers, theirs)}
 
 
-def film_rows(study: Study, film: ShownFilm, answers: Sequence[FilmAnswer]) -> Rows:
-    """The table of one film, with a row for each part that people can tick.
+def published_part(part: str) -> str:
+    """The part of PARTS["published"] that stands for a part of either list: "left shank" is "lower leg"."""
+    return PUBLISHED_PART.get(part.removeprefix("left ").removeprefix("right "), part)
 
-    answers: those to this film. Keys of a row. part: its name. hurts: whether it hurts in the film. people:
-    how many people ticked it. share: share of people who ticked it.
+
+def film_rows(answers: Sequence[FilmAnswer], published: Json) -> Rows:
+    """The table of one film: how many people gave each answer, and how many did in the published study.
+
+    answers: those of all people to this film. published: the film's entry in published.yaml. The share of a
+    part is of all people, the share of another choice is of those who answered the question.
     """
-    ticked = {part: sum(part in a.parts for a in answers) for part in study.parts}
-    return [
-        {
-            "part": part,
-            "hurts": part in film.parts,
-            "people": count,
-            "share": _ratio(count, len(answers)),
-        }
-        for part, count in ticked.items()
-    ]
-
-
-def summary_rows(study: Study, answers: Mapping[int, Sequence[FilmAnswer]]) -> Rows:
-    """The table of all films: a row for each film, one for each kind of film, and one for all films.
-
-    answers: film number -> the answers to this film.
-
-    Keys of a row. film: its number, or ALL in a row for several films. kind: the kind of film, or ALL. parts:
-    the parts that hurt. The other keys are from `score_answers`.
-    """
-    rows = [
-        {"film": str(film.number), "kind": film.kind, "parts": ", ".join(film.parts)}
-        | score_answers([(film, a) for a in answers[film.number]])
-        for film in study.films
-    ]
-    for kind in [*dict.fromkeys(film.kind for film in study.films), ALL]:
-        of_kind = [(f, a) for f in study.films if kind in (f.kind, ALL) for a in answers[f.number]]
-        rows.append({"film": ALL, "kind": kind, "parts": ""} | score_answers(of_kind))
+    rows = []
+    for number, (key, (_, choices)) in enumerate(ASKED.items(), 1):
+        given = [a.ticked if key == "parts" else {getattr(a, key)} for a in answers]
+        ours = [sum(choice in of_person for of_person in given) for choice in choices]
+        theirs = published[key]
+        of_ours, of_theirs = (len(answers), 10) if key == "parts" else (sum(ours), sum(theirs))
+        rows += [
+            {
+                "question": f"Q{number}",
+                "about": key,
+                "choice": choice,
+                "people": ours[i],
+                "share": _ratio(ours[i], of_ours),
+                "published_people": theirs[i],
+                "published_share": _ratio(theirs[i], of_theirs),
+            }
+            for i, choice in enumerate(choices)
+        ]
     return rows
 
 
-def score_answers(answers: Sequence[tuple[ShownFilm, FilmAnswer]]) -> dict[str, Any]:
-    """How well people answered. answers: pairs of a film and one person's answer to it.
+def summary_rows(tables: Sequence[Rows], published: Json) -> Rows:
+    """Table XVI: mean and standard deviation (n - 1) over the films, ours and published.
 
-    Keys of the result. answers: number of answers. seen: share of the hurt parts that were ticked. wrong:
+    Of the first question it is the share of yes, of the others the mean mark, from 1 (very poor) to 5.
+    """
+    rows = []
+    for number, key in enumerate(QUESTIONS, 1):
+        of_films = []
+        for table in tables:
+            people = [row["people"] for row in table if row["about"] == key]
+            weights = (1, 0) if key == "noticed" else (1, 2, 3, 4, 5)
+            of_films.append(float(np.dot(people, weights)) / max(sum(people), 1))
+        mean, sd = published[key]
+        ours = round(float(np.mean(of_films)), 5), _sd(of_films)
+        row = {"question": f"Q{number}", "about": key, "average": ours[0], "sd": ours[1]}
+        rows.append(row | {"published_average": mean, "published_sd": sd})
+    return rows
+
+
+def score_rows(
+    films: Sequence[ShownFilm], answers: Sequence[Sequence[FilmAnswer]], published: Mapping[int, Json]
+) -> Rows:
+    """How well people saw what hurts: a row for each film, for each kind of film, and for all films.
+
+    answers: those to each film. published: number of a film -> its entry in published.yaml. Keys of a row.
+    seen: share of the hurt parts that were ticked, as in the published questionnaire, without sides. wrong:
     mean number of ticked parts that do not hurt. exact: share of the answers that tick exactly the hurt
-    parts. seen_without_side, exact_without_side: `seen` and `exact` if left and right count as the same.
-    fluid: mean of the marks from 1 to 5 for how fluid the motion is. fluid_sd: standard deviation of these
-    marks. A value that cannot be computed is None.
+    parts. seen_with_side: `seen`, with left and right told apart; None if nobody was asked for the side.
+    published_seen: `seen` of the published answers.
     """
-    # (hurt parts, ticked parts) of each answer, with and without left and right.
-    sides = [(set(film.parts), set(answer.parts)) for film, answer in answers]
-    no_sides = [
-        ({without_side(p) for p in hurt}, {without_side(p) for p in ticked}) for hurt, ticked in sides
-    ]
-    fluid = [a.fluid for _, a in answers]
 
-    def seen(pairs: Sequence[tuple[set[str], set[str]]]) -> float | None:
-        return _ratio(sum(len(hurt & ticked) for hurt, ticked in pairs), sum(len(hurt) for hurt, _ in pairs))
+    def row(name: str, kind: str, chosen: Sequence[int]) -> dict[str, Any]:
+        pairs = [(films[i].hurts, a.ticked) for i in chosen for a in answers[i]]
+        sided = [(set(films[i].parts), set(a.parts)) for i in chosen for a in answers[i]]
+        asked = any(part not in PARTS["published"] for _, ticked in sided for part in ticked)
+        theirs = [
+            published[films[i].number]["parts"][PARTS["published"].index(part)]
+            for i in chosen
+            for part in films[i].hurts
+        ]
+        return {
+            "film": name,
+            "kind": kind,
+            "parts": films[chosen[0]].in_words if name != ALL else "",
+            "answers": len(pairs),
+            "seen": _seen(pairs),
+            "wrong": _ratio(sum(len(ticked - hurt) for hurt, ticked in pairs), len(pairs)),
+            "exact": _ratio(sum(hurt == ticked for hurt, ticked in pairs), len(pairs)),
+            "seen_with_side": _seen(sided) if asked else None,
+            "published_seen": _ratio(sum(theirs), 10 * len(theirs)),
+        }
 
-    def exact(pairs: Sequence[tuple[set[str], set[str]]]) -> float | None:
-        return _ratio(sum(hurt == ticked for hurt, ticked in pairs), len(pairs))
-
-    return {
-        "answers": len(answers),
-        "seen": seen(sides),
-        "seen_without_side": seen(no_sides),
-        "wrong": _ratio(sum(len(ticked - hurt) for hurt, ticked in sides), len(answers)),
-        "exact": exact(sides),
-        "exact_without_side": exact(no_sides),
-        "fluid": round(float(np.mean(fluid)), 5) if fluid else None,
-        "fluid_sd": round(float(np.std(fluid, ddof=1)), 5) if len(fluid) > 1 else None,
-    }
-
-
-def without_side(part: str) -> str:
-    """The part without its side: "left thigh" and "right thigh" become "thigh"."""
-    return part.removeprefix("left ").removeprefix("right ")
+    rows = [row(str(film.number), film.kind, [i]) for i, film in enumerate(films)]
+    for kind in [*dict.fromkeys(film.kind for film in films), ALL]:
+        rows.append(row(ALL, kind, [i for i, film in enumerate(films) if kind in (film.kind, ALL)]))
+    return rows
 
 
-def write_tables(
-    folder: str | Path, study: Study, rows_by_numeral: Mapping[str, Rows], published: float
-) -> None:
-    """Write table-III.csv and so on, and tables.md with all tables.
-
-    rows_by_numeral: numeral -> rows, from `answer_rows_by_numeral`. published: the share of hurt parts that
-    people named in the study of Quentin Ferre (2019).
-    """
-    folder = Path(folder)
-    folder.mkdir(parents=True, exist_ok=True)
+def tables_as_text(study: Study, tables: Mapping[str, Rows]) -> str:
+    """All tables as Markdown. Those of films have the published layout: a line for each question."""
     text = [f"# What people saw in the films of {study.configuration}\n"]
-    for (numeral, rows), film in zip(rows_by_numeral.items(), [*study.films, None], strict=True):
-        write_csv(folder / f"table-{numeral}.csv", rows)
-        title = f"film {film.number}, {film.kind}: {', '.join(film.parts)}" if film else "all films"
+    for film, (numeral, rows) in zip(study.films, tables.items(), strict=False):
+        text.append(f"## Table {numeral}: film {film.number}, {film.kind}: {film.in_words}\n")
+        text += ["| question | | | | | | |", "|---|---|---|---|---|---|---|"]
+        for number, (key, (question, _)) in enumerate(ASKED.items(), 1):
+            for whose, end in ((f"Q{number} {question}", ""), ("Ferre et al. (2019)", "published_")):
+                cells = [
+                    f"{row['choice']}: {row[f'{end}people']} ({100 * row[f'{end}share']:.0f} %)"
+                    for row in rows
+                    if row["about"] == key
+                ]
+                text.append(f"| {' | '.join([whose, *cells, *[''] * (6 - len(cells))])} |")
+        text.append("")
+    for title, rows in (("Table XVI: all films", tables[NUMERALS[-1]]), ("Hurt parts", tables["scores"])):
         lines = [list(rows[0]), ["---"] * len(rows[0]), *([_cell(v) for v in row.values()] for row in rows)]
-        text += [f"## Table {numeral}: {title}\n", *(f"| {' | '.join(line)} |" for line in lines), ""]
-    text.append(
-        f"Compare `seen` with Quentin Ferre (2019): people named {100 * published:.0f} % of the hurt parts.\n"
-    )
-    write_text(folder / "tables.md", "\n".join(text))
+        text += [f"## {title}\n", *(f"| {' | '.join(line)} |" for line in lines), ""]
+    return "\n".join(text)
+
+
+def _seen(pairs: Sequence[tuple[set[str], set[str]]]) -> float | None:
+    """The share of hurt parts that were ticked. pairs: (hurt, ticked) parts of each answer."""
+    return _ratio(sum(len(hurt & ticked) for hurt, ticked in pairs), sum(len(hurt) for hurt, _ in pairs))
+
+
+def _sd(values: Sequence[float]) -> float | None:
+    return round(float(np.std(values, ddof=1)), 5) if len(values) > 1 else None
 
 
 def _cell(value: Any) -> str:
-    """A value as text. None and False are empty cells."""
-    if value is None or value is False:
-        return ""
-    return "yes" if value is True else f"{value:.2f}" if isinstance(value, float) else str(value)
+    """A value as text. None is an empty cell."""
+    return "" if value is None else f"{value:.2f}" if isinstance(value, float) else str(value)
 
 
 def _ratio(part: float, whole: float) -> float | None:

@@ -2,10 +2,19 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
+from pydantic import Field
+
 from hobble.core.section import Section
 
 
 class ReportOptions(Section):
-    """The keys of a configuration's `report` section. title: the page's heading, instead of the default."""
+    """The keys of a configuration's `report` section."""
 
-    title: str | None = None
+    title: str | None = Field(None, description="the page's heading, instead of the default")
+    parts: Literal["published", "sided"] = Field(
+        "published",
+        description="parts that people can tick in the questionnaire: the five of Ferre et al. (2019), or "
+        "twelve, of the left and the right side",
+    )

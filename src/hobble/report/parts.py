@@ -334,8 +334,8 @@ def citation(row: Mapping[str, Any], sources: Mapping[str, str]) -> str:
     'Author (2021)'
     """
     text = sources.get(row["source"], row["source"])
-    if row.get("table"):
-        text += f", Table {row['table']}"
+    if place := row.get("table"):
+        text += f", {place}" if place.startswith(("Section", "Figure")) else f", Table {place}"
     return f"{text} (but {row['other_figure']})" if row.get("other_figure") else text
 
 

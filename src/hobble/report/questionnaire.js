@@ -1,9 +1,10 @@
-// The questionnaire shows films in a random order, asks two questions about each film, and saves the answers as a file.
+// The questionnaire shows films in a random order, asks some questions about each film, and saves the answers as a file.
 "use strict";
 (() => {
-  // study: the study's name. parts: names of parts of the body. films: {film: its name, webp: the film in base64}.
-  const { study, parts, films } = JSON.parse(document.getElementById("study").textContent);
-  const find = (id) => document.getElementById(id), NOTHING = "nothing", MARKS = { 1: "1, jerky", 2: "2", 3: "3", 4: "4", 5: "5, fluid" };
+  // study: the study's name. questions: key of an answer -> [question, choices]. parts: names of parts of the body.
+  // films: {film: its name, webp: the film in base64}.
+  const { study, questions, parts, films } = JSON.parse(document.getElementById("study").textContent);
+  const find = (id) => document.getElementById(id), NOTHING = "nothing";
   const KEY = `hobble-study-${study}`;
   // state: {study, person, begun, order: names of the films, answers}, or null before the start. plays: how often the present film was played.
   let state = null, plays = 0, url = null;
@@ -30,10 +31,17 @@
     return input;
   };
   const partBoxes = parts.map((part) => addOption(find("parts"), "checkbox", "part", part, part));
-  const nothingBox = addOption(find("parts"), "checkbox", "part", NOTHING, "nothing hurts");
-  const markButtons = Object.entries(MARKS).map(([value, text]) => addOption(find("marks"), "radio", "fluid", value, text));
+  const nothingBox = addOption(find("parts"), "checkbox", "part", NOTHING, "none of these");
+  for (const [key, [question, choices]] of Object.entries(questions)) {
+    const group = document.createElement("fieldset"), legend = document.createElement("legend"), marks = document.createElement("div");
+    legend.textContent = question;
+    marks.className = "marks";
+    choices.forEach((choice) => addOption(marks, "radio", key, choice, choice));
+    group.append(legend, marks);
+    find("questions-asked").append(group);
+  }
+  const chosen = (key) => document.querySelector(`#questions-asked input[name="${key}"]:checked`)?.value;
   const tickedParts = () => partBoxes.filter((box) => box.checked).map((box) => box.value);
-  const chosenMark = () => Number(markButtons.find((mark) => mark.checked)?.value ?? 0);
 
   const playFilm = () => {
     const { webp } = films.find(({ film }) => film === state.order[state.answers.length]);
@@ -44,9 +52,10 @@
     plays++;
   };
   const checkAnswers = () => {
-    const answered = tickedParts().length > 0 || nothingBox.checked, marked = chosenMark() > 0;
-    find("next").disabled = !(answered && marked);
-    find("missing").textContent = answered && marked ? "" : answered ? "Say how fluid the motion is." : marked ? "Tick the parts that hurt, or \"nothing hurts\"." : "";
+    const open = Object.keys(questions).filter((key) => !chosen(key)).length, ticked = tickedParts().length > 0 || nothingBox.checked;
+    find("next").disabled = open > 0 || !ticked;
+    find("missing").textContent = open ? `Not answered yet: ${open + !ticked} of ${Object.keys(questions).length + 1} questions.`
+      : ticked ? "" : "Tick the parts that are injured, or \"none of these\".";
   };
   const showSection = (name) => ["welcome", "asking", "done"].forEach((id) => { find(id).hidden = id !== name; });
   const askNext = () => {
@@ -75,7 +84,8 @@
   });
   find("questions").addEventListener("submit", (event) => {
     event.preventDefault();
-    state.answers.push({ film: state.order[state.answers.length], parts: tickedParts(), fluid: chosenMark(), plays });
+    const marks = Object.fromEntries(Object.keys(questions).map((key) => [key, chosen(key)]));
+    state.answers.push({ film: state.order[state.answers.length], ...marks, parts: tickedParts(), plays });
     saveState();
     askNext();
   });

@@ -66,8 +66,12 @@ class ClipRows:
 
     def every(self, step: int, first: int = 0) -> ClipRows:
         """Every `step`-th row from row `first` on, with the fits of these rows."""
+        return self.part(slice(first, None, step))
+
+    def part(self, rows: slice) -> ClipRows:
+        """The rows in a slice, with their fits."""
         kept = np.zeros(len(self), bool)
-        kept[first::step] = True
+        kept[rows] = True
         kept_fits = np.repeat(kept, self.fits)
         by_row = {name: getattr(self, name)[kept] for name in ("x", "y", "p", "frame", "cycle", "fits")}
         return replace(
