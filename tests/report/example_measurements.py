@@ -139,10 +139,8 @@ def responsivity(rng: np.random.Generator, laps: int = 19) -> dict[str, Any]:
         }
         for n in range(1, laps + 1)
     ]
-    return {
-        "configuration": "example",
+    entry = {
         "mode": "cubic",
-        "track": {"waypoints": 6, "metres": 260.0},
         "laps": entries,
         "laps_finished": laps - 1,
         "waypoints_reached": 6 * laps - 1,
@@ -152,6 +150,9 @@ def responsivity(rng: np.random.Generator, laps: int = 19) -> dict[str, Any]:
         "largest_turn_degrees": 19.0,
         "milliseconds": milliseconds(),
     }
+    track = {"waypoints": 6, "metres": 260.0}
+    modes = [{**entry, "mode": "constant"}, entry]
+    return {"configuration": "example", "track": track, **entry, "modes": modes}
 
 
 def injury_sweep(rng: np.random.Generator, links: tuple[str, ...] = LINKS) -> dict[str, Any]:
