@@ -82,7 +82,7 @@ MIXES: dict[str, dict[str, float]] = {
     "foot": {"antalgic": 0.65, "steppage": 0.35},
 }
 # Part -> factor on the mixed curves of trunk, pelvis and shoulders.
-CURVE_FACTOR: dict[str, float] = {"pelvis": 1.6, "hip": 2.1, "thigh": 1.25, "shank": 1.5, "foot": 0.9}
+CURVE_FACTOR: dict[str, float] = {"pelvis": 1.6, "hip": 2.3, "thigh": 1.25, "shank": 1.5, "foot": 0.9}
 # Part -> changes that the recordings do not show.
 # - Ratios to the healthy clip: speed; stride (time); lift (height of the swinging foot); push and strike
 #   (pitch of the foot while the heel is up and while the toe is up); arms (swing of both arms); back and head
@@ -93,32 +93,70 @@ CURVE_FACTOR: dict[str, float] = {"pelvis": 1.6, "hip": 2.1, "thigh": 1.25, "sha
 # - Degrees: toe_out; crouch (knee flexion added in stance); forward and side (lean of the trunk forward and
 #   to the hurt side); list (pelvis up on the hurt side while that leg swings); nod (head forward).
 ADDED_CHANGES: dict[str, dict[str, float]] = {
-    "pelvis": {"speed": 0.74, "stride": 1.15, "push": 0.65, "back": 0.6, "lift": 0.8, "list": 2.0},
-    "hip": {"speed": 0.66, "stride": 1.2, "push": 0.6, "lift": 0.75, "forward": 2.0, "out": 0.02},
+    "pelvis": {
+        "speed": 0.74,
+        "stride": 1.15,
+        "turn": 0.8,
+        "push": 0.65,
+        "back": 0.6,
+        "lift": 0.8,
+        "lift_sound": 0.3,
+        "push_sound": 0.75,
+        "list": 2.0,
+    },
+    "hip": {
+        "speed": 0.66,
+        "stride": 1.2,
+        "turn": 0.8,
+        "push": 0.7,
+        "vault": 0.9,
+        "lift": 0.75,
+        "lift_sound": 0.3,
+        "push_sound": 0.4,
+        "forward": 2.0,
+        "out": 0.02,
+        "crouch_sound": 4.0,
+    },
     "thigh": {
         "speed": 0.62,
         "stride": 1.04,
-        "push": 0.35,
-        "crouch": 4.0,
+        "turn": 0.8,
+        "push": 0.4,
+        "vault": 1.0,
         "lift": 0.1,
+        "lift_sound": 0.3,
+        "push_sound": 0.45,
         "out": 0.07,
         "strike": 0.4,
         "list": 5.0,
-        "vault_sound": 0.8,
+        "toe_out": 8.0,
+        "vault_sound": 0.5,
+        "crouch_sound": 3.0,
     },
     "shank": {
         "speed": 0.62,
         "stride": 1.02,
-        "push": 0.5,
-        "lift": 0.05,
-        "out": 0.05,
+        "turn": 0.8,
+        "push": 0.55,
+        "lift": 0.4,
+        "lift_sound": 0.3,
+        "push_sound": 0.45,
         "strike": 0.0,
-        "crouch": 15.0,
-        "toe_out": 4.0,
-        "list": 4.0,
-        "vault_sound": 0.8,
+        "crouch": 19.0,
+        "list": 2.0,
     },
-    "foot": {"speed": 0.66, "stride": 1.03, "push": 0.5, "lift": 0.7, "strike": 0.9, "toe_out": 14.0},
+    "foot": {
+        "speed": 0.66,
+        "stride": 1.03,
+        "turn": 0.8,
+        "push": 0.15,
+        "lift": 0.7,
+        "lift_sound": 0.3,
+        "push_sound": 0.45,
+        "strike": 1.0,
+        "side": 2.5,
+        "toe_out": 18.0,
+    },
     "back": {
         "speed": 0.68,
         "push": 0.6,
@@ -137,10 +175,24 @@ ADDED_CHANGES: dict[str, dict[str, float]] = {
     "forearm": {"speed": 0.90, "forward": 2.0},
     "hand": {"speed": 0.94},
 }
+# Changes at severity 10 and guarding 1, for a leg or back that hurts on the right, in addition to the above. From CMU
+# 105_25 and the walks of Ferre et al. (2019): trunk 21 to 30 degrees forward, a nod of 12 to 24 degrees (`dip`) as the
+# hurt foot bears weight, elbows bent by 40 to 77 degrees (`guard`, see HELD_ARMS), both knees bent, eyes on the ground.
+GUARD_CHANGES: dict[str, float] = {
+    "forward": 17.0,
+    "nod": 10.0,
+    "dip": 14.0,
+    "crouch": 10.0,
+    "crouch_sound": 10.0,
+    "guard": 0.95,
+    "guard_sound": 0.75,
+}
 # The changes that are ratios.
 RATIOS = (
     "speed",
     "stride",
+    "turn",
+    "lift_sound",
     "push",
     "push_sound",
     "lift",
@@ -157,7 +209,7 @@ RATIOS = (
 TIMING_FACTOR = 1.85
 # Part -> length of the step onto the hurt foot, as a ratio to the healthy clip. It replaces the ratio of the
 # profiles.
-STEP_RATIO = {"thigh": 0.44, "shank": 0.38, "foot": 0.44}
+STEP_RATIO = {"thigh": 0.16, "shank": 0.47, "foot": 0.54}
 
 
 @functools.cache
@@ -193,6 +245,7 @@ def _add_mix(
         return float(sum(share * getattr(profile_of[p], name) for p, share in mix.items()))
 
     curves = sum(share * profile_of[p].harmonics() for p, share in mix.items()) * CURVE_FACTOR.get(part, 1.0)
+    curves[CURVES.index("pelvis_turn_left") :, 1:] = 0.0  # how far pelvis and shoulders turn is the change `turn`
     ratios = {"stride": mixed("stride"), "arm": mixed("arm_hurt"), "arm_sound": min(mixed("arm_sound"), 1.0)}
     # The ratio of the stride's length is the product of the ratios of speed and stride time.
     stride_length = changes["speed"] * changes.get("stride", mixed("stride"))

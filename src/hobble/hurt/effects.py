@@ -10,7 +10,7 @@ from hobble.channels.speed_limits import SUM_NORM
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 from hobble.core.smooth import gaussian
-from hobble.hurt.amounts import changes_of_hurt_part
+from hobble.hurt.amounts import GUARD_CHANGES, changes_of_hurt_part
 
 LEFT, RIGHT = 0, 1
 SIDES = ("left", "right")
@@ -71,12 +71,18 @@ def _chain(skeleton: Skeleton, joint: int, above: int) -> list[int]:
 
 
 HIGHEST_SEVERITY = 10.0
-STRENGTH_POWER = 0.78  # strength = (severity / 10) ** STRENGTH_POWER: .39 at 3, .58 at 5, .76 at 7
+# strength = (severity / 10) ** STRENGTH_POWER: .48 at 3, .66 at 5, .81 at 7. So an injury of 3 already shows.
+STRENGTH_POWER = 0.6
+# A person guards an injury with the whole body: GUARD_CHANGES grow with guarding ** GUARD_POWER. People who have
+# long lived with an injury hardly guard it (0); people who act pain guard as much as they can (1).
+GUARD_POWER = 1.8
+GUARDED_PARTS = ("pelvis", "hip", "thigh", "shank", "foot", "back")
 LEAST_RATIO = 0.02  # smaller ratios to the healthy clip are raised to this
 SETTLING_SECONDS = 0.3  # sigma of the Gaussian that smooths changes of severity
 LEAST_SEVERITY = 0.05  # smaller severities count as 0
-WHOLE_BODY = ("speed", "stride", "back", "head", "forward", "nod")  # changes of the whole body
-# Changes of one side. The last three say how much an arm is held in each way (HELD_ARM_OF_PART).
+WHOLE_BODY = ("speed", "stride", "turn", "back", "head", "forward", "nod")  # changes of the whole body
+# Changes of one side. The last four say how much an arm is held in each way (HELD_ARMS in
+# `hobble.hurt.upper_body`).
 SIDED = (
     *(
         "land",
@@ -93,8 +99,9 @@ SIDED = (
         "arm",
         "side",
         "list",
+        "dip",
     ),
-    *("upper", "fore", "carry"),
+    *("upper", "fore", "carry", "guard"),
 )
 SOUND_SUFFIX = "_sound"  # names of changes of the side that is not hurt end with this
 # Factors on the CURVES (see `hobble.hurt.amounts`) that mirror the body. All curves but the first
@@ -131,8 +138,12 @@ class Effects:
         )
 
 
-def effects_of_severities(skeleton: Skeleton, severity: Array, fps: float) -> Effects:
+def effects_of_severities(
+    skeleton: Skeleton, severity: Array, fps: float, guarding: Array | float = 0.0
+) -> Effects:
     """The effects of severities (F, L), 0 to 10, of the skeleton's links (the bones that can be hurt).
+
+    guarding: (F,) or one number, 0 to 1, how much the whole body spares the hurt part.
 
     If several links hurt, the result is at least the effect of the worst link and less than the sum of all.
     """
@@ -149,16 +160,29 @@ def effects_of_severities(skeleton: Skeleton, severity: Array, fps: float) -> Ef
         # Several links of one part, such as fingers, count as one link: the worst.
         key = (body_part.name, body_part.side)
         parts[key] = np.maximum(parts.get(key, 0.0), column)
+    guarded = np.broadcast_to(np.clip(guarding, 0.0, 1.0) ** GUARD_POWER, frames)
+
+    def add(name: str, values: Array, side: int | None) -> None:
+        if name in WHOLE_BODY:
+            body[name].add(values)
+        else:
+            _add_sided(sided, name, values, side)
+
     for (part, side), part_strength in parts.items():
         if not part_strength.any():
             continue
         for name, amount in changes_of_hurt_part(part).items():
             if name == "curves":
                 curves.add(part_strength[:, None, None] * _curves_of_side(np.asarray(amount), side))
-            elif name in WHOLE_BODY:
-                body[name].add(part_strength * amount)
             else:
-                _add_sided(sided, name, part_strength * amount, side)
+                add(name, part_strength * amount, side)
+        if part in GUARDED_PARTS and guarded.any():
+            # An injury on the midline is guarded by both sides, each at a share with which their sum is 1.
+            sides = (LEFT, RIGHT) if side is None else (side,)
+            share = len(sides) ** (-1 / SUM_NORM)
+            for name, amount in GUARD_CHANGES.items():
+                for each in sides:
+                    add(name, share * guarded * part_strength * amount, each)
         if part in HELD_ARM_OF_PART and side is not None:
             _add_sided(sided, HELD_ARM_OF_PART[part], part_strength, side)
     return Effects(

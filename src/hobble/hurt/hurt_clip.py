@@ -41,6 +41,7 @@ from hobble.labels.clip_labels import Labels
 # Radians of knee flexion: a knee that straightens to lift the hips stops here. In the recordings of
 # impaired walks, the sound knee is bent by 8 to 10 degrees while a stiff leg swings.
 STRAIGHT_KNEE = np.radians(9.0)
+MOST_VAULT = np.radians(14.0)  # a knee straightens by at most this, so a crouching figure stays down
 
 
 @dataclass(frozen=True)
@@ -66,13 +67,15 @@ def hurt_clip(
     flat: bool = True,
     zero: str = "right",
     margins: str = "extend",
+    guarding: float | Array = 0.6,
 ) -> HurtClip:
     """The clip as a person with these severities would walk it.
 
     labels: those of the clip. severity: (F, L), 0 to 10, of the skeleton's L links. name: name of the result;
     None: the clip's name. flat: whether the ground is flat; on other ground, climbs get lower as steps get
     shorter. zero: the foot that lands at phase 0. margins: which gait cycles near the ends of the clip are
-    labelled, see `MARGINS` in `hobble.labels.phase`.
+    labelled, see `MARGINS` in `hobble.labels.phase`. guarding: 0 to 1, or (F,) of these: how much the whole
+    body spares the hurt part.
 
     The clip gets longer if the cadence falls. The path keeps its shape, but gets shorter with the steps. If
     all severities are 0, or the clip has fewer than 3 frames, the motion is not changed. Raises HobbleError
@@ -97,7 +100,7 @@ def hurt_clip(
     if clip.translations is not None:
         raise HobbleError(f"clip {clip.name} has bones that change their length, so it cannot be hurt")
     source = measure_healthy_clip(clip, labels)
-    changes = effects_of_severities(clip.skeleton, severity, clip.fps)
+    changes = effects_of_severities(clip.skeleton, severity, clip.fps, guarding)
     timing = retime(source, changes)
     feet = [reduce_pitch(source, changes, side) for side in (LEFT, RIGHT)]
     path = shorten(source, changes, timing.stride_ratio, None if flat else _ground_heights(source, feet))
@@ -185,7 +188,7 @@ def _desired_reach(leg: Leg, changes: Effects, source: HealthyClip, timing: Timi
     bend = interpolate_values(knee_flexion(leg.reach, leg.thigh_length, leg.shank_length) + crouch, when)
     source_vault = np.clip(changes.side_changes["vault"][:, side], 0.0, 1.0) * source.swing_curve[:, 1 - side]
     vault = interpolate_values(source_vault, other_when)
-    bend = bend - vault * np.maximum(bend - STRAIGHT_KNEE, 0.0)
+    bend = bend - vault * np.clip(bend - STRAIGHT_KNEE, 0.0, MOST_VAULT)
     changed = (interpolate_values(crouch, when) > 0) | (vault > 0)
     return np.where(
         changed,

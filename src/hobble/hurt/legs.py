@@ -105,7 +105,6 @@ CLEARANCE_CM = 1.3
 # A swing is lowered less if the stances before and after it differ in height. At this difference, it is
 # lowered 1 / e times as much as on flat ground.
 UNEVEN_CM = 4.0
-JOGGING = 0.65  # in a jog, the change of a step's length is smaller by this share
 # The lower height of a swing is blended in over this share of its frames, and out over as many at its end.
 BLEND_SHARE = 0.22
 
@@ -278,7 +277,7 @@ def _new_footprint(
     velocity = (
         np.gradient(source.path[near], axis=0)[nearest - near.start] if len(source) > 1 else np.zeros(2)
     )
-    step = effects.side_changes["step"][near] * (1 - JOGGING * source.jog_share[near])[:, None]
+    step = effects.side_changes["step"][near]
     change = interpolate_curve(step[:, side] - step[:, 1 - side], when - near.start)
     # A step lasts half a cycle. Half of its change is made by this foot, the other half by the other foot.
     ahead = change / 2 * velocity * source.cycle_frames[nearest] / 2

@@ -17,6 +17,7 @@ X, Y, Z = np.eye(3)
 PELVIS_LEAN = 0.35  # the pelvis tilts forward by this share of the trunk's lean
 PELVIS_STIFFNESS = 0.7  # the pelvis loses this times as much of its movement as a stiff back loses
 POSTURE_SECONDS = 0.5  # sigma of the Gaussian over time that gives a joint's mean posture
+TRUNK_DIP = 0.35  # the trunk leans by this share of the head's nod
 LOOK_AHEAD = 0.85  # share of the trunk's lean that the head undoes, to look ahead
 ARM_STILL = 0.93  # a held arm loses up to this share of its movement
 # How firmly an arm is held grows with (strength of the injury) ** HOLD_POWER. So a mildly hurt arm swings
@@ -27,11 +28,13 @@ HOLD_POWER = 1.9
 # the heading. `fore`, for a hurt forearm: the forearm lies across the belly. This is the mean posture of the
 # clip Injured_Jog_LLA by Ferre et al., a jog with a hurt forearm. `upper`, for a hurt upper arm or shoulder:
 # the upper arm is closer to the body, and the forearm points more forward. `carry`, for a hurt hand: the
-# forearm is only raised in front of the body.
+# forearm is only raised in front of the body. `guard`, while a leg or the back is guarded: elbow bent by some 80
+# degrees, upper arm a little behind, as in Ferre's walks and in CMU 105_25.
 HELD_ARMS = {
     "upper": ((0.10, 0.16, -0.98), (0.80, -0.58, 0.10)),
     "fore": ((0.28, 0.17, -0.85), (0.26, -0.86, -0.41)),
     "carry": ((0.10, 0.14, -0.98), (0.92, -0.25, 0.30)),
+    "guard": ((-0.12, 0.22, -0.97), (0.82, -0.30, -0.10)),
 }
 CARRY_STRENGTH = 0.75  # an arm with a hurt hand (`carry`) is held less firmly, by this factor
 
@@ -124,17 +127,30 @@ def _added_rotations(source: HealthyClip, effects: Effects) -> tuple[Array, Arra
         waves += [known * np.cos(2 * np.pi * h * phase), known * np.sin(2 * np.pi * h * phase)]
     # (F,) degrees each, in the order of CURVES.
     forward, left, left_up, turn, shoulders = np.einsum("fck,kf->cf", effects.curves, np.stack(waves))
+    # Shorter steps turn pelvis and shoulders less.
+    less = effects.ratio("turn") - 1.0
+    turn, shoulders = turn + less * _turning(source, "hip"), shoulders + less * _turning(source, "shoulder")
     side, raised = effects.side_changes["side"], effects.side_changes["list"] * source.swing_curve
-    forward = forward + effects.body_changes["forward"]
+    # As a hurt foot bears weight, which is while the other foot swings, the head nods and the trunk follows.
+    dip = np.sum(effects.side_changes["dip"] * source.swing_curve[:, ::-1], axis=1)
+    forward = forward + effects.body_changes["forward"] + TRUNK_DIP * dip
     left = left + side[:, LEFT] - side[:, RIGHT]
     left_up = left_up + raised[:, LEFT] - raised[:, RIGHT]
     pelvis = _turn_and_lean(source, turn, left_up, PELVIS_LEAN * forward)
     chest = _turn_and_lean(source, shoulders, -left, forward)
     rest = 1 - LOOK_AHEAD  # what the head does not undo
     head = _turn_and_lean(
-        source, rest * shoulders, -rest * left, rest * forward + effects.body_changes["nod"]
+        source, rest * shoulders, -rest * left, rest * forward + effects.body_changes["nod"] + dip
     )
     return pelvis, chest, head
+
+
+def _turning(source: HealthyClip, joint: str) -> Array:
+    """(F,) degrees to the left by which the line through the right and the left joint turns in a step."""
+    right, left = (source.clip.positions[:, source.clip.skeleton.role(f"{s}_{joint}")] for s in SIDES[::-1])
+    across = left - right
+    yaw = np.degrees(np.unwrap(np.arctan2(-across[:, 2], across[:, 0])))
+    return yaw - gaussian(yaw, POSTURE_SECONDS * source.clip.fps)
 
 
 def _turn_and_lean(source: HealthyClip, turn: Array, left_up: Array, forward: Array) -> Array:
