@@ -21,7 +21,7 @@ __all__ = [
 ]
 
 # The names of all channels. Each is also a package in this folder, whose CHANNEL is an instance of `Channel`.
-CHANNEL_NAMES = ("injury", "mood", "diagnosis")
+CHANNEL_NAMES = ("injury", "guarding", "mood", "diagnosis")
 
 
 @functools.cache

@@ -51,7 +51,8 @@ class Channel(ABC):
     """A channel. Each channel is a subclass in channels/<name>/.
 
     name: the name of the channel's folder. It is also used in configurations and as a keyword argument of
-    `next_pose`. title: the page's word for the channel. value_word: the page's word for one of its values.
+    `next_pose`. default: the value of all columns until `next_pose` is told another one. title: the page's
+    word for the channel. value_word: the page's word for one of its values.
     highest: the highest value. rate: how much a value may change in a second at run time, unless the
     configuration says otherwise. suffix: a file <clip><suffix> beside a clip holds the clip's values; None if
     the channel has no such files. old_keys: keys that stand for this channel in old configurations and
@@ -67,6 +68,7 @@ class Channel(ABC):
     title: str
     value_word: str = "value"
     highest: float = 1.0
+    default: float = 0.0
     rate: float = 1.0
     suffix: str | None = None
     old_keys: Sequence[str] = ()

@@ -382,7 +382,7 @@ def add_rows(learners: Mapping[str, LimitLearner], rows: ClipRows, source: str |
         return
     layout = rows.layout
     shares = rows.x[:, body_layout(layout).x_gait].reshape(len(rows), len(GAITS), layout.samples)
-    is_above_0 = {name: rows.channels[name].any(axis=1) for name, _ in layout.channels}
+    is_above_0 = {name: rows.channels[name].any(axis=1) for name, _ in layout.channels if channel(name).slows}
     for name, learner in learners.items():
         others = [above_0 for other, above_0 in is_above_0.items() if other != name]
         learner.add(

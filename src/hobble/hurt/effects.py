@@ -73,8 +73,7 @@ def _chain(skeleton: Skeleton, joint: int, above: int) -> list[int]:
 HIGHEST_SEVERITY = 10.0
 # strength = (severity / 10) ** STRENGTH_POWER: .48 at 3, .66 at 5, .81 at 7. So an injury of 3 already shows.
 STRENGTH_POWER = 0.6
-# A person guards an injury with the whole body: GUARD_CHANGES grow with guarding ** GUARD_POWER. People who have
-# long lived with an injury hardly guard it (0); people who act pain guard as much as they can (1).
+# A person guards an injury with the whole body. GUARD_CHANGES grow with guarding ** GUARD_POWER.
 GUARD_POWER = 1.8
 GUARDED_PARTS = ("pelvis", "hip", "thigh", "shank", "foot", "back")
 LEAST_RATIO = 0.02  # smaller ratios to the healthy clip are raised to this

@@ -28,8 +28,8 @@ HOLD_POWER = 1.9
 # the heading. `fore`, for a hurt forearm: the forearm lies across the belly. This is the mean posture of the
 # clip Injured_Jog_LLA by Ferre et al., a jog with a hurt forearm. `upper`, for a hurt upper arm or shoulder:
 # the upper arm is closer to the body, and the forearm points more forward. `carry`, for a hurt hand: the
-# forearm is only raised in front of the body. `guard`, while a leg or the back is guarded: elbow bent by some 80
-# degrees, upper arm a little behind, as in Ferre's walks and in CMU 105_25.
+# forearm is only raised in front of the body. `guard`, for a guarded leg or back: the
+# elbow is bent by some 80 degrees, and the upper arm is a little behind the body.
 HELD_ARMS = {
     "upper": ((0.10, 0.16, -0.98), (0.80, -0.58, 0.10)),
     "fore": ((0.28, 0.17, -0.85), (0.26, -0.86, -0.41)),

@@ -14,6 +14,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from hobble.channels.guarding import guarding_of_clip
 from hobble.core.clip import Clip
 from hobble.core.errors import HobbleError
 from hobble.core.quat import Array
@@ -148,7 +149,16 @@ def hurt_version(
     """
     severity = schedule_severities(clip.skeleton, len(clip), clip.fps, options, name, version_number)
     flat = ground == "flat"
-    hurt = hurt_clip(clip, labels, severity, name, flat=flat, zero=report.phase_zero, margins=report.margins)
+    hurt = hurt_clip(
+        clip,
+        labels,
+        severity,
+        name,
+        flat=flat,
+        zero=report.phase_zero,
+        margins=report.margins,
+        guarding=guarding_of_clip(name),
+    )
     if not options.in_between:
         hurt = leave_out_other_severities(hurt, options.severities, report)
     if len(clip) >= UNCUT_SECONDS * clip.fps:

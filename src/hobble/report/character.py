@@ -142,6 +142,7 @@ def shown_channels(network: Network, runtime: Runtime) -> list[dict[str, Any]]:
                 "presets": presets,
                 "regions": [list(indices) for indices in display.regions],
                 "highest": definition.highest,
+                "start": definition.default,
                 "sliderStep": wording.slider_step,
                 "rest": wording.neutral_button,
                 "never": wording.untrained_note,

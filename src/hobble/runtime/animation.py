@@ -140,7 +140,7 @@ class ProceduralAnimation:
         return cls(network, **options)
 
     def reset(self, position: Any = None, facing: Any = None) -> None:
-        """Restart the characters, with all channel values at 0.
+        """Restart the characters, with all channels at their defaults.
 
         position: where they start, on the ground: (3,) or (C, 3), or without the height (2,) or (C, 2). By
         default this is the origin, or the start of the track of waypoints. facing: the direction that they
@@ -163,7 +163,9 @@ class ProceduralAnimation:
         else:
             ahead = self._targets.convert_facing(facing)
             yaws = np.arctan2(ahead[:, 0], ahead[:, 1])
-        self._continue_from(start_characters(self.network, count, np.array(places, float), yaws))
+        self._continue_from(
+            start_characters(self.network, count, np.array(places, float), yaws, self._channel_values.scales)
+        )
 
     def copies(self, of: np.ndarray) -> ProceduralAnimation:
         """A new animation whose character i is a copy of character of[i] of this animation.
@@ -246,8 +248,8 @@ class ProceduralAnimation:
             are in your axes and unit. Pass the same object in every frame, so that it is converted only once.
         channels: keywords named after channels, such as injury={"LeftUpLeg-LeftLeg": 7}. The value is a
             mapping from label (column of the channel) to value or (C,) values, or an array (L,) or (C, L) of
-            all L labels. Labels that the mapping does not have go back to 0. None, or no keyword, leaves the
-            channel unchanged. The values approach their targets at the channel's rate.
+            all L labels. Labels that the mapping does not have go back to the default. None, or no keyword,
+            leaves the channel unchanged. The values approach their targets at the channel's rate.
 
         Raises UnknownName (a KeyError) for a label or gait that the network does not have; TypeError for a
         keyword that is no channel; ValueError for a channel that the network has no input for, for values out

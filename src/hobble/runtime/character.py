@@ -1,15 +1,17 @@
 """A character's state between frames: pose, trajectory, phase, targets, channel values, feet.
 
-A channel is a group of network inputs that tell how hurt or how sad the body is. In a healthy character the
-values of all channels are 0.
+A channel is a group of network inputs that tell how hurt or how sad the body is. A healthy character
+starts with the defaults of all channels.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, fields
 
 import numpy as np
 
+from hobble.channels import channel
 from hobble.core import quat
 from hobble.core.quat import Array
 from hobble.models.network import Network
@@ -83,14 +85,21 @@ class Snapshot:
             array[...] = saved
 
 
-def start_characters(network: Network, count: int, position: Array, yaw: Array) -> Character:
+def start_characters(
+    network: Network, count: int, position: Array, yaw: Array, scales: Mapping[str, float] | None = None
+) -> Character:
     """The states of `count` healthy characters at ground positions (C, 2), facing `yaw` (C,) in radians.
+
+    scales: channel -> number by which its values are divided; default: 1.
 
     They start in the start frame of the network's file. It is a standing pose, unless the training clips
     hardly have any. If the file has no start frame, they start in the network's mean pose.
     """
     layout, facts = network.layout, network.training_facts
-    channel_columns = sum(columns for _, columns in layout.channels)
+    at_rest = np.concatenate(
+        [np.full(n, channel(name).default / (scales or {}).get(name, 1.0)) for name, n in layout.channels]
+        or [[]]
+    )
     # A row of network outputs, relative to the root.
     start_row = network.y_mean.astype(float) if facts is None else facts.start_y.astype(float)
     path, path_direction, gait = _start_path(network)
@@ -113,8 +122,8 @@ def start_characters(network: Network, count: int, position: Array, yaw: Array) 
         joint_velocity=np.ascontiguousarray(_turn_about_y(velocity, sin, cos)),
         joint_rotation=quat.mul(quat.yaw(yaw)[:, None], quat.exp(half_turns)),
         phase=np.full(count, 0.0 if facts is None else facts.start_phase),
-        channel_values=np.zeros((count, channel_columns)),
-        channel_targets=np.zeros((count, channel_columns)),
+        channel_values=np.tile(at_rest, (count, 1)),
+        channel_targets=np.tile(at_rest, (count, 1)),
         smoothed_velocity=np.zeros((count, 2)),
         smoothed_direction=facing.copy(),
         strafe=np.zeros(count),

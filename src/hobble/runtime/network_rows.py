@@ -59,14 +59,14 @@ class ChannelValues:
     def convert(self, name: str, given: Any, characters: int) -> tuple[slice, Array]:
         """The columns of channel `name` in the character's state, and their new values (C, columns).
 
-        given: label -> one value or (C,) values, where labels that are not named get 0; or an array
+        given: label -> one value or (C,) values, where labels that are not named get the default; or an array
         (columns,) or (C, columns). characters: C. Raises the errors listed in
         `ProceduralAnimation.next_pose`.
         """
         if name not in CHANNEL_NAMES:
             raise TypeError(f"next_pose() got an unexpected keyword argument {name!r}")
         definition, labels = channel(name), self.labels.get(name, {})
-        values = np.zeros((characters, len(labels)))
+        values = np.full((characters, len(labels)), definition.default)
         if isinstance(given, Mapping):
             for label, value in given.items():
                 self._check_label(name, label)

@@ -102,11 +102,11 @@ export const createActor = (view, spec, { place = [0, 0], tint = null, ghost = f
   const groundUnder = (j) => { const [x, z] = [rig.places[3 * j], rig.places[3 * j + 2]]; return [x, groundHeight(x, z), z]; };
 
   // Runs one frame toward a target. values: Map from `valueKey(channel, column)` to the value of the column. A missing
-  // column has the value 0.
+  // column has the start value of its channel.
   actor.frame = ({ velocity, facing, gait }, values) => {
     const character = actor.character, before = performance.now();
     spec.channels.forEach((channel) => channel.columns.forEach((column, l) => {
-      character.channelTargets[channel.first + l] = (values.get(valueKey(channel, column)) || 0) / channel.scale;
+      character.channelTargets[channel.first + l] = (values.get(valueKey(channel, column)) ?? channel.start) / channel.scale;
     }));
     character.frame(velocity, facing, gait, groundHeight);
     rig.take(character.posePosition, character.poseRotation);

@@ -18,13 +18,14 @@ export const createDrawnTurns = (spec) => {
 // place: [x, z] in cm, and heading: yaw in radians, where the character starts. T: entries of the path. S: samples of it that the network gets.
 export const createState = (spec, place, heading) => {
   const { joints: J, step, gaits } = spec, T = 2 * spec.window, S = T / step, { sin, cos } = Math;
-  const filled = (n, value = 0) => new Float64Array(n).fill(value), L = spec.channels.flatMap(({ columns }) => columns).length;
+  const filled = (n, value = 0) => new Float64Array(n).fill(value);
+  const atStart = spec.channels.flatMap(({ columns, start, scale }) => columns.map(() => start / scale));
   const c = {
     px: filled(T, place[0]), pz: filled(T, place[1]), dx: filled(T, sin(heading)), dz: filled(T, cos(heading)),
     gait: filled(T * gaits.length), ground: filled(S * 3), rootHeight: 0, phase: 0, root: [place[0], 0, place[1]], placed: false,
     jointPosition: filled(3 * J), jointVelocity: filled(3 * J), jointRotation: filled(4 * J),
     posePosition: filled(3 * J), poseRotation: filled(4 * J),
-    channelValues: filled(L), channelTargets: filled(L), memory: filled(spec.network.memory ?? 0),
+    channelValues: Float64Array.from(atStart), channelTargets: Float64Array.from(atStart), memory: filled(spec.network.memory ?? 0),
     smoothedVelocity: [0, 0], smoothedDirection: [sin(heading), cos(heading)], strafe: 0, correction: [0, 0],
     footLock: [0, 0], footHold: [[0, 0], [0, 0]], footStep: [0, 0], footMissed: [0, 0], footLift: [0, 0], bodyLift: 0,
     footAdded: [0, 1].map(() => [[1, 0, 0, 0], [1, 0, 0, 0]]), legShown: [], contacts: [0, 0, 0, 0],

@@ -30,7 +30,7 @@ export interface Character {
   readonly contacts: number[];
   readonly phase: number;
   readonly root: [number, number, number];
-  /** Sets values of a channel, by column. Columns that are not named go back to 0. Throws RangeError for an unknown name or a bad value. */
+  /** Sets values of a channel, by column. Columns that are not named go back to their value at the start. Throws RangeError for an unknown name or a bad value. */
   setChannel(channel: string, values?: Record<string, number>): void;
   /** Runs one frame, a sixtieth of a second. */
   step(target?: Target): Character;

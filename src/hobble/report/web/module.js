@@ -17,7 +17,7 @@ export const createCharacter = (data, { place = [0, 0], heading = 0 } = {}) => {
   rig.take(controller.posePosition, controller.poseRotation);
   copyState();
 
-  // Sets the values of a channel. values: column -> value. Columns that are not in `values` go back to 0.
+  // Sets the values of a channel. values: column -> value. Columns that are not in `values` go back to their value at the start.
   character.setChannel = (name, values = {}) => {
     const channel = spec.channels.find((each) => each.name === name);
     if (!channel) throw new RangeError(`there is no channel ${name}; the channels are: ${spec.channels.map((channel) => channel.name).join(", ") || "none"}`);
@@ -25,7 +25,7 @@ export const createCharacter = (data, { place = [0, 0], heading = 0 } = {}) => {
       if (!channel.trained.includes(column)) throw new RangeError(`${name}: ${column} was not trained; the trained columns are: ${channel.trained.join(", ")}`);
       if (!(value >= 0 && value <= channel.highest)) throw new RangeError(`${name}: the value of ${column} is ${value}, but it must be a number from 0 to ${channel.highest}`);
     }
-    channel.columns.forEach((column, l) => { controller.channelTargets[channel.first + l] = (values[column] || 0) / channel.scale; });
+    channel.columns.forEach((column, l) => { controller.channelTargets[channel.first + l] = (values[column] ?? channel.start) / channel.scale; });
   };
   // Runs one frame, a sixtieth of a second. ground(x, z): height of the ground, cm. The other arguments are the target, see createTargets.
   character.step = ({ velocity = [0, 0], facing = null, gait = null, ground = FLAT } = {}) => {

@@ -45,7 +45,7 @@ export const createSliders = (specs, changed) => {
   }
   // The trained columns of a channel in all characters. Other columns were always 0 in training and have no effect, so they are left out.
   const trainedColumns = (name) => specs.flatMap((spec) => spec.channels.filter((channel) => channel.name === name).flatMap((channel) => channel.trained));
-  const values = new Map(channels.flatMap((channel) => trainedColumns(channel.name).map((column) => [valueKey(channel, column), 0])));
+  const values = new Map(channels.flatMap((channel) => trainedColumns(channel.name).map((column) => [valueKey(channel, column), channel.start])));
   const rows = [], panel = { values, channels }, columns = (channel) => [...new Set(trainedColumns(channel.name))];
   // The words for a column.
   panel.word = ({ name }, column) => specs.flatMap((spec) => spec.channels.filter((channel) => channel.name === name))
@@ -82,10 +82,10 @@ export const createSliders = (specs, changed) => {
     });
     changed();
   };
-  // Sets columns to values, and other columns to 0. triples: [channel, column, value]. only: if it is a channel, other channels stay as they are.
+  // Sets columns to values, and other columns to the start values of their channels. triples: [channel, column, value]. only: if it is a channel, other channels stay as they are.
   panel.set = (triples, only = null) => {
-    channels.filter((channel) => !only || channel === only).forEach((channel) => columns(channel).forEach((column) => values.set(valueKey(channel, column), 0)));
-    triples.forEach(([channel, column, value]) => { if (values.has(valueKey(channel, column)) && value) setValue(channel, column, value); });
+    channels.filter((channel) => !only || channel === only).forEach((channel) => columns(channel).forEach((column) => values.set(valueKey(channel, column), channel.start)));
+    triples.forEach(([channel, column, value]) => { if (values.has(valueKey(channel, column)) && value !== channel.start) setValue(channel, column, value); });
     showValues();
   };
   // Changes a value by a fifth of the highest value, after a click or a key. by: 1 or -1.
@@ -100,9 +100,9 @@ export const createSliders = (specs, changed) => {
     if (slider) panel.change(slider.channel, slider.column, event.shiftKey ? -1 : 1);
     return Boolean(slider);
   };
-  // The values for a link, with an entry for each channel that has values above 0: its key -> "column:value,column:value".
+  // The values for a link, with an entry for each channel that has other values than at the start: its key -> "column:value,column:value".
   panel.state = () => Object.fromEntries(channels.flatMap((channel) => {
-    const some = columns(channel).map((column) => [column, values.get(valueKey(channel, column))]).filter(([, value]) => value > 0);
+    const some = columns(channel).map((column) => [column, values.get(valueKey(channel, column))]).filter(([, value]) => value !== channel.start);
     return some.length ? [[channel.key, some.map(([column, value]) => `${column}:${value}`).join(",")]] : [];
   }));
 

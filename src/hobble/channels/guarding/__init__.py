@@ -1,0 +1,67 @@
+"""The guarding channel: how much the whole body spares what hurts, from 0 to 1.
+
+People who act pain guard with the whole body (1). People who have long lived with an injury hardly do (0). A
+body that does not hurt moves in the same way at every value. A network learns this, because every clip has a
+value.
+"""
+
+from __future__ import annotations
+
+import math
+import zlib
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from hobble.channels.channel import Channel, ClipSource, HasLinks
+from hobble.core.clip import Clip
+from hobble.core.errors import InputError
+from hobble.core.quat import Array
+
+MIRROR_SUFFIX = "_mirror"  # end of the name of a mirrored clip
+GOLDEN = (math.sqrt(5) - 1) / 2
+
+
+def guarding_of_clip(name: str) -> float:
+    """How much the body guards in a clip, if its entry does not say so: the same in all its frames.
+
+    The values of clips with different names are spread evenly over 0 to 1. A clip and its mirror have the
+    same value.
+    """
+    return math.modf(zlib.crc32(name.removesuffix(MIRROR_SUFFIX).encode()) * GOLDEN)[0]
+
+
+class Guarding(Channel):
+    """Has one column. The clip's entry in the data set may give its value, else it is `guarding_of_clip`."""
+
+    name = "guarding"
+    title = "Guarding"
+    value_word = "amount"
+    highest = 1.0
+    rate = 1.0
+    default = 0.6
+
+    def columns(self, rig: HasLinks) -> tuple[str, ...]:
+        """The only column."""
+        return ("guarding",)
+
+    def is_neutral(self, source: ClipSource) -> bool:
+        """Always. A network without this channel may train on any clip."""
+        return True
+
+    def check(self, source: ClipSource, rig: HasLinks) -> None:
+        """Raise InputError if the clip's entry is not a number from 0 to 1."""
+        if source.value is not None and not (
+            isinstance(source.value, int | float) and 0 <= source.value <= self.highest
+        ):
+            where = f"{source.clip}.channels.{self.name}"
+            raise InputError(where, f"cannot be {source.value!r:.80}", fix="Write a number from 0 to 1.")
+
+    def read(self, clip: Clip, source: ClipSource, motion: Mapping[str, Any]) -> tuple[Array, list[str]]:
+        """Values (F, 1), the same in each frame, and no warnings."""
+        value = guarding_of_clip(clip.name) if source.value is None else float(source.value)
+        return np.full((len(clip), 1), value, np.float32), []
+
+
+CHANNEL = Guarding()
