@@ -176,8 +176,8 @@ ADDED_CHANGES: dict[str, dict[str, float]] = {
     "hand": {"speed": 0.94},
 }
 # Changes at severity 10 and guarding 1, for a leg or back that hurts on the right, in addition to the above.
-# From CMU 105_25 and the walks of Ferre et al. (2019): trunk 21 to 30 degrees forward, a nod of 12 to 24 degrees
-# (`dip`) as the hurt foot bears weight, elbows bent by 40 to 77 degrees (`guard`, see HELD_ARMS), both knees
+# From CMU 105_25 and the walks of Ferre et al. (2019): trunk 21 to 30 degrees forward, a nod of 12 to 24
+# degrees (`dip`) as the hurt foot bears weight, elbows bent by 40 to 77 degrees (`guard`), both knees
 # bent, eyes on the ground.
 GUARD_CHANGES: dict[str, float] = {
     "forward": 17.0,
@@ -245,7 +245,8 @@ def _add_mix(
     def mixed(name: str) -> float:
         return float(sum(share * getattr(profile_of[p], name) for p, share in mix.items()))
 
-    curves = sum(share * profile_of[p].harmonics() for p, share in mix.items()) * CURVE_FACTOR.get(part, 1.0)
+    curves = np.sum([share * profile_of[p].harmonics() for p, share in mix.items()], axis=0)
+    curves *= CURVE_FACTOR.get(part, 1.0)
     curves[CURVES.index("pelvis_turn_left") :, 1:] = (
         0.0  # how far pelvis and shoulders turn is the change `turn`
     )

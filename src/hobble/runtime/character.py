@@ -96,10 +96,10 @@ def start_characters(
     hardly have any. If the file has no start frame, they start in the network's mean pose.
     """
     layout, facts = network.layout, network.training_facts
-    at_rest = np.concatenate(
-        [np.full(n, channel(name).default / (scales or {}).get(name, 1.0)) for name, n in layout.channels]
-        or [[]]
-    )
+    scale_of = scales or {}
+    at_rest = [
+        channel(name).default / scale_of.get(name, 1.0) for name, n in layout.channels for _ in range(n)
+    ]
     # A row of network outputs, relative to the root.
     start_row = network.y_mean.astype(float) if facts is None else facts.start_y.astype(float)
     path, path_direction, gait = _start_path(network)

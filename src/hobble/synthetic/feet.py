@@ -12,7 +12,7 @@ import numpy as np
 
 from hobble.core import quat
 from hobble.core.quat import Array
-from hobble.core.smooth import interpolate_curve, smooth_above
+from hobble.core.smooth import gaussian, interpolate_curve, smooth_above
 from hobble.synthetic.plan import Ground, PlannedPath
 from hobble.synthetic.style import LEFT, RIGHT, SIDE_SIGN, Style
 
@@ -21,6 +21,10 @@ ANKLE_TO_TOE = np.array([0.0, -4.5, 13.5])  # x, y, z from the ankle joint to th
 # cm and radians: a standing figure keeps a foot in place if it would move and turn by less than these.
 SMALLEST_STEP = (7.0, np.radians(12.0))
 MIN_ANKLE_DISTANCE = 8.0  # cm: least sideways distance between the ankles
+CADENCE_SPREAD, CADENCE_SECONDS = (
+    0.025,
+    0.6,
+)  # standard deviation of the cadence; seconds over which it varies
 STANDING_SPEED = 12.0  # cm/s: a slower figure counts as standing
 # Points along the foot, cm in front of the ankle, that should all be on the same step of stairs. The last
 # three are in front of the toes, so that the foot does not stand close to the next step.
@@ -45,9 +49,14 @@ class PlannedStance:
     swings: bool = True
 
 
-def phase_curve(style: Style, fps: float, start: float) -> Array:
-    """(F,) phase in cycles. It starts near `start` and only grows. The right foot lands at whole numbers."""
-    return start + np.cumsum(style.frequency) / fps
+def phase_curve(style: Style, fps: float, rng: np.random.Generator) -> Array:
+    """(F,) phase in cycles. It starts near 0 to 1 and only grows. The right foot lands at whole numbers.
+
+    The cadence varies at random over some steps, as that of people does.
+    """
+    start = rng.random()
+    slow = gaussian(rng.normal(size=len(style.frequency)), CADENCE_SECONDS * fps)
+    return start + np.cumsum(style.frequency * (1 + CADENCE_SPREAD * slow / slow.std())) / fps
 
 
 def landing_frames(phase: Array, side: int) -> Array:
@@ -163,7 +172,7 @@ HEEL = np.array([0.0, -4.2, -3.0])  # cm from the ankle joint to the heel, appro
 READY = 0.95  # after this share of the swing, the foot has the pitch with which it lands
 # Exponents of the time in a swing, which runs from 0 to 1. KICK is below 1, so the foot is highest before the
 # middle of the swing. EARLY is below 1, so the foot covers more than half of its way in the first half.
-KICK, EARLY = 0.68, 0.81
+KICK, EARLY = 0.64, 0.81
 FOLLOW = 0.45  # the pitch begins the swing with this share of its rate of change at the end of the stance
 LANDING_SPEED = 0.36  # speed of the foot as it lands, as a share of its mean speed in the swing
 # Where the ground is in the way, the foot is raised more. The raise grows in the first RISE of the swing, and

@@ -79,7 +79,7 @@ def walk_from_plan(
     """
     path = plan_path(segments, total, fps)
     style = healthy_style(path)
-    phase = phase_curve(style, fps, random_generator(seed, clip, "phase").random())
+    phase = phase_curve(style, fps, random_generator(seed, clip, "phase"))
     right, left = (_frames_in_clip(landing_frames(phase, side), path.first, total) for side in (RIGHT, LEFT))
     rng = random_generator(seed, clip, "walk")
     terrain = make_ground(ground, rng)

@@ -15,6 +15,8 @@ from hobble.synthetic.plan import Ground, PlannedPath, flat
 from hobble.synthetic.style import LEFT, RIGHT, SIDE_SIGN, Style
 
 X, Y, Z = np.eye(3)  # the three axes
+# Shares of the swing of an arm, degrees by degrees, by which the shoulder girdle and the hand turn as well.
+GIRDLE, HAND = 0.25, 0.5
 TWIST = 12.0  # degrees by which an upper arm is turned inward about its axis
 # The keys of both say whether the ground is flat. MAX_STRETCH: longest distance from hip to ankle, as a share
 # of the leg's length. SMOOTHING_TIME: seconds, for the filter by which the hips come down smoothly to where
@@ -47,7 +49,7 @@ def pose_figure(
     hips, chest = _pelvis_rotation(style, phase, yaw, noise), _chest_rotation(style, phase, yaw, noise)
     root = _hip_positions(skeleton, path, style, phase, feet, ground, hips, noise)
     world = np.tile(quat.IDENTITY, (len(path), len(skeleton.joints), 1))
-    _set_trunk_and_head(skeleton, world, path, hips, chest, noise)
+    _set_trunk_and_head(skeleton, world, path, style, phase, hips, chest, noise)
     for side in (LEFT, RIGHT):
         _set_leg(skeleton, world, root, feet[side], side)
         _set_arm(skeleton, world, path, style, phase, side)
@@ -102,11 +104,17 @@ def _hip_positions(
     """
     sway = style.sway * (_wave(phase, _mid_stance(style, LEFT)) - _wave(phase, _mid_stance(style, RIGHT))) / 2
     sway = sway + 0.3 * noise[:, 3]
-    x = path.position[:, 0] + sway * np.cos(path.facing)
-    z = path.position[:, 1] - sway * np.sin(path.facing)
-    ground_height = gaussian_filter1d(ground(x, z), 0.16 * path.fps, mode="nearest")  # over 0.16 s
-    # Mean over both feet. The left foot is half a cycle behind, which is one period of the bob.
+    # Mean over both feet. The left foot is half a cycle behind, which is one period of bob and surge.
     middle = (_mid_stance(style, RIGHT) + _mid_stance(style, LEFT) - 0.5) / 2
+    ahead = (
+        path.velocity
+        / np.maximum(path.speed, 1e-6)[:, None]
+        * (style.surge * _wave(phase, middle - 0.125, 2))[:, None]
+    )
+    aside, forward = sway + ahead[:, 0], ahead[:, 1]
+    x = path.position[:, 0] + aside * np.cos(path.facing) + forward * np.sin(path.facing)
+    z = path.position[:, 1] - aside * np.sin(path.facing) + forward * np.cos(path.facing)
+    ground_height = gaussian_filter1d(ground(x, z), 0.16 * path.fps, mode="nearest")  # over 0.16 s
     height = ground_height + style.height + style.bob * _wave(phase, middle, 2) + 0.2 * noise[:, 4]
     root = np.stack([x, height, z], axis=1)
     excess = np.zeros(len(path))
@@ -142,14 +150,22 @@ def leg_lengths(skeleton: Skeleton, side: str) -> tuple[float, float]:
 
 
 def _set_trunk_and_head(
-    skeleton: Skeleton, world: Array, path: PlannedPath, hips: Array, chest: Array, noise: Array
+    skeleton: Skeleton,
+    world: Array,
+    path: PlannedPath,
+    style: Style,
+    phase: Array,
+    hips: Array,
+    chest: Array,
+    noise: Array,
 ) -> None:
     """Set the world rotations of pelvis, spine, neck and head. hips, chest: (F, 4) rotations."""
     # The head looks up to 8 degrees into a turn of the path.
     ahead = np.radians(4) * np.clip(np.gradient(path.facing) * path.fps, -2, 2)
+    pitch = 2.0 + style.nod * _wave(phase, 0.05, 2) + noise[:, 0]  # forward as a foot lands
     head = quat.mul(
         quat.yaw(path.facing + ahead),
-        quat.mul(_rotation(Y, 1.5 * noise[:, 5]), _rotation(X, 2.0 + noise[:, 0])),
+        quat.mul(_rotation(Y, 1.5 * noise[:, 5]), _rotation(X, pitch)),
     )
     for name in ("Hips", "LHipJoint", "RHipJoint"):
         world[:, skeleton.index(name)] = hips
@@ -203,10 +219,12 @@ def _set_arm(
     )
     upper = quat.mul(upper, _rotation(X, np.full(len(path), TWIST)))
     lower = quat.mul(upper, _rotation(Y, -sign * np.maximum(elbow, 2)))
-    world[:, skeleton.index(f"{name}Shoulder")] = chest
+    # The shoulder girdle goes along with the arm, and the hand hangs behind in the swing.
+    along = style.arm_swing[:, side] * swing
+    world[:, skeleton.index(f"{name}Shoulder")] = quat.mul(chest, _rotation(Y, -sign * GIRDLE * along))
     world[:, skeleton.index(f"{name}Arm")] = upper
     world[:, skeleton.index(f"{name}ForeArm")] = lower
-    hand = quat.mul(lower, _rotation(Y, np.full(len(path), -sign * 8.0)))
+    hand = quat.mul(lower, _rotation(Y, -sign * (8.0 + HAND * along)))
     initial = "L" if side == LEFT else "R"
     for joint in (f"{name}Hand", f"{name}FingerBase", f"{name}HandIndex1", f"{initial}Thumb"):
         world[:, skeleton.index(joint)] = hand

@@ -30,24 +30,27 @@ VALUES_BY_GAIT: dict[str, tuple[tuple[float, float], ...]] = {
     # exponent of the heel's rise over time: slow at first, then fast
     "roll": ((2.8, 0), (3.2, 0), (2.6, 0), (1.9, 0)),
     # greatest height of the swinging foot above the line from its last place on the ground to its next
-    "lift": ((2, 0), (0.3, 1), (3, 3), (4, 0)),
+    "lift": ((2, 0), (5.2, 1), (4, 3), (4, 0)),
     "clearance": ((1, 0), (2.5, 0), (3, 0), (2, 0)),  # least height of the sole above the ground in mid-swing
     "behind": ((4, 0), (9.9, 5.5), (7.5, 3), (10, 5)),  # distance of an ankle behind the body in mid-stance
     "width": ((9.5, 0), (5.5, 0), (3.5, 0), (9.5, 0)),  # distance of an ankle from the path, sideways
     "toe_out": ((8, 0), (6, 0), (3, 0), (10, 0)),  # angle by which the foot points outward
     "height": ((94.6, 0), (94.8, -1.0), (94.5, -0.8), (65, 0)),  # height of the hips above the ground
+    # amplitude of the hips' way forward and back; they are slowest in mid-stance
+    "surge": ((0, 0), (1.1, 0.2), (1.2, 0), (0.7, 0)),
     # amplitude of the hips' height; positive if they are highest in mid-stance, negative if lowest
     "bob": ((0, 0), (1.3, 1.2), (-2.0, 0.3), (0.8, 0)),
     "sway": ((1.6, 0), (2.2, -0.8), (0.8, 0), (2.5, 0)),  # amplitude of the hips, sideways
     "pelvis_yaw": ((0.3, 0), (9, 2), (6, 1), (5, 0)),  # amplitude of the turn about the vertical axis
     "pelvis_list": ((1.0, 0), (6, 1), (4, 0), (3, 0)),  # amplitude of the sideways tilt
     "pelvis_tilt": ((3, 0), (7, 1), (6, 1), (34, 0)),  # mean forward tilt
+    "nod": ((0.1, 0), (2.4, 0.6), (3, 0), (1.5, 0)),  # amplitude of the head, forward
     "lean": ((1, 0), (3, 2), (10, 2), (79, 0)),  # lean of the trunk, forward
     "chest_yaw": ((0.3, 0), (4, 2), (9, 2), (4, 0)),  # amplitude of the turn about the vertical axis
     "arm_swing": ((0.8, 0), (17, 12), (27, 4), (9, 0)),  # amplitude of the upper arm, forward and backward
     "arm_mean": ((1, 0), (-1, 0), (-8, 0), (14, 0)),  # mean angle of the upper arm, + forward
     "elbow": ((14, 0), (22, 8), (82, 2), (48, 0)),  # mean bend of the elbow
-    "elbow_swing": ((0.5, 0), (9, 5), (11, 0), (5, 0)),  # amplitude of the bend of the elbow
+    "elbow_swing": ((0.5, 0), (16, 5), (14, 0), (7, 0)),  # amplitude of the bend of the elbow
     "abduction": ((9, 0), (9, 0), (13, 0), (14, 0)),  # angle of the upper arm, away from the body
 }
 # The names in VALUES_BY_GAIT whose curves have a value for each side of the body.
@@ -87,11 +90,13 @@ class Style:
     width: Array
     toe_out: Array
     height: Array
+    surge: Array
     bob: Array
     sway: Array
     pelvis_yaw: Array
     pelvis_list: Array
     pelvis_tilt: Array
+    nod: Array
     lean: Array
     chest_yaw: Array
     arm_swing: Array
@@ -160,9 +165,10 @@ def _adapt_to_direction(style: Style, path: PlannedPath) -> Style:
         # them from crossing.
         width=style.width + 0.25 * stride / (1 + 0.6 * sideways) * sideways,
         behind=4 + (style.behind - 4) * ahead,
-        lift=style.lift + 3 * (back + side),
+        lift=style.lift - back - side,
         frequency=style.frequency * (1 + 0.6 * sideways + 0.15 * back[:, 0] + SPIN_CADENCE * spin),
         lean=style.lean * (1 - 0.6 * back[:, 0]),
+        surge=style.surge * np.abs(ahead),
         pelvis_yaw=style.pelvis_yaw * ahead,
         arm_swing=style.arm_swing * (0.25 + 0.75 * forward),
         height=style.height - 1.5 * sideways - 1.0 * back[:, 0],
