@@ -13,6 +13,7 @@ from importlib.metadata import version
 from hobble.cli import characters, clips, gait
 from hobble.cli.command import Command
 from hobble.core.errors import HobbleError, keep_traceback
+from hobble.measures import score
 
 GROUPS = {
     "clips": "BVH files",
@@ -59,6 +60,7 @@ def _completion_arguments(parser: argparse.ArgumentParser) -> None:
 
 COMMANDS: Mapping[str, Command] = {
     **clips.COMMANDS,
+    "score": Command("clips", score.add_arguments, score.run),
     **gait.COMMANDS,
     **characters.COMMANDS,
     "completion": Command("shell", _completion_arguments, completion),

@@ -1,0 +1,313 @@
+"""Measures that papers of the field publish, of the character and of captured motion. See `field`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from hobble.core import quat
+from hobble.core.quat import Array
+from hobble.core.skeleton import Skeleton, local_rotations
+from hobble.measures.measure import MeasureInputs, Outcome
+from hobble.measures.motion_quality import (
+    BODY,
+    FOOT_POINTS,
+    FPS,
+    Reference,
+    contact_speed,
+    diversity,
+    frechet_distance,
+    jerk,
+    joint_update,
+    joints_with,
+    skating,
+    standing_heights,
+    window_features,
+)
+from hobble.measures.sample import HURT_VERSION, ClipPart, clip_parts
+from hobble.models.load import load_network
+from hobble.models.network import Network
+from hobble.rows.captured import captured_stretches, headings, rotate_by_yaw
+from hobble.runtime.animation import ProceduralAnimation
+from hobble.runtime.options import Runtime
+
+if TYPE_CHECKING:
+    from hobble.measures.field import Options
+
+WALK, JOG = 2.0, 7.0  # cm a frame: 1.2 and 4.2 m/s
+LOOK_AHEAD = 16  # frames: the character is asked to go where the path will be after these
+SETTLING = 90  # frames at the start of a walk that are not measured
+REACHED = 0.8  # the asked gait counts as reached at this share of the asked speed
+LONGEST_RESPONSE = 4 * FPS
+LONGEST, SHORTEST = 20 * FPS, 3 * FPS  # frames of a captured stretch that is walked again
+MOST_STRETCHES = 60
+
+
+@dataclass(frozen=True)
+class Motion:
+    """F frames of one body. positions: (F, J, 3) cm, in the world. rotations: (F, J, 4), to the parent."""
+
+    positions: Array = field(repr=False)
+    rotations: Array = field(repr=False)
+
+    def part(self, frames: slice) -> Motion:
+        """Some of its frames."""
+        return Motion(self.positions[frames], self.rotations[frames])
+
+
+@dataclass(frozen=True)
+class Command:
+    """What a captured person did in F frames, as a command: velocity (F, 2) x and z in the world, cm a frame,
+    gait (F, 6) shares, ahead (F, 2) facing direction; and the captured motion.
+    """
+
+    velocity: Array = field(repr=False)
+    gait: Array = field(repr=False)
+    ahead: Array = field(repr=False)
+    motion: Motion = field(repr=False)
+
+    def __len__(self) -> int:
+        return len(self.velocity)
+
+
+def paths() -> dict[str, Array]:
+    """Closed paths (N, 2), a point for each cm: a circle (radius 250 cm), a square and a star like it."""
+    angle = np.linspace(0.0, 2 * np.pi, 1571)[:-1]
+    corners = 250.0 * np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)], float)
+    tips = np.pi * (0.5 + 0.8 * np.arange(5))  # every second of five points of a circle: a pentagram
+    star = 250.0 * np.column_stack([np.cos(tips), np.sin(tips)])
+    return {
+        "circle": 250.0 * np.column_stack([np.cos(angle), np.sin(angle)]),
+        "square": _polygon(corners),
+        "star": _polygon(star),
+    }
+
+
+def _polygon(corners: Array) -> Array:
+    """The closed line through corners (K, 2), a point for each cm."""
+    sides = []
+    for start, end in zip(corners, np.roll(corners, -1, axis=0), strict=True):
+        count = round(float(np.hypot(*(end - start))))
+        sides.append(start + np.linspace(0.0, 1.0, count, endpoint=False)[:, None] * (end - start))
+    return np.concatenate(sides)
+
+
+def follow_path(network: Network, runtime: Runtime, path: Array, laps: int) -> tuple[float, float]:
+    """Mean distance (cm) and angle (degrees) between the asked and the walked path.
+
+    Each frame, the character at WALK speed is asked to go to the point that the path reaches after LOOK_AHEAD
+    frames. The first half lap is not measured. path: (N, 2), a point for each cm.
+    """
+    start, ahead = path[0], path[5] - path[0]
+    animation = ProceduralAnimation(network, position=start, facing=ahead, **dict(runtime))
+    at, passed, place = 0, 0, start
+    distances, angles = [], []
+    for _ in range(int((laps + 0.5) * len(path) / WALK * 3)):  # at a third of the speed it gives up
+        way = path[(at + round(LOOK_AHEAD * WALK)) % len(path)] - place
+        pose = animation.next_pose(way / max(float(np.hypot(*way)), 1e-6) * WALK, gait="walk")
+        before, place = place, pose.root[::2].copy()
+        # The nearest point of the path not far ahead: crossing branches of a star are not mixed up.
+        near = (at + np.arange(-20, 60)) % len(path)
+        step = int(np.argmin(np.hypot(*(path[near] - place).T))) - 20
+        at, passed = (at + step) % len(path), passed + step
+        if passed > len(path) // 2:
+            distances.append(float(np.hypot(*(path[at] - place))))
+            angles.append(_angle(place - before, path[(at + 1) % len(path)] - path[at]))
+        if passed >= (laps + 0.5) * len(path):
+            break
+    return float(np.mean(distances)), float(np.mean(angles))
+
+
+def _angle(a: Array, b: Array) -> float:
+    """Degrees between two vectors (2,)."""
+    cross, dot = a[0] * b[1] - a[1] * b[0], a @ b
+    return float(np.degrees(abs(np.arctan2(cross, dot))))
+
+
+def response(network: Network, runtime: Runtime, gait: str, speed: float) -> float | None:
+    """Seconds from the command to a standing character until its mean speed over a quarter of a second is
+    REACHED times `speed`; None if it does not come to that in LONGEST_RESPONSE.
+    """
+    animation = ProceduralAnimation(network, **dict(runtime))
+    for _ in range(2 * FPS):
+        animation.next_pose((0.0, 0.0))
+    places = [np.asarray(animation.next_pose((0.0, 0.0)).root)]
+    for frame in range(LONGEST_RESPONSE):
+        places.append(np.asarray(animation.next_pose((0.0, speed), gait=gait).root))
+        since = places[max(0, len(places) - 1 - FPS // 4)]  # before the command it stood still
+        if np.hypot(*(places[-1] - since)[::2]) / (FPS // 4) >= REACHED * speed:
+            return round((frame + 1) / FPS, 3)
+    return None
+
+
+def straight_walk(network: Network, runtime: Runtime, seconds: float) -> Motion:
+    """A straight walk at WALK speed, after SETTLING."""
+    frames = SETTLING + round(seconds * FPS)
+    command = Command(
+        np.tile([0.0, WALK], (frames, 1)),
+        _walk_shares(network, frames),
+        np.zeros((frames, 2)),
+        Motion(*EMPTY),
+    )
+    return walk_commands(network, runtime, [command])[0].part(slice(SETTLING, None))
+
+
+EMPTY = (np.zeros((0, 0, 3)), np.zeros((0, 0, 4)))
+
+
+def _walk_shares(network: Network, frames: int) -> Array:
+    return np.tile([float(name == "walk") for name in network.gaits], (frames, 1))
+
+
+def walk_commands(network: Network, runtime: Runtime, commands: Sequence[Command]) -> list[Motion]:
+    """The character's motion for each command, all as one crowd. Characters start standing."""
+    assert network.skeleton is not None
+    count, longest = len(commands), max(map(len, commands))
+    animation = ProceduralAnimation(network, characters=count, **dict(runtime))
+    velocity, gait, ahead = (
+        np.stack([_lengthened(getattr(command, name), longest) for command in commands], axis=1)
+        for name in ("velocity", "gait", "ahead")
+    )
+    joints = len(network.skeleton.joints)
+    positions = np.empty((longest, count, joints, 3), np.float32)
+    rotations = np.empty((longest, count, joints, 4), np.float32)
+    for frame in range(longest):
+        pose = animation.next_pose(velocity[frame], facing=ahead[frame], gait=gait[frame])
+        positions[frame], rotations[frame] = (
+            x.reshape(count, joints, -1) for x in (pose.positions, pose.rotations)
+        )
+    local = local_rotations(network.skeleton, rotations)
+    return [Motion(positions[: len(c), i], local[: len(c), i]) for i, c in enumerate(commands)]
+
+
+def _lengthened(values: Array, frames: int) -> Array:
+    """(frames, ...) the values (F, ...), with the last one repeated."""
+    return np.concatenate([values, np.repeat(values[-1:], frames - len(values), axis=0)])
+
+
+def commands_of_clips(inputs: MeasureInputs, skeleton: Skeleton, split: str) -> list[Command]:
+    """Healthy captured stretches of a split as commands, at most MOST_STRETCHES."""
+    clips = {
+        clip: path
+        for clip, path in inputs.clips.items()
+        if inputs.splits[clip] == split and not HURT_VERSION.search(clip) and not clip.endswith("_mirror")
+    }
+    found: list[Command] = []
+    for part in clip_parts(clips, None):
+        found += _commands_of(part, skeleton)
+        if len(found) >= MOST_STRETCHES:
+            break
+    return found[:MOST_STRETCHES]
+
+
+def _commands_of(part: ClipPart, skeleton: Skeleton) -> Iterator[Command]:
+    """The stretches of one clip in which nothing hurts, each of SHORTEST to LONGEST frames."""
+    rows = part.load().rows
+    layout = rows.layout
+    for captured in captured_stretches(rows):
+        if any(np.any(values) for values in captured.channels.values()):
+            continue
+        yaw = headings(rows.y[captured.rows][:, layout.y_turn][:, 0].astype(float))
+        turns = rows.y[captured.rows][:, layout.y_joint_rotation].reshape(len(captured), -1, 3)
+        world = quat.mul(quat.yaw(yaw)[:, None], quat.exp(turns.astype(float)))
+        positions = captured.local.copy()
+        positions[..., ::2] = rotate_by_yaw(positions[..., ::2], yaw[:, None]) + captured.root[:, None, ::2]
+        motion = Motion(positions, local_rotations(skeleton, world))
+        ahead = np.column_stack([np.sin(yaw), np.cos(yaw)])
+        velocity = rotate_by_yaw(captured.velocity, yaw)
+        for first in range(0, len(captured) - SHORTEST + 1, LONGEST):
+            frames = slice(first, first + LONGEST)
+            if len(velocity[frames]) >= SHORTEST:
+                yield Command(velocity[frames], captured.gait[frames], ahead[frames], motion.part(frames))
+
+
+def cleanness(skeleton: Skeleton, motions: Sequence[Motion]) -> dict[str, float]:
+    """Skating, rotation of joints, jerk and contact speed of motions: means over them."""
+    feet, body = joints_with(skeleton, FOOT_POINTS), joints_with(skeleton, BODY)
+    found: dict[str, list[float]] = {}
+    for motion in motions:
+        points = motion.positions[:, feet].astype(float)
+        standing = standing_heights(points)
+        slid = skating(points, standing)
+        for name, value in {
+            "skating_cm": slid.mean(),
+            "skating_heels_cm": slid[:, ::2].mean(),
+            "skating_toes_cm": slid[:, 1::2].mean(),
+            "joint_update_degrees": joint_update(motion.rotations[:, body]),
+            "jerk": jerk(motion.positions[:, body].astype(float)),
+            "contact_speed": contact_speed(points, standing),
+        }.items():
+            found.setdefault(name, []).append(float(value))
+    return {name: round(float(np.nanmean(values)), 4) for name, values in found.items()}
+
+
+def compare_with_captured(
+    network: Network, runtime: Runtime, commands: Sequence[Command]
+) -> dict[str, dict[str, Any]]:
+    """The character asked for what captured people did, beside these people.
+
+    Of both, the first SETTLING frames of each stretch are left out, since the character starts standing. The
+    Frechet distance of `captured` is that of two halves of its stretches, in turn.
+    """
+    skeleton = network.skeleton
+    assert skeleton is not None
+    rest = slice(SETTLING, None)
+    captured = [command.motion.part(rest) for command in commands]
+    walked = [motion.part(rest) for motion in walk_commands(network, runtime, commands)]
+    features = [window_features(skeleton, motion.positions) for motion in captured]
+    basis = Reference.of(np.concatenate(features))
+    windows = basis.project(np.concatenate([window_features(skeleton, m.positions) for m in walked]))
+    halves = [basis.project(np.concatenate(features[start::2])) for start in (0, 1) if features[start::2]]
+    apart = frechet_distance(*halves) if len(halves) == 2 else None
+    return {
+        "character": cleanness(skeleton, walked)
+        | {
+            "frechet": round(frechet_distance(windows, basis.windows), 4),
+            "diversity": round(diversity(windows), 4),
+        },
+        "captured": cleanness(skeleton, captured)
+        | {"frechet": apart and round(apart, 4), "diversity": round(diversity(basis.windows), 4)},
+    }
+
+
+def measure_field(
+    network: Network, runtime: Runtime, options: Options, commands: Mapping[str, Sequence[Command]]
+) -> dict[str, Any]:
+    """The content of field.json (docs/artefacts.md). commands: split -> its captured stretches."""
+    assert network.skeleton is not None
+    walked = {
+        name: dict(
+            zip(
+                ("cm", "degrees"),
+                np.round(follow_path(network, runtime, path, options.path_laps), 3),
+                strict=True,
+            )
+        )
+        for name, path in paths().items()
+    }
+    split = next((name for name in ("held_out", "train") if commands.get(name)), None)
+    return {
+        "paths": walked,
+        "response": {
+            "walk": response(network, runtime, "walk", WALK),
+            "jog": response(network, runtime, "jog", JOG),
+        },
+        "straight": cleanness(network.skeleton, [straight_walk(network, runtime, options.field_seconds)]),
+        "split": split,
+        "stretches": len(commands[split]) if split else 0,
+        "asked": compare_with_captured(network, runtime, commands[split]) if split else None,
+    }
+
+
+def run(inputs: MeasureInputs, options: Options) -> Outcome:
+    """field.json, and its values as a table."""
+    network = load_network(inputs.weights)
+    assert network.skeleton is not None
+    commands = {split: commands_of_clips(inputs, network.skeleton, split) for split in ("held_out", "train")}
+    result = measure_field(network, inputs.runtime, options, commands)
+    result["published"] = inputs.published["field"]
+    circle, skated = result["paths"]["circle"]["cm"], result["straight"]["skating_cm"]
+    return Outcome(result, {}, f"off a circle by {circle:.1f} cm; feet skate {skated:.3f} cm a frame")

@@ -1,0 +1,163 @@
+"""`hobble score` and the formulas behind it: exact values, planted faults, equal folders."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hobble.cli.__main__ import main
+from hobble.core import quat
+from hobble.core.bvh import write_bvh
+from hobble.core.clip import Clip
+from hobble.measures.motion_quality import (
+    Reference,
+    contact_speed,
+    floating,
+    frechet_distance,
+    jerk,
+    joint_update,
+    penetration,
+    skating,
+    window_features,
+)
+from hobble.motion.skeleton_file import find_skeleton, load_skeleton
+from hobble.synthetic.generate_clip import generate_walk
+
+
+def feet(height: float, step: float, frames: int = 50) -> np.ndarray:
+    """(F, 4, 3) four points that glide sideways by `step` cm a frame."""
+    out = np.full((frames, 4, 3), height)
+    out[..., 0] = step * np.arange(frames)[:, None]
+    return out
+
+
+@pytest.mark.parametrize(("clearance", "share"), [(-1.0, 1.0), (0.0, 1.0), (1.25, 2 - 2**0.5), (2.5, 0.0)])
+def test_skating_counts_less_with_height(clearance, share):
+    assert skating(feet(3 + clearance, 1.5), 3.0) == pytest.approx(1.5 * share)
+
+
+def test_a_still_foot_in_the_air_floats_and_a_fast_one_flies():
+    standing = np.full(4, 3.0)
+    assert floating(feet(7.0, 0.1), standing) == pytest.approx(4.0)
+    assert np.isnan(floating(feet(7.0, 3.0), standing))
+    assert penetration(feet(1.5, 0.1), standing) == pytest.approx((1.5, 1.0))
+
+
+def test_jerk_rotation_and_contact_speed_have_their_units():
+    t = np.arange(10.0)
+    cube = np.stack([t**3, 0 * t, 0 * t], axis=-1)[:, None]  # cm: its third derivative is 6 cm a frame cubed
+    assert jerk(cube) == pytest.approx(6 * 60**3 / 100)
+    turning = quat.yaw(np.radians(2.0) * t)[:, None]
+    rotations = np.concatenate([turning, np.broadcast_to(quat.yaw(0.0), turning.shape)], axis=1)
+    assert joint_update(rotations) == pytest.approx(1.0)
+    half = feet(3.0, 1.0)
+    half[:, 2:, 1], half[:, 2:, 0] = 9.0, 4 * half[:, 2:, 0]
+    assert contact_speed(half, np.full(4, 3.0)) == pytest.approx(0.25)
+
+
+def test_frechet_distance_of_two_known_distributions():
+    rng = np.random.default_rng(0)
+    a, b = rng.normal(0, [1, 2], (200_000, 2)), rng.normal([3, 0], [2, 2], (200_000, 2))
+    # |3|^2 + (1 - 2)^2 + 0
+    assert frechet_distance(a, b) == pytest.approx(10.0, abs=0.1)
+    assert frechet_distance(a, a) == pytest.approx(0.0, abs=1e-9)
+
+
+def walk(name: str, seed: int) -> Clip:
+    file = find_skeleton("holden31")
+    skeleton = load_skeleton(file, "holden31").skeleton
+    return generate_walk(name, skeleton, 300, "walk", 60.0, seed).clip
+
+
+def test_windows_do_not_depend_on_place_and_heading():
+    clip = walk("a", 1)
+    turn = quat.yaw(np.array(1.0))
+    rotations = clip.rotations.copy()
+    rotations[:, 0] = quat.mul(np.broadcast_to(turn, rotations[:, 0].shape), rotations[:, 0])
+    root = quat.rotate(np.broadcast_to(turn, (len(clip), 4)), clip.root) + np.array([300.0, 0.0, -50.0])
+    moved = replace(clip, rotations=rotations, root=root)
+    here, there = (window_features(c.skeleton, c.positions) for c in (clip, moved))
+    np.testing.assert_allclose(here, there, atol=1e-6)
+    assert len(here) > 10
+    assert Reference.of(here).scale > 0.01
+
+
+def lifted(clip: Clip) -> Clip:
+    return replace(clip, root=clip.root + np.array([0.0, 4.0, 0.0]))
+
+
+def half_lifted(clip: Clip) -> Clip:
+    up = np.where(np.arange(len(clip)) < len(clip) // 2, 0.0, 6.0)
+    return replace(clip, root=clip.root + up[:, None] * [0.0, 1.0, 0.0])
+
+
+def bobbing(clip: Clip) -> Clip:
+    down = np.where(np.arange(len(clip)) % 100 < 20, -4.0, 0.0)
+    return replace(clip, root=clip.root + down[:, None] * [0.0, 1.0, 0.0])
+
+
+def sliding(clip: Clip) -> Clip:
+    return replace(clip, root=clip.root * [1.3, 1.0, 1.3])
+
+
+def trembling(clip: Clip) -> Clip:
+    noise = np.random.default_rng(0).normal(0, 0.02, (*clip.rotations.shape[:2], 3))
+    return replace(clip, rotations=quat.mul(clip.rotations, quat.exp(noise)))
+
+
+def stiff(clip: Clip) -> Clip:
+    rotations = clip.rotations.copy()
+    for side in ("left", "right"):
+        for part in ("shoulder", "elbow"):
+            joint = clip.skeleton.role(f"{side}_{part}")
+            rotations[:, joint] = rotations[0, joint]
+    return replace(clip, rotations=rotations)
+
+
+def write(folder: Path, change=lambda clip: clip) -> Path:
+    folder.mkdir()
+    for seed in (1, 2):
+        write_bvh(folder / f"walk{seed}.bvh", change(walk(f"walk{seed}", seed)))
+    return folder
+
+
+def scores(capsys, folder: Path, *options: str | Path) -> dict:
+    assert main(["score", str(folder), "--json", *map(str, options)]) == 0
+    return json.loads(capsys.readouterr().out)
+
+
+def test_equal_folders_score_equal_and_each_planted_fault_is_found(tmp_path, capsys):
+    reference = write(tmp_path / "reference")
+    same = scores(capsys, write(tmp_path / "same"), "--reference", reference, "--out", tmp_path / "out")
+    mean = same["mean"]
+    assert mean["frechet"] == pytest.approx(0.0, abs=1e-9)
+    for name, value in same["reference"].items():
+        if name != "frechet":
+            assert mean[name] == pytest.approx(value), name
+    assert json.loads((tmp_path / "out" / "score.json").read_text())["mean"] == mean
+    assert (tmp_path / "out" / "score.png").read_bytes().startswith(b"\x89PNG")
+    for change, measure, more in (
+        (lifted, "floor", 3.0),
+        (half_lifted, "floating", 2.0),
+        (bobbing, "depth", 0.4),
+        (sliding, "skating", 0.1),
+        (trembling, "jerk", 1000.0),
+        (stiff, "frechet", 0.02),
+    ):
+        found = scores(capsys, write(tmp_path / change.__name__, change), "--reference", reference)["mean"]
+        assert found[measure] > mean[measure] + more, (change.__name__, found)
+    assert found["joint_update"] < 0.9 * mean["joint_update"]  # of the stiff one
+
+
+def test_a_broken_file_is_named_and_the_others_are_scored(tmp_path, capsys):
+    folder = write(tmp_path / "clips")
+    (folder / "broken.bvh").write_text("HIERARCHY\nROOT Hips\n")
+    assert main(["score", str(folder)]) == 1
+    said = capsys.readouterr()
+    assert "broken.bvh" in said.err
+    assert "2 clips scored, 1 left out" in said.out
+    assert "foot skating" in said.out
