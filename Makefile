@@ -38,20 +38,25 @@ faults: env      ## test the workflow with N random faults (make faults N=200 SE
 cluster-test: env ## run the test configuration on a SLURM cluster of one node (needs root on Debian)
 	tests/cluster/run.sh
 
-# The tests that open the report need a browser. If there is none, this target installs Chromium. That needs root on Debian;
-# otherwise the tests are skipped.
-browser:         ## find or install the browser for the tests
+# The tests that open the report need a browser; without one they are skipped. This target asks before it installs Chromium with
+# apt-get as root. BROWSER=yes or BROWSER=no answers, for machines without a person.
+BROWSER ?= ask
+browser:         ## find the browser for the tests, or ask whether to install one (BROWSER=yes, BROWSER=no)
 	@for name in chromium chromium-browser google-chrome; do command -v $$name >/dev/null && exit 0; done; \
+	answer=$(BROWSER); \
 	if [ "$$(id -u)" = 0 ] && command -v apt-get >/dev/null; then \
-	  echo "installing chromium, for the tests that open the report"; \
-	  { apt-get update && DEBIAN_FRONTEND=noninteractive apt-get install -y --no-install-recommends chromium; } >/dev/null 2>&1 && exit 0; \
+	  if [ $$answer = ask ] && [ -t 0 ]; then printf "Install chromium for the tests that open the report? [y/N] "; read answer; fi; \
+	  case $$answer in y|yes) \
+	    { apt-get update && DEBIAN_FRONTEND=noninteractive apt-get install -y --no-install-recommends chromium; } >/dev/null 2>&1 && exit 0 ;; \
+	  esac; \
 	fi; \
-	echo "no chromium here, and none could be installed: the tests that open the report will be skipped"
+	echo "no chromium here: the tests that open the report will be skipped (make browser BROWSER=yes installs it, as root on Debian)"
 
 check: env       ## check lint, format and types
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
-	$(BIN)/snakefmt --check Snakefile workflow/rules
+	$(BIN)/snakefmt --check Snakefile workflow/Snakefile workflow/rules
+	$(BIN)/snakemake --lint >/dev/null || $(BIN)/snakemake --lint
 	$(BIN)/mypy
 
 docs: env        ## build the documentation site in site/

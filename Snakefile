@@ -1,11 +1,12 @@
 # This workflow turns motion-capture clips into a character that can be hurt. Its usual target is the report of a
 # configuration: results/<configuration>/report.html
 import sys
+from functools import partial
 
 import snakemake_logger_plugin_hobble
 from hobble.core.errors import HobbleError, keep_traceback
 from hobble.workflow import lifetime
-from hobble.workflow.estimate import sentences_about_trainings
+from hobble.workflow.estimate import sentences_about_plan
 from hobble.workflow.targets import open_project
 
 lifetime.ensure_user_name()
@@ -20,15 +21,12 @@ except Exception as error:
 lifetime.set_run_variable()
 
 
-def about_plan(jobs):
-    """Sentences about a plan: how long its trainings take. jobs: rule and wildcards of each job."""
-    names = [
-        wildcards["configuration"] for rule, wildcards in jobs if rule == "training"
-    ]
-    return sentences_about_trainings(demands, names)
-
-
+about_plan = partial(sentences_about_plan, project)
 snakemake_logger_plugin_hobble.ABOUT_PLAN.append(about_plan)
+
+
+# With `--sdm apptainer` each job runs in this image, which `docker build -t hobble .` makes.
+container: "docker-daemon://hobble:latest"
 
 
 onstart:

@@ -36,6 +36,10 @@ SUPERFLUOUS = re.compile(
     r"Exiting because a job execution failed|Look below for error messages|^Shutting down|"
     r"^At least one job did not complete|^WorkflowError:\s*At least one job did not complete"
 )
+# What Snakemake puts around a message of the Snakefile: the place in the code. Users do not need it.
+PLACE = re.compile(
+    r'^WorkflowError in file ".*Snakefile", line \d+:\n|\n  File ".*Snakefile", line \d+, in <module>'
+)
 # Snakemake's messages that are shown although they are no warnings.
 SHOWN_MESSAGES = re.compile(r"^Nothing to be done|^This was a dry-run|^Unlocking|^Touching|^Error")
 # The rule `clip_file` finds its file already there, because a batch made it. Snakemake warns of this.
@@ -230,7 +234,7 @@ class Terminal:
             self._print_line("Stopping the running jobs.")
         elif record.levelno >= logging.ERROR:
             if not (JOB_ENDED.search(text) or SUPERFLUOUS.search(text)) and text:
-                self._print_line(text)
+                self._print_line(PLACE.sub("", text))
         elif FOUND_OUTPUT not in text and (record.levelno >= logging.WARNING or SHOWN_MESSAGES.search(text)):
             self._print_line(text)
 

@@ -124,11 +124,12 @@ def test_leftovers_of_killed_processes_are_removed(tmp_path):
     path = tmp_path / "a[1].json"
     child = subprocess.Popen(["true"])
     child.wait()
-    dead, alive = (tmp_path / f".{path.name}.{pid}.part" for pid in (child.pid, 1))
-    dead.write_text("half")
-    alive.write_text("half")
+    places = ((files._HOST, child.pid), (files._HOST, 1), ("0" * 8, child.pid))
+    dead, alive, elsewhere = (tmp_path / f".{path.name}.{host}.{pid}.part" for host, pid in places)
+    for part in (dead, alive, elsewhere):
+        part.write_text("half")
     write_json(path, {"whole": 1})
-    assert leftovers(tmp_path) == [alive.name]
+    assert sorted(leftovers(tmp_path)) == sorted([alive.name, elsewhere.name])
 
 
 def test_every_flipped_bit_of_an_npz_is_detected_or_harmless(tmp_path):

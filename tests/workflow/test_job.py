@@ -5,6 +5,9 @@ import sys
 
 import pytest
 
+from hobble.core.errors import InputError
+from hobble.workflow.job import with_true_advice
+
 SCRIPT = """
 from types import SimpleNamespace
 from hobble.core.errors import InputError
@@ -48,3 +51,26 @@ def test_a_bug_writes_its_traceback_only_to_the_log(tmp_path) -> None:
     text = path.read_text()
     assert "words for the log" in text
     assert "Traceback" in text
+
+
+@pytest.mark.parametrize(
+    ("path", "advice"),
+    [
+        (
+            "results/d/database/plain/statistics.npz",
+            "Delete results/d/database/plain; the same command makes it",
+        ),
+        (
+            "results/c/network/weights.npz",
+            "Delete results/c/network/weights.npz; the same command makes it again.",
+        ),
+        ("data/heights.npz", "Replace it by a good copy."),
+        ("results/c/checkpoints/0/checkpoint.npz", "Delete it; the next run makes it again."),
+    ],
+)
+def test_the_advice_to_delete_names_what_a_rule_makes(path: str, advice: str) -> None:
+    inputs = ["results/d/database/plain", "results/c/network/weights.npz", "data/heights.npz"]
+    error = InputError(path, "damaged", line=3, fix="Delete it; the next run makes it again.")
+    assert str(with_true_advice(error, inputs)).startswith(f"{path}, line 3: damaged. {advice}")
+    other = InputError(path, "too short", fix="Use a longer clip.")
+    assert with_true_advice(other, inputs) is other

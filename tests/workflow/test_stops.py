@@ -6,6 +6,7 @@ import os
 import shutil
 import signal
 import subprocess
+import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -117,6 +118,41 @@ def test_a_second_run_is_refused_while_the_first_runs(copied) -> None:
     os.kill(process.pid, signal.SIGTERM)
     assert process.wait(timeout=5) == 1  # jobs that ignore SIGTERM are killed
     assert not running(jobs)
+
+
+KILLED_AT = """
+import os, signal, sys
+left = int(sys.argv.pop(1))
+
+def count(event, arguments):
+    global left
+    in_folder = event in ("open", "os.mkdir", "os.rename", "os.remove") and ".snakemake" in str(arguments[0])
+    left -= in_folder or event == "fcntl.flock"
+    if left == 0:
+        os.kill(os.getpid(), signal.SIGKILL)
+
+sys.addaudithook(count)
+from snakemake.cli import main
+main(sys.argv[1:])
+"""
+
+
+@pytest.mark.slow
+def test_a_kill_at_any_step_before_the_first_job_leaves_no_lock(workflow) -> None:
+    """The run is killed at its first step in its folder, its second, ..., until one gets past all of them."""
+    target, step, status = "results/datasets/tiny/terrain/patches.npz", 0, -signal.SIGKILL
+    while status == -signal.SIGKILL:
+        step += 1
+        command = [sys.executable, "-c", KILLED_AT, str(step), "-c1", target]
+        done = subprocess.run(command, cwd=workflow.folder, env=workflow.environment(), capture_output=True)
+        status = done.returncode
+        lock = workflow.folder / ".snakemake/run.lock"
+        if lock.exists():
+            subprocess.run(["flock", "--nonblock", str(lock), "true"], check=True)
+        if (workflow.folder / target).exists():
+            break
+    assert step > 5
+    assert "Nothing to be done" in workflow.run("-c1", target)
 
 
 def test_after_touch_of_every_file_nothing_runs_again(copied) -> None:

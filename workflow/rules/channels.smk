@@ -1,8 +1,3 @@
-def channel_files(dataset, clip, channel):
-    """The files that a channel reads for a clip."""
-    return datasets.channel_sources.files(dataset, clip, channel)
-
-
 rule channel_clips:
     """The values of the data set's channels in each frame of clips and of their mirrors."""
     input:
@@ -37,6 +32,7 @@ rule channel_clips:
             for channel in batches.channels(batch_of(w))
             for clip in batch_of(w).clips
         ],
+        contents=contents_of,
         mirrored=lambda w: batch_of(w).mirrored,
     script:
         "../scripts/channel_clips.py"

@@ -1,12 +1,20 @@
 # What the rules share. In functions of rules, `w` holds the job's wildcards. `project` is made in the Snakefile.
 from hobble.channels import channel_packages, display_modules
 from hobble.measures.measure import all_measures
+from hobble.workflow.clips import channels_of_folder
+from hobble.workflow.contents import Contents
 from hobble.workflow.demands import Demands
 
 catalogue, clips, datasets = project.catalogue, project.clips, project.datasets
 batches, demands, package = project.batches, Demands(project), project.package
 configurations, measurements = project.configurations, project.measurements
 comparison = project.comparison
+contents = Contents(project.base / "data" / "downloaded")
+
+
+def contents_of(w, input):
+    """A param: hashes of the user's files among a job's inputs, see hobble.workflow.contents."""
+    return contents.of(input)
 
 
 wildcard_constraints:
@@ -49,3 +57,36 @@ def memory(stage):
 def minutes(stage):
     """A resource function: the minutes of a batch's job."""
     return lambda w, attempt: demands.batch_minutes(stage, batch_of(w), attempt)
+
+
+def motion_files(dataset, clip):
+    """The clip's BVH file, and the file of its rig if this is not the data set's skeleton."""
+    return {
+        "bvh": clips.source(dataset, clip),
+        "rigs": clips.clip_skeleton_files(dataset, clip),
+    }
+
+
+def channel_files(dataset, clip, channel):
+    """The files that a channel reads for a clip."""
+    return datasets.channel_sources.files(dataset, clip, channel)
+
+
+def splits_of(w):
+    """Clip -> "train" or "held_out", for the clips of a database."""
+    return datasets.splits(w.dataset, channels_of_folder(w.channels))
+
+
+def compared_clips(w):
+    """The clips that are compared with the others, so that no motion is both trained on and held out."""
+    names = datasets.clips_to_compare(w.dataset, channels_of_folder(w.channels))
+    splits = splits_of(w)
+    return [name for name in names if name in splits]
+
+
+def rows_and_compared(w):
+    """The folders with the rows of a database's clips, and those with the motion that is compared."""
+    return [
+        *batches.folders(w.dataset, splits_of(w), "database"),
+        *batches.folders(w.dataset, compared_clips(w), "motion"),
+    ]

@@ -1,5 +1,4 @@
 from hobble.database.options import Merging, RowOptions
-from hobble.workflow.clips import channels_of_folder
 
 
 rule database_clips:
@@ -25,26 +24,6 @@ rule database_clips:
         ),
     script:
         "../scripts/database_clips.py"
-
-
-def splits_of(w):
-    """Clip -> "train" or "held_out", for the clips of a database."""
-    return datasets.splits(w.dataset, channels_of_folder(w.channels))
-
-
-def compared_clips(w):
-    """The clips that are compared with the others, so that no motion is both trained on and held out."""
-    names = datasets.clips_to_compare(w.dataset, channels_of_folder(w.channels))
-    splits = splits_of(w)
-    return [name for name in names if name in splits]
-
-
-def rows_and_compared(w):
-    """The folders with the rows of a database's clips, and those with the motion that is compared."""
-    return [
-        *batches.folders(w.dataset, splits_of(w), "database"),
-        *batches.folders(w.dataset, compared_clips(w), "motion"),
-    ]
 
 
 rule database_merge:

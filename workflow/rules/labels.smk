@@ -28,6 +28,7 @@ rule labels_clips:
             }
             for clip in batch_of(w).clips
         ],
+        contents=contents_of,
         mirrored=lambda w: batch_of(w).mirrored,
         options=lambda w: datasets.options(w.dataset, "labels"),
         code=lambda w: package.code("labels_clips"),
@@ -44,7 +45,12 @@ rule look_page:
             w.dataset, clips.listed_entries(w.dataset), "motion", "labels", "channels"
         ),
     output:
-        html="results/datasets/{dataset}/look.html",
+        html=report(
+            "results/datasets/{dataset}/look.html",
+            caption="../report/look.rst",
+            category="Data sets",
+            labels={"data set": "{dataset}"},
+        ),
     log:
         "results/datasets/{dataset}/logs/labels/look_page.log",
     resources:

@@ -17,14 +17,6 @@ rule download_clip:
         "../scripts/download_clip.py"
 
 
-def motion_files(dataset, clip):
-    """The clip's BVH file, and the file of its rig if this is not the data set's skeleton."""
-    return {
-        "bvh": clips.source(dataset, clip),
-        "rigs": clips.clip_skeleton_files(dataset, clip),
-    }
-
-
 rule motion_clips:
     """Clips made from BVH files: checked, retargeted to the data set's skeleton, at 60 Hz. Also their mirrors."""
     input:
@@ -57,6 +49,7 @@ rule motion_clips:
             }
             for clip in batch_of(w).clips
         ],
+        contents=contents_of,
         mirrored=lambda w: batch_of(w).mirrored,
         skeleton_name=lambda w: catalogue.dataset(w.dataset).skeleton,
         # The folder of skeleton files. They map the joints of one rig to those of another.

@@ -75,7 +75,12 @@ rule report:
         template=keep_local(package.template_files()),
         bundle=rules.page_bundle.output.js,
     output:
-        html="results/{configuration}/report.html",
+        html=report(
+            "results/{configuration}/report.html",
+            caption="../report/report.rst",
+            category="Characters",
+            labels={"configuration": "{configuration}"},
+        ),
     log:
         "results/{configuration}/logs/report/report.log",
     benchmark:
@@ -116,7 +121,11 @@ rule report_compare:
         template=keep_local(package.template_files()),
         bundle=rules.page_bundle.output.js,
     output:
-        html="results/compare/report.html",
+        html=report(
+            "results/compare/report.html",
+            caption="../report/compare.rst",
+            category="Comparison",
+        ),
     log:
         "results/compare/logs/report/report_compare.log",
     resources:
@@ -212,7 +221,12 @@ rule limp_picture:
     input:
         weights=lambda w: configurations.network(w.configuration, "weights.npz"),
     output:
-        picture="results/{configuration}/limp.webp",
+        picture=report(
+            "results/{configuration}/limp.webp",
+            caption="../report/limp.rst",
+            category="Characters",
+            labels={"configuration": "{configuration}"},
+        ),
     log:
         "results/{configuration}/logs/report/limp_picture.log",
     benchmark:

@@ -15,6 +15,7 @@ rule terrain_patches:
         mem_mb=2000,
         runtime=10,
     params:
+        contents=contents_of,
         options=lambda w: datasets.options_of_class(w.dataset, "terrain", PatchOptions),
         code=lambda w: package.code("terrain_patches"),
     script:

@@ -12,6 +12,7 @@ import glob
 import io
 import json
 import os
+import platform
 import struct
 import zipfile
 import zlib
@@ -32,6 +33,7 @@ Json = Mapping[str, Any]  # what a JSON file holds
 # The compressed arrays of a file may together unpack to at most this. Hobble itself does not compress arrays.
 MAX_INFLATED_BYTES = 1 << 30
 MAX_JSON_BYTES = 1 << 30
+_HOST = f"{zlib.crc32(platform.node().encode()):08x}"  # this machine, in the names of temporary files
 DELETE_IT = "Delete it; the next run makes it again."
 # Version of the npy format -> NumPy's function that reads the header of an array in this version.
 HEADER_READERS = {
@@ -61,7 +63,7 @@ def atomic_path(path: str | Path) -> Iterator[Path]:
     cannot be written.
     """
     path = Path(path)
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
+    temporary = path.with_name(f".{path.name}.{_HOST}.{os.getpid()}.part")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         _remove_leftovers(path)
@@ -91,8 +93,10 @@ def _remove_leftovers(path: Path) -> None:
     """Remove the unfinished temporary files of `path` that killed processes left."""
     for left in path.parent.glob(f".{glob.escape(path.name)}.*.part"):
         try:
-            # The name contains the process id. Signal 0 only asks whether the process exists.
-            os.kill(int(left.name.split(".")[-2]), 0)
+            # The name contains the machine and the process id. Another machine may still be writing.
+            host, pid = left.name.split(".")[-3:-1]
+            if host == _HOST:
+                os.kill(int(pid), 0)  # signal 0 only asks whether the process exists
         except ProcessLookupError:
             left.unlink(missing_ok=True)
         except (ValueError, OSError):

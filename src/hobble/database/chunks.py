@@ -64,7 +64,7 @@ LENGTH = 8  # bytes of the number, at the start of the file, that says how long 
 MOST_PARTS = 16  # one call of `preadv` fills at most this many buffers; every POSIX system allows so many
 # NumPy's name of a type -> its name in safetensors. NumPy has no bfloat16, so uint16 numbers hold its bits.
 TYPES = {"<f2": "F16", "<u2": "BF16", "<f4": "F32", "<i4": "I32"}
-HINT = "Delete the folder of the database. The next run makes it again."
+HINT = "Delete the folder of the database; the next run makes it again."
 
 
 @dataclass(frozen=True)

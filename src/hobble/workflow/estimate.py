@@ -11,6 +11,7 @@ from typing import Any
 
 from hobble.core.errors import HobbleError
 from hobble.workflow.demands import Demands
+from hobble.workflow.project import Project
 
 # Seconds of a step of training for each parameter of a network, and for each sample and parameter, on two
 # quiet cores of an AMD EPYC 9005: 10,200 samples a second at a batch of 32, 35,600 at 256, 2.4 million
@@ -21,9 +22,13 @@ FAST = "fast"  # the configuration with the recipe that is named if it is much f
 LONG_SECONDS = 300.0  # for a training that takes longer than this
 
 
-def sentences_about_trainings(demands: Demands, names: Sequence[str]) -> list[str]:
-    """How long trainings take, a sentence for each configuration, with a faster recipe for a long one."""
-    catalogue, sentences = demands.project.catalogue, []
+def sentences_about_plan(project: Project, jobs: Sequence[tuple[str, Mapping[str, str]]]) -> list[str]:
+    """How long the trainings of a plan take, a sentence each, with a faster recipe for a long one.
+
+    jobs: rule and wildcards of each job.
+    """
+    names = [wildcards["configuration"] for rule, wildcards in jobs if rule == "training"]
+    demands, catalogue, sentences = Demands(project), project.catalogue, []
     measured = slowness(demands)
     fast = (
         catalogue.configuration(FAST).training.model_dump() if FAST in catalogue.names() and names else None
@@ -67,7 +72,8 @@ def _range(seconds: float, measured: float | None) -> str:
     """A time as text: for a machine that has trained before, or from the fastest to the slowest known one."""
     if measured:
         return f"about {_minutes(seconds * measured)} min"
-    return f"{_minutes(seconds)} to {_minutes(seconds * SLOWEST)} min on two quiet cores"
+    fastest, slowest = _minutes(seconds), _minutes(seconds * SLOWEST)
+    return f"{fastest} min" if fastest == slowest else f"{fastest} to {slowest} min on two quiet cores"
 
 
 def _minutes(seconds: float) -> int:

@@ -25,6 +25,7 @@ from typing import TYPE_CHECKING, Any
 from hobble.core.errors import HobbleError, InputError, unforeseen
 from hobble.core.files import failed_write_error, write_text
 from hobble.workflow.clips import MIRROR_SUFFIX, original
+from hobble.workflow.contents import stamp
 from hobble.workflow.lifetime import ends_with_run
 
 if TYPE_CHECKING:
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
 # The disk is full, a quota is used up, or the disk is read-only. Every other clip would fail, too.
 DISK_ERRORS = (errno.ENOSPC, errno.EDQUOT, errno.EROFS)
 CLOCK_TICK = 0.02  # seconds; two writes that are this far apart get different modification times
+DELETE = "Delete"  # with this word begins every advice to delete a damaged file
 RECORDS = ".made"  # folder in that of a data set; see `make_each`
 
 
@@ -78,7 +80,7 @@ class Inputs:
         raise InputError(
             name,
             "is missing in the folder of its batch",
-            fix="Delete that folder in batches/; the next run makes it again.",
+            fix="Delete that folder in batches/; the same command makes it again.",
         )
 
     def each(self, name: str, clips: Iterable[str]) -> dict[str, str]:
@@ -183,8 +185,10 @@ class _Maker:
     ) -> None:
         self.make_files, self.reads, self.writes, self.folder = make, reads, writes, folder
         self.root = folder.parents[2]  # the folder of the data set
-        self.records = self.root / RECORDS / snakemake.rule
-        self.params = {name: value for name, value in snakemake.params.items() if name != "clips"}
+        self.records = self.root / RECORDS / Path(snakemake.log[0]).parent.name
+        self.params = {
+            name: value for name, value in snakemake.params.items() if name not in ("clips", "contents")
+        }
         self.inputs = Inputs(snakemake.input)
         self.shared = {
             name: file for name, file in snakemake.input.items() if name not in ("batches", "files")
@@ -294,31 +298,30 @@ def _link(source: Path, target: Path) -> None:
         raise failed_write_error(error, target) from error
 
 
-def _stamps(paths: Iterable[str]) -> dict[str, tuple[int, int, int]]:
-    """Path -> modification time (ns), size and inode, for those of the files that exist."""
+def _stamps(paths: Iterable[str]) -> dict[str, tuple[int, ...]]:
+    """Path -> `hobble.workflow.contents.stamp`, for those of the files that exist."""
     out = {}
     for path in paths:
         if os.path.isfile(path):
             # Wait if the file was written just now, because another write could get the same time.
             if 0 <= time.time() - os.stat(path).st_mtime < CLOCK_TICK:
                 time.sleep(CLOCK_TICK)
-            status = os.stat(path)
-            out[path] = (status.st_mtime_ns, status.st_size, status.st_ino)
+            out[path] = tuple(stamp(path))
     return out
 
 
 def _check_unchanged(before: Mapping[str, Any]) -> None:
     """Raise InputError for a file that was changed, replaced or deleted since `_stamps` returned `before`."""
     now = _stamps(before)
-    for path, stamp in before.items():
-        if now.get(path) != stamp:
+    for path, earlier in before.items():
+        if now.get(path) != earlier:
             raise InputError(path, "changed while it was being read", fix="Run the same command again.")
 
 
 @contextlib.contextmanager
 def _logged(snakemake: Any) -> Iterator[_Log]:
     """Run a script with a log. An error is reported and ends the process with status 1."""
-    log = _Log(str(snakemake.log[0]), snakemake.rule)
+    log = _Log(str(snakemake.log[0]), snakemake.rule, list(map(str, getattr(snakemake, "input", ()))))
     try:
         with ends_with_run():
             yield log
@@ -332,11 +335,12 @@ def _logged(snakemake: Any) -> Iterator[_Log]:
 class _Log:
     """Writes a job's messages to its log file, and warnings and errors also to the terminal.
 
-    path: the log file. rule: name of the rule, with which each message on the terminal begins.
+    path: the log file. rule: name of the rule, with which each message on the terminal begins. inputs: the
+    paths of the job's input files and folders.
     """
 
-    def __init__(self, path: str, rule: str) -> None:
-        self.path = path
+    def __init__(self, path: str, rule: str, inputs: list[str]) -> None:
+        self.path, self.inputs = path, inputs
         with contextlib.suppress(OSError):
             os.makedirs(os.path.dirname(path) or ".", exist_ok=True)
             open(path, "w").close()  # empty the log of an earlier try
@@ -359,7 +363,7 @@ class _Log:
         says everything that a user needs.
         """
         if isinstance(error, HobbleError):
-            self.logger.error("%s", error)
+            self.logger.error("%s", with_true_advice(error, self.inputs))
         elif isinstance(error, MemoryError):
             self.logger.error("out of memory. Give the job more memory, or use a smaller data set or batch.")
         else:
@@ -371,6 +375,22 @@ class _Log:
             self.logger.removeHandler(self.terminal)  # the traceback goes only to the file
             self.logger.error("%s", "".join(traceback.format_exception(error)))
             self.logger.addHandler(self.terminal)
+
+
+def with_true_advice(error: HobbleError, inputs: Iterable[str]) -> HobbleError:
+    """The error with advice that helps in a run, if its advice was to delete a damaged file.
+
+    A rule makes its whole output again only if all of it is gone, and the output may be a folder. A file that
+    no rule has made must be replaced. inputs: the paths of the job's input files and folders.
+    """
+    if not isinstance(error, InputError) or DELETE not in (error.fix or ""):
+        return error
+    path = os.path.normpath(error.path)
+    made = [given for given in inputs if "results/" in given and f"{path}/".startswith(f"{given}/")]
+    if not made and "results/" in path:
+        return error
+    fix = f"Delete {made[0]}; the same command makes it again." if made else "Replace it by a good copy."
+    return InputError(error.path, error.problem, line=error.line, frame=error.frame, fix=fix)
 
 
 class _LogFile(logging.FileHandler):

@@ -48,17 +48,25 @@ def ensure_user_name() -> None:
         os.environ["USER"] = str(os.getuid())
 
 
+def check_writable(path: Path = LOCK) -> int:
+    """Open the file of the lock. It stays open, and jobs do not inherit it. Returns its number.
+
+    Raises InputError if the folder of the run cannot be written, where Snakemake would print a traceback.
+    """
+    try:
+        path.parent.mkdir(exist_ok=True)
+        return os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
+    except OSError as error:
+        fix = "Work in a folder of your own (--directory FOLDER), or ask the owner for permission."
+        raise InputError(path.parent, f"cannot be written: {error.strerror}", fix=fix) from None
+
+
 def lock(path: Path = LOCK) -> None:
     """Let only one run work in this folder at a time. The lock ends with this process, however it ends.
 
     Raises HobbleError if another run has the lock, and InputError if the folder cannot be written.
     """
-    try:
-        path.parent.mkdir(exist_ok=True)
-        handle = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)  # stays open; jobs do not inherit it
-    except OSError as error:
-        fix = "Work in a clone of your own, or ask the owner of this folder for permission."
-        raise InputError(path, f"cannot be written: {error.strerror}", fix=fix) from None
+    handle = check_writable(path)
     try:
         fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, get_args
 from hobble.channels import all_channels
 from hobble.config.sections import PhaseMode
 from hobble.core.errors import HobbleError, InputError
+from hobble.workflow import lifetime
 from hobble.workflow.configurations import COMPARE
 from hobble.workflow.project import Project
 
@@ -37,6 +38,7 @@ def open_project(workflow: Any, config: Mapping[str, Any], words: Sequence[str],
     # Params of rules contain this path. It is relative, so that no job runs again after a checkout is moved.
     project = Project(Path(os.path.relpath(base)), config)
     if workflow.is_main_process:
+        lifetime.check_writable()
         if files := workflow.overwrite_configfiles:
             raise HobbleError(
                 f"--configfile {Path(files[0]).name} would put its values into every configuration, so that "

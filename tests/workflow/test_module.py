@@ -1,0 +1,52 @@
+"""Another workflow imports this one as a module; `snakemake --report` and `--lint`."""
+
+from __future__ import annotations
+
+import subprocess
+
+import pytest
+
+pytestmark = [pytest.mark.workflow, pytest.mark.slow]
+IMPORTING = """
+module hobble:
+    snakefile: "{checkout}/workflow/Snakefile"
+    config: {{}}
+    {prefix}
+
+use rule * from hobble as hobble_*
+
+rule mine:
+    default_target: True
+    input: "{place}results/test/pipeline.json"
+"""
+
+
+@pytest.mark.parametrize("place", ["", "walkers/"])
+def test_a_module_makes_the_same_in_its_place(workflow, finished, tmp_path, place: str) -> None:
+    prefix = f'prefix: "{place}"' if place else ""
+    text = IMPORTING.format(checkout=workflow.checkout, prefix=prefix, place=place)
+    (tmp_path / "Snakefile").write_text(text)
+    motion = f"{place}results/datasets/tiny/batches/motion/uneven-1"
+    for target in ("-n", motion):
+        done = subprocess.run(
+            workflow.command("-c2", target),
+            cwd=tmp_path,
+            env=workflow.environment(),
+            capture_output=True,
+            text=True,
+        )
+        assert done.returncode == 0, done.stderr
+    assert (tmp_path / motion / "motion/uneven-1.npz").read_bytes() == (
+        finished.folder / "results/datasets/tiny/motion/uneven-1.npz"
+    ).read_bytes()
+
+
+def test_snakemakes_own_report_shows_the_pages(copied) -> None:
+    copied.run("--report", "own.html", "results/test/report.html")
+    text = (copied.folder / "own.html").read_text()
+    assert "results/test/report.html" in text
+    assert "a character to steer and to hurt" in text
+
+
+def test_lint_has_nothing_to_say(workflow) -> None:
+    assert "Lints for" not in workflow.run("--lint")
