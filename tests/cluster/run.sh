@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# The `test` configuration through a real SLURM of one node, with two jobs killed on the way: tests/cluster/run.sh
+# The `test` configuration through a real SLURM of one node; snakemake and two jobs are killed on the way: tests/cluster/run.sh
 # Installs slurm-wlm and munge where they are missing (root, apt-get), and the extra `cluster` beside the environment;
 # starts the daemons on loopback; ends all that it started. Status 0: the results are those of a local run, bit for bit.
 # Status 77: it cannot be tried on this machine, and why.
@@ -73,6 +73,17 @@ echo "import site; site.addsitedir('$site')" >"$("$folder/venv/bin/python" -c \
     --constraint "$root/constraints.txt" snakemake-executor-plugin-slurm || fail "the plugin cannot be installed"
 slurm_up "$folder/node" || exit 77
 say "SLURM $(slurmctld -V | awk '{print $2}') is up on one node, memory and time of jobs enforced"
+
+# The machine where snakemake runs dies, and its jobs live on and write while the same command starts them again.
+setsid "${through_slurm[@]}" >"$log" 2>&1 &
+head=$!
+running+=("$head")
+until [ -n "$(squeue -h -t R -o '%k' | grep -E 'motion|terrain|labels')" ]; do
+    kill -0 "$head" 2>/dev/null || fail "it ended before it could be killed"
+    sleep 0.05
+done
+kill -KILL -- "-$head"
+say "killed snakemake itself while $(squeue -h | wc -l) of its jobs run or wait"
 
 setsid "${through_slurm[@]}" >"$log" 2>&1 &
 cluster=$!
