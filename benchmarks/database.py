@@ -205,11 +205,11 @@ def training(folder: Path, memory_mb: int, rounds: int) -> None:
     order alternates from round to round. So other work on the machine affects both equally, and neither
     profits from what the other has read.
     """
-    from hobble.config.sections import Training
     from hobble.models.pfnn import PfnnOptions
     from hobble.training.batches import HostRows
     from hobble.training.checkpoint import new_state, step_for, use_threads
     from hobble.training.optimiser import update_for
+    from hobble.training.options import Training
 
     use_threads(int(os.environ.get("OMP_NUM_THREADS", "2")))
     options = Training(memory_mb=memory_mb)

@@ -27,7 +27,6 @@ import hobble.training  # noqa: F401 - first, since it says how threads wait
 import torch
 import yaml
 
-from hobble.config.sections import Training
 from hobble.database.reader import Database
 from hobble.measures.responsivity_run import measure_responsivity
 from hobble.measures.rollouts_run import measure_roll_outs
@@ -36,6 +35,7 @@ from hobble.models.pfnn import PfnnOptions
 from hobble.runtime.options import Runtime
 from hobble.runtime.waypoints import TRACK, Waypoint
 from hobble.training.batches import HeldOutErrors
+from hobble.training.options import Training
 from hobble.training.run import write_weights
 from hobble.training.train import train
 

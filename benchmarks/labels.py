@@ -14,16 +14,17 @@ from pathlib import Path
 
 import yaml
 
-from hobble.config.sections import LabelOptions, Synthetic
 from hobble.core.clip import Clip, load_clip
 from hobble.core.processors import processor_name
 from hobble.labels.contacts import find_contacts, find_stance_contacts
 from hobble.labels.footfall import find_landings, find_swings
 from hobble.labels.gait import automatic_gait
 from hobble.labels.label import label_clip
+from hobble.labels.options import LabelOptions
 from hobble.motion.make import make_clip
 from hobble.motion.options import ClipMotion
 from hobble.synthetic.generate_clip import write_clip
+from hobble.synthetic.options import Synthetic
 
 ROOT = Path(__file__).resolve().parents[1]
 

@@ -16,11 +16,11 @@ from pathlib import Path
 
 import numpy as np
 
-from hobble.config.sections import Training
 from hobble.database.chunks import Manifest
 from hobble.database.write import write_database
 from hobble.measures.accuracy_run import measure_accuracy
 from hobble.models.pfnn import PfnnOptions
+from hobble.training.options import Training
 from hobble.training.run import run
 
 DTYPES = ("float32", "float16", "bfloat16")

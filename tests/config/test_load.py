@@ -223,7 +223,7 @@ def test_shipped_configurations_are_the_published_ones(root: Path) -> None:
     hurried = Catalogue(root / "config", {"training": "fast"}).configuration("holden-xt").training
     assert hurried == catalogue.configuration("fast").training != t
     assert catalogue.configuration("ava-m").network_of == "ava"
-    assert catalogue.configuration("injured").channels == ("injury",)
+    assert "injury" in catalogue.configuration("injured").channels
     assert catalogue.dataset("synthetic").terrain.fits == 10
     assert catalogue.dataset("synthetic").synthetic.frames == 12_795
 

@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 import yaml
 
-from hobble.config.sections import Synthetic
 from hobble.core.clip import Clip
 from hobble.labels.clip_labels import Labels
 from hobble.labels.label import label_clip
@@ -19,6 +18,7 @@ from hobble.labels.options import LabelOptions as Options
 from hobble.motion.make import make_clip
 from hobble.motion.options import ClipMotion
 from hobble.synthetic.generate_clip import write_clip
+from hobble.synthetic.options import Synthetic
 
 SUFFIXES = (".phase", ".gait", "_footsteps.txt", "_gait.txt")
 PFNN = ["pfnn/LocomotionFlat04_000", "pfnn/LocomotionFlat09_000"]

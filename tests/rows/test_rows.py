@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from hobble.config import sections
 from hobble.config.load_configuration import Catalogue
 from hobble.core import quat
 from hobble.core.clip import Clip
 from hobble.core.errors import InputError
 from hobble.core.skeleton import Skeleton
 from hobble.labels.label import label_clip
+from hobble.labels.options import LabelOptions
 from hobble.motion.make import make_clip
 from hobble.motion.options import ClipMotion
 from hobble.rows.build_rows import build_clip_rows, cycle_frames, cycle_phase, phase_change
@@ -23,7 +23,7 @@ from hobble.rows.clip_rows import ClipRows, pair_batches
 from hobble.rows.layout import GAITS, RowLayout
 from hobble.terrain.clip_fits import clip_fits
 from hobble.terrain.heightmaps import TerrainMap
-from hobble.terrain.options import HeightSampling
+from hobble.terrain.options import HeightSampling, Terrain
 from hobble.terrain.patches import draw_patches
 
 NAME = "LocomotionFlat09_000"
@@ -70,14 +70,14 @@ def rows_as_configured(shared: Path, root: Path, margins: str = "drop", **terrai
         ClipMotion(**options("motion")),
     )
     files = [folder / f"{NAME}{end}" for end in (".phase", ".gait", "_footsteps.txt", "_gait.txt")]
-    labelling = sections.LabelOptions.model_validate(options("labels", margins=margins))
+    labelling = LabelOptions.model_validate(options("labels", margins=margins))
     labels = vars(label_clip(clip, files, report, "walk", "flat", labelling)[0])
     ground, database = options("terrain", **terrain), options("database")
     any_map = TerrainMap("any", np.zeros((200, 200)), ground["cell"])
     drawn = {name: ground[name] for name in ("cell", "size", "highest", "seed")}
     patches = draw_patches([any_map], count=10, **drawn)
     sampling = HeightSampling(**{name: database[name] for name in HeightSampling.model_fields})
-    fits = clip_fits(clip, labels, patches, "flat", sections.Terrain(**ground), sampling)
+    fits = clip_fits(clip, labels, patches, "flat", Terrain(**ground), sampling)
     severity = np.zeros((len(clip), len(clip.skeleton.links)), np.float32)
     window = {name: database[name] for name in OPTIONS}
     return build_clip_rows(NAME, clip, labels, {"injury": severity}, vars(fits), **window)

@@ -9,11 +9,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from hobble.config.sections import DatabaseOptions, HeightmapOptions, Terrain
 from hobble.core.clip import Clip
 from hobble.core.skeleton import Skeleton
+from hobble.database.options import DatabaseOptions
 from hobble.terrain.heightmaps import heightmaps
-from hobble.terrain.options import HeightSampling
+from hobble.terrain.options import HeightmapOptions, HeightSampling, Terrain
 from hobble.terrain.patches import Patches, draw_patches
 
 CELL = 3.937007874

@@ -214,9 +214,10 @@ def test_clips_can_be_fitted_to_the_heightmap_of_the_original(shared: Path, made
 @pytest.mark.shared
 def test_real_clips_stand_on_the_fitted_ground(shared: Path, root: Path, made: SimpleNamespace) -> None:
     """Uneven ground, a limp, and the original's own flat clip, whose ground stays at zero."""
-    from hobble.config.sections import LabelOptions, Terrain
     from hobble.labels.label import label_clip
+    from hobble.labels.options import LabelOptions
     from hobble.motion.make import make_clip
+    from hobble.terrain.options import Terrain
 
     patches = made.patches(2_000)
     terrain = Terrain()

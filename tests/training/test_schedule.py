@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 import torch
 
-from hobble.config.sections import Training
 from hobble.database.reader import Database
 from hobble.training.batches import HostRows
 from hobble.training.optimiser import Adam
+from hobble.training.options import Training
 from hobble.training.train import train
 
 Settings = dict[str, Any]

@@ -3,33 +3,36 @@
 from __future__ import annotations
 
 import functools
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import AfterValidator, Field, create_model, field_validator, model_validator
 
-from hobble.channels import CHANNEL_NAMES, all_channels, channel
-from hobble.config import sections as s
+from hobble.channels import CHANNEL_NAMES, channel
 from hobble.core.clip_files import CLIP_NAME_RULE, is_valid_clip_name
+from hobble.core.section import Finite, Gait, Ground, Positive, PositiveFloat, RelativePath, Section
+from hobble.database.options import DatabaseOptions
+from hobble.hurt.options import Hurt
+from hobble.labels.options import LabelOptions
+from hobble.measures.measure import all_measures, joined_options
 from hobble.models import DEFAULT_KIND, options_of_kind
 from hobble.models.model import Options
+from hobble.motion.options import Download, MotionOptions
+from hobble.report import ReportOptions
+from hobble.runtime.options import Runtime
+from hobble.synthetic.options import Synthetic
+from hobble.terrain.options import Terrain
+from hobble.training.options import Training
+
+if TYPE_CHECKING:  # a type checker cannot follow the class that is made below
+    Evaluation = Section
+else:
+    Evaluation = joined_options([measure.options for measure in all_measures()])
 
 
 def _check_clip_name(name: str) -> str:
     if not is_valid_clip_name(name):
         raise ValueError(f"a clip's name must have {CLIP_NAME_RULE}")
     return name
-
-
-def _refuse_old_keys(values: Any, model: type[s.Section], how: str) -> Any:
-    """Raise ValueError if a section has a key that is in OLD_KEYS and not in its model.
-
-    values: the section before validation. model: the section's model. how: what to write instead of the key,
-    with {} for the channel's name. Returns `values`.
-    """
-    for key in values if isinstance(values, dict) else ():
-        if key not in model.model_fields and isinstance(key, str) and key in OLD_KEYS:
-            raise ValueError(f"`{key}` is now `{how.format(OLD_KEYS[key])}`")
-    return values
 
 
 def _check_channel_name(name: str) -> str:
@@ -41,17 +44,15 @@ def _check_channel_name(name: str) -> str:
 Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,99}$")]
 ClipName = Annotated[str, AfterValidator(_check_clip_name)]
 ChannelName = Annotated[str, AfterValidator(_check_channel_name)]
-# Key of older files -> name of the channel that replaces it.
-OLD_KEYS = {key: each.name for each in all_channels() for key in each.old_keys}
 # Keys of a clip's entry that only the generator of synthetic clips reads.
 GENERATOR_KEYS = ("recipe", "share")
 
 
-class ClipEntry(s.Section):
+class ClipEntry(Section):
     """The entry of one clip in a data set."""
 
-    gait: s.Gait | None = Field(None, description="the main gait of the clip, for automatic labels")
-    ground: s.Ground = "flat"
+    gait: Gait | None = Field(None, description="the main gait of the clip, for automatic labels")
+    ground: Ground = "flat"
     channels: dict[ChannelName, Any] = Field({}, description="channel -> its value in all frames of the clip")
     person: Name | None = Field(
         None, description="who walks; needed by measurements that leave out all clips of a person"
@@ -61,23 +62,18 @@ class ClipEntry(s.Section):
         description="for synthetic clips: what the generated walker does, a key of "
         "`hobble.synthetic.plan.RECIPES`",
     )
-    share: s.PositiveFloat = Field(1.0, description="for synthetic clips: length relative to the other clips")
-    source_fps: s.PositiveFloat | None = Field(None, description="overrides the file's Frame Time")
+    share: PositiveFloat = Field(1.0, description="for synthetic clips: length relative to the other clips")
+    source_fps: PositiveFloat | None = Field(None, description="overrides the file's Frame Time")
     hurt: Annotated[float, Field(ge=0, le=9, allow_inf_nan=False)] | None = Field(
         None,
         description="total length of the clip's hurt versions, as a multiple of the clip's length; overrides "
         "`hurt.versions` and `hurt.longest` of the data set",
     )
-    loops: s.Positive | None = Field(None, description="overrides motion.loops")
-    heading: s.Finite | None = Field(None, description="overrides motion.heading")
-
-    @model_validator(mode="before")
-    @classmethod
-    def _no_old_keys(cls, values: Any) -> Any:
-        return _refuse_old_keys(values, cls, "channels: {{{}: ...}}")
+    loops: Positive | None = Field(None, description="overrides motion.loops")
+    heading: Finite | None = Field(None, description="overrides motion.heading")
 
 
-class Dataset(s.Section):
+class Dataset(Section):
     """Clips, their skeleton, and how a database is made from them."""
 
     extends: Name | None = None
@@ -85,12 +81,8 @@ class Dataset(s.Section):
     source: Name | None = Field(
         None, description="use the generated or downloaded BVH files of this data set"
     )
-    folder: s.RelativePath | None = Field(
-        None, description="folder of the BVH files, inside the mocap folder"
-    )
-    download: s.Download | None = Field(
-        None, description="where to download clips that are not in the folder"
-    )
+    folder: RelativePath | None = Field(None, description="folder of the BVH files, inside the mocap folder")
+    download: Download | None = Field(None, description="where to download clips that are not in the folder")
     clips: dict[ClipName, ClipEntry | None] = Field(
         default_factory=dict, description="clips by name; empty: every .bvh in the folder and its subfolders"
     )
@@ -101,14 +93,14 @@ class Dataset(s.Section):
     channels: dict[ChannelName, dict[str, Any]] = Field(
         {}, description="channel -> its options, for channels that have options"
     )
-    synthetic: s.Synthetic | None = None
-    motion: s.MotionOptions = s.MotionOptions()
-    labels: s.LabelOptions = s.LabelOptions()
-    hurt: s.Hurt | None = Field(
+    synthetic: Synthetic | None = None
+    motion: MotionOptions = MotionOptions()
+    labels: LabelOptions = LabelOptions()
+    hurt: Hurt | None = Field(
         None, description="how to compute hurt versions of healthy clips, which are added as further clips"
     )
-    terrain: s.Terrain = s.Terrain()
-    database: s.DatabaseOptions = s.DatabaseOptions()
+    terrain: Terrain = Terrain()
+    database: DatabaseOptions = DatabaseOptions()
 
     @field_validator("channels")
     @classmethod
@@ -152,7 +144,7 @@ class Dataset(s.Section):
                     )
 
 
-class Configuration(s.Section):
+class Configuration(Section):
     """One network: its data set, its training, and the options to run, measure and report it."""
 
     extends: Name | None = None
@@ -166,15 +158,10 @@ class Configuration(s.Section):
     )
     # For other kinds of network, see `configuration_of`.
     network: Options = options_of_kind(DEFAULT_KIND)()
-    training: s.Training = s.Training()
-    runtime: s.Runtime = s.Runtime()
-    evaluation: s.Evaluation = s.Evaluation()
-    report: s.ReportOptions = s.ReportOptions()
-
-    @model_validator(mode="before")
-    @classmethod
-    def _no_old_keys(cls, values: Any) -> Any:
-        return _refuse_old_keys(values, cls, "channels: [{}]")
+    training: Training = Training()
+    runtime: Runtime = Runtime()
+    evaluation: Evaluation = Evaluation()
+    report: ReportOptions = ReportOptions()
 
     @field_validator("channels")
     @classmethod
@@ -196,14 +183,14 @@ def configuration_of(kind: str) -> type[Configuration]:
     return create_model("Configuration", __base__=Configuration, network=(options, options()))
 
 
-class JointEntry(s.Section):
+class JointEntry(Section):
     """A joint of a skeleton. parent: None for the root. offset: from the parent, in the rest pose, cm."""
 
     parent: str | None
     offset: tuple[float, float, float]
 
 
-class SkeletonFile(s.Section):
+class SkeletonFile(Section):
     """A skeleton file. `hobble.core.skeleton.Skeleton` explains all keys but `maps`."""
 
     joints: dict[str, JointEntry]

@@ -246,6 +246,9 @@ class Measurements:
         return self.package.code(script, measure_named(name).run_module, *modules)
 
 
+# Names of the configurations that are compared in results/compare/, unless --config compare=... names others:
+# the published networks, and the character that can be hurt.
+COMPARED = ("holden", "holden-xl", "holden-xt", "ava", "ava-m", "injured")
 COMPARE = "compare"  # name of a folder in results/, and of a key of --config
 
 

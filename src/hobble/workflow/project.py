@@ -7,11 +7,16 @@ from pathlib import Path
 from typing import Any
 
 from hobble.config.load_configuration import Catalogue
-from hobble.config.sections import COMPARED
 from hobble.core.errors import HobbleError
 from hobble.workflow.batches import Batches
 from hobble.workflow.clips import Clips
-from hobble.workflow.configurations import COMPARE, ComparedConfigurations, Configurations, Measurements
+from hobble.workflow.configurations import (
+    COMPARE,
+    COMPARED,
+    ComparedConfigurations,
+    Configurations,
+    Measurements,
+)
 from hobble.workflow.datasets import Datasets
 from hobble.workflow.fingerprint import Package
 

@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
 
 from hobble.channels import all_channels
-from hobble.config.sections import PhaseMode
 from hobble.core.errors import HobbleError, InputError
+from hobble.core.section import PhaseMode
 from hobble.workflow import lifetime
 from hobble.workflow.configurations import COMPARE
 from hobble.workflow.project import Project
