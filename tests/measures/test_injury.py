@@ -22,6 +22,8 @@ from hobble.measures.injury_run import (
     largest_accelerations,
     respond,
     second_injuries,
+    second_sweep,
+    second_thresholds,
     sweep_rows,
     walk_crowd,
 )
@@ -125,6 +127,10 @@ def test_every_link_is_swept_and_those_never_hurt_are_marked(hurtable) -> None:
     assert len(result["falling"]) == 2 * 30 * 10
     assert [r["link"] for r in result["responses"] if r["trained"]] == 2 * hurt
     assert [(r["first"], r["second"]) for r in result["second"]] == [tuple(hurt)]  # two thighs: one first
+    assert result["second_sweep"] == [], "none of the published pairs"
+    assert [(r["link"], r["severities"], np.shape(r["poses"])) for r in result["strips"]] == [
+        (link, (0, 4, 7, 10), (4, 31, 3)) for link in hurt
+    ]
     assert {r["link"] for r in result["into_a_jog"]} == {None, *hurtable.channels["injury"]}
     assert set(result["summary"]) == set(result["summary_untrained"]) == set(GAITS)
 
@@ -150,10 +156,59 @@ def test_a_second_injury_adds_to_the_first(hurtable) -> None:
     assert deaf[1]["share"] == pytest.approx(1, rel=0.03)
 
 
+def test_a_second_injury_is_swept_over_a_first_as_published(hurtable) -> None:
+    """Each injury lowers the head by .4 cm and slows the walk by 3 cm/s for each unit of severity."""
+    shank, thigh = "LeftLeg-LeftFoot", "RightUpLeg-RightLeg"
+    rows, thresholds, strips = second_sweep(slowing(hurtable, (shank, thigh)), [shank, thigh], 2.0, RUNTIME)
+    assert [(r["first_severity"], r["severity"]) for r in rows] == [
+        (f, s) for f in (5, 10) for s in range(11)
+    ]
+    each = (30 * 0.05 + np.hypot(0.4, 0.05)) / 31
+    np.testing.assert_allclose(
+        [r["from_first_cm"] for r in rows], 2 * [each * s for s in range(11)], atol=0.01
+    )
+    np.testing.assert_allclose(
+        [r["from_second_cm"] for r in rows], [each * r["first_severity"] for r in rows], atol=0.01
+    )
+    np.testing.assert_allclose(
+        [r["speed"] for r in rows], [90 - 3 * (r["first_severity"] + r["severity"]) for r in rows], rtol=0.02
+    )
+    for row, first in zip(thresholds, (5, 10), strict=True):
+        # A tenth and nine tenths of a change in even steps, up to rounding.
+        assert row["begins"] in (1, 2)
+        assert row["capped"] in (9, 10)
+        assert row["second_leads"] in ((5, 6) if first == 5 else (10, None))
+        assert row["equal_speed_share"] is None or row["equal_speed_share"] < 0, "slower than either alone"
+    assert [(s["link"], s["first"], s["severities"]) for s in strips] == [(thigh, shank, (0, 5))]
+    head = hurtable.skeleton.role("head")
+    lower = np.subtract(*np.array(strips[0]["poses"])[:, head, 1])
+    assert lower == pytest.approx(5 * 0.4, abs=0.11)
+
+
+def test_thresholds_of_a_walk_that_does_not_change_are_unknown() -> None:
+    rows = [
+        {"severity": float(s), "from_first_cm": 0.01 * s, "from_second_cm": 1.0, "speed": 80.0,
+         "speed_of_first": 60.0, "speed_of_second": 100.0 - s} for s in range(11)
+    ]  # fmt: skip
+    found = second_thresholds([{**row, "from_first_cm": 0.0} for row in rows], 10)
+    assert found == {
+        "begins": None,
+        "capped": None,
+        "second_leads": None,
+        "equal_speed_share": round(2 / 3, 5),
+    }
+    rising = [{**row, "from_first_cm": 3.0 * (row["severity"] >= 4)} for row in rows]
+    assert second_thresholds(rising, 10) | {"equal_speed_share": 0} == {
+        "begins": 4, "capped": 4, "second_leads": 4, "equal_speed_share": 0
+    }  # fmt: skip
+
+
 def test_an_injury_lasts_from_a_walk_into_a_jog(hurtable) -> None:
-    found = into_a_jog(slowing(hurtable), [KNEE, "Neck1-Head"], 2.0, RUNTIME)
+    found = into_a_jog(slowing(hurtable), [KNEE, "Neck1-Head"], [KNEE], 2.0, RUNTIME)
     rows = {(r["link"], r["severity"]): r for r in found}
-    assert list(rows) == [(None, 0.0), (KNEE, 5.0), (KNEE, 10.0), ("Neck1-Head", 5.0), ("Neck1-Head", 10.0)]
+    assert list(rows) == [(None, 0.0), *((KNEE, float(s)) for s in range(1, 11)), ("Neck1-Head", 10.0)]
+    speeds = [rows[KNEE, float(s)]["jog_speed"] for s in range(1, 11)]
+    np.testing.assert_allclose(np.diff(speeds), -60 * 0.05, rtol=0.05)
     assert rows[KNEE, 10.0]["kept"] == pytest.approx(1, rel=0.05)
     assert rows[KNEE, 5.0]["walk_speed"] == pytest.approx(60 * 1.25, rel=0.02)
     assert rows["Neck1-Head", 10.0]["kept"] is None
@@ -162,7 +217,7 @@ def test_an_injury_lasts_from_a_walk_into_a_jog(hurtable) -> None:
 
 def test_each_gait_is_compared_with_the_healthy_figure_of_the_same_gait(hurtable) -> None:
     """The network's jog differs from its walk."""
-    healthy, *hurt = into_a_jog(hurtable, [KNEE], 1.0, RUNTIME)
+    healthy, *hurt = into_a_jog(hurtable, [KNEE], [], 1.0, RUNTIME)
     assert healthy["walk_from_healthy_cm"] == healthy["jog_from_healthy_cm"] == 0
     assert all(row["jog_from_healthy_cm"] != row["walk_from_healthy_cm"] for row in hurt)
 
@@ -191,6 +246,8 @@ def test_a_divided_severity_has_the_effect_of_the_quotient(hurtable) -> None:
     assert {scale for scale, _ in away} == {1, 2, 5}
     assert away[2, 10] == pytest.approx(away[1, 5], rel=0.03)
     assert away[2, 5] == pytest.approx(away[1, 2.5], rel=0.03)
+    rough = {(r["scale"], r["severity"]): r["largest_acceleration"] for r in found}
+    assert rough[1, 10] > rough[5, 10]
     assert away[5, 10] == pytest.approx(0.2 * away[1, 10], rel=0.03)
 
 

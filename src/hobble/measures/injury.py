@@ -38,6 +38,7 @@ from hobble.report.parts import (
     line_trace,
     marker_trace,
     ordered_axis,
+    reference_line,
     shows_something,
     with_order,
 )
@@ -70,6 +71,7 @@ GAIT_COLOURS = {"walk": "@accent", "jog": "@g2"}
 COLOURS = ("@accent", "@g2", "@g3", "@g4", "@g5", "@g0")  # of the lines in a chart
 # The marker of links that were never hurt in training.
 HOLLOW = {"symbol": "circle-open", "size": 8, "line": {"width": 1.2}}
+STRIP_WIDTH, STRIP_HEIGHT = 110.0, 205.0  # cm between the figures of a strip
 SIDES = (("left", "@accent"), ("right", "@g2"))  # side of the body, colour
 # A small chart: its name, title and unit; its lines as (key of a row, label, colour); the least length of the
 # vertical axis; whether this axis starts at 0.
@@ -130,7 +132,7 @@ ROW_LABELS = {
 
 def section(found: Json, material: ReportMaterial) -> PageSection:
     """The charts and tables of the response to injury. Empty for a network without severities."""
-    parts = _parts(with_spoken_links(found, material), material.name) if found.get("applies") else []
+    parts = _parts(with_spoken_links(found, material), material) if found.get("applies") else []
     return PageSection("injury", parts, title="Injury response", order=20)
 
 
@@ -206,22 +208,141 @@ def with_spoken_links(found: Json, material: ReportMaterial) -> dict[str, Any]:
     return {key: renamed(value) for key, value in found.items()}
 
 
-def _parts(found: Json, name: str) -> list[SectionPart]:
-    """The parts of the section. found: injury.json, with links renamed. name: of the configuration."""
+def _parts(found: Json, material: ReportMaterial) -> list[SectionPart]:
+    """The parts of the section. found: injury.json, with links renamed."""
+    name, published = material.name, material.published["severities"]
     rows, responses, second = (found.get(key) or [] for key in ("rows", "responses", "second"))
+    sweep, thresholds = (found.get(key) or [] for key in ("second_sweep", "second_thresholds"))
     untrained = {r["link"] for r in responses if not _trained(r)}
-    jogs = jog_chart(found.get("into_a_jog") or (), untrained)
     words = {"from_worst": "from severity 10"}
     all_rows = table_of_rows(f"{name}-injury", rows, "Every walk and jog at rising severity", words)
+    both = (
+        "Two injuries: where the second begins to show, has its whole effect, and shows more than the first"
+    )
+    jogs = found.get("into_a_jog") or ()
     return [
         SectionPart(0, ChartPair(effect_charts(responses))),
         SectionPart(10, response_table(name, responses)),
+        SectionPart(15, strip_chart(found.get("strips") or (), material.network["skeleton"])),
         SectionPart(20, sweep_charts(rows, found.get("falling") or (), untrained) if rows else None),
+        SectionPart(25, range_table(name, rows, untrained, published["one_link"]), open=True, short=True),
         SectionPart(40, second_chart(second)),
+        SectionPart(42, sweep_chart(sweep, published)),
+        SectionPart(45, table_of_rows(f"{name}-second-thresholds", thresholds, both), open=True, short=True),
         SectionPart(50, table_of_rows(f"{name}-second-injury", second, "Every walk with two injuries")),
-        SectionPart(60, ChartPair([divided_chart(found.get("divided") or ()), jogs])),
+        SectionPart(51, table_of_rows(f"{name}-second-sweep", sweep, "Every step of a second injury")),
+        SectionPart(60, ChartPair([divided_chart(found.get("divided") or ()), jog_chart(jogs, untrained)])),
+        SectionPart(
+            65, table_of_rows(f"{name}-into-a-jog", jogs, "Every walk that becomes a jog", texts=["link"])
+        ),
         SectionPart(70, all_rows),
     ]
+
+
+def strip_chart(strips: Rows, skeleton: Json) -> Chart | None:
+    """Poses at rising severity, from the side and from the front: Figures 3 and 4 of Ferre et al. (2019)."""
+    if not strips:
+        return None
+    joints = list(skeleton["joints"])
+    bones = [(joints.index(j["parent"]), i) for i, j in enumerate(skeleton["joints"].values()) if j["parent"]]
+
+    def figure(pose: Any, place: float) -> list[Trace]:
+        """A pose from the side, walking to the right, and above it from the front."""
+        p = np.array(pose)
+        views = [(p[:, 2] + place, p[:, 1]), (p[:, 0] + place, p[:, 1] + STRIP_HEIGHT)]
+        points = [((x[a], x[b], None), (y[a], y[b], None)) for x, y in views for a, b in bones]
+        xs, ys = ([v for point in points for v in point[axis_]] for axis_ in (0, 1))
+        return [line_trace("", xs, ys, "@accent", width=3, showlegend=False, hoverinfo="skip")]
+
+    options: dict[str, list[Trace]] = {}
+    for strip in strips:
+        first = f"{strip['first']} at {strip['first_severity']:g}, and " if strip["first"] else ""
+        places = [STRIP_WIDTH * n for n in range(len(strip["poses"]))]
+        texts = [f"{severity:g}" for severity in strip["severities"]]
+        label = marker_trace("", places, [-14.0] * len(places), {"size": 1}, mode="text", text=texts)
+        figures = [t for p, x in zip(strip["poses"], places, strict=True) for t in figure(p, x)]
+        options[first + strip["link"]] = [*figures, {**label, "showlegend": False, "hoverinfo": "skip"}]
+    bare = {"showgrid": False, "zeroline": False, "showticklabels": False}
+    caption = (
+        "Poses of the walk at the severity below each, from the side (walking to the right) and, above, "
+        "from the front. They are means over gait cycles, all at the phase at which the last differs most "
+        "from the first. Ferre et al. show such strips in their Figures 3 (one link at 0, 4, 7 and 10) and "
+        "4 (a second injury at 0 and 5 over a first at 5)."
+    )
+    layout = {"xaxis": {**bare, "title": {"text": "severity"}}, "yaxis": {**bare, "scaleanchor": "x"}}
+    return Chart("strips", "Poses at rising severity", caption, (), layout, 520, "Injury", options)
+
+
+def range_table(name: str, rows: Rows, untrained: Collection[str], ranges: Json) -> Table | None:
+    """Shares of the whole change of pose and speed that walks have at the ends of the published ranges.
+
+    rows: of injury.json. ranges: `severities.one_link` of published.yaml.
+    """
+    sweeps: dict[tuple[str, str], dict[float, Any]] = {}
+    for row in rows:
+        if row["link"] not in untrained:
+            sweeps.setdefault((row["gait"], row["link"]), {})[row["severity"]] = row
+    ends = [high for _, high in (ranges["little"], ranges["changing"])] + [ranges["as_trained"][0]]
+
+    def shares(sweep: Mapping[float, Any], key: str) -> list[float | None]:
+        healthy, worst = sweep[0][key], sweep[10][key]
+        whole = worst - healthy
+        return [(sweep[end][key] - healthy) / whole if abs(whole) > 1e-9 else None for end in ends]
+
+    table = [
+        [gait, link, *shares(sweep, "from_healthy"), *shares(sweep, "speed")]
+        for (gait, link), sweep in sweeps.items()
+        if {0, 10, *ends} <= set(sweep)
+    ]
+    columns = [Column("gait"), Column("link")]
+    columns += [Column.number(f"{what} at {end}", 2) for what in ("pose", "speed") for end in ends]
+    title = (
+        "Shares of the whole change at the ends of the ranges that Ferre et al. saw: 0 to 3 little change, "
+        "4 to 6 speed and pose change, 7 to 10 as in the clips"
+    )
+    return Table(f"{name}-injury-ranges", columns, table, title) if table else None
+
+
+def sweep_chart(rows: Rows, published: Json) -> Chart | None:
+    """A second injury swept over a first one at 5 and at 10, with lines at the published thresholds."""
+    options: dict[str, list[Trace]] = {}
+    layouts: dict[str, dict[str, Any]] = {}
+    lines = {5.0: published["second_over_5"].values(), 10.0: published["second_over_10"].values()}
+    keys = (("from_first_cm", "cm"), ("from_second_cm", "cm"), ("speed", "cm/s"))
+    for first, second, severity in dict.fromkeys(
+        (r["first"], r["second"], r["first_severity"]) for r in rows
+    ):
+        labels = {"first": first, "second": second, "first_severity": severity}
+        of_pair = [row for row in rows if labels.items() <= row.items()]
+        for label, shown in (("pose", keys[:2]), ("speed", keys[2:])):
+            option = f"{second} over {first} at {severity:g}, {label}"
+            options[option] = [
+                _line(key.removesuffix("_cm").replace("_", " "), of_pair, key, colour, mode="lines+markers")
+                for (key, _), colour in zip(shown, COLOURS, strict=False)
+            ]
+            if label == "speed":
+                for key, colour in (("speed_of_first", "@muted"), ("speed_of_second", "@faint")):
+                    words = key.replace("speed_of_", "only the ")
+                    options[option].append(_line(words, of_pair, key, colour, dash="dot", width=1.4))
+            layouts[option] = {"shapes": [_threshold(x) for x in lines[severity]], "yaxis": axis(shown[0][1])}
+    caption = (
+        "The character walks with one injury while the severity of a second one rises. Pose: distance from "
+        "the walk with only the first injury, and from that with only the second. Dotted vertical lines are "
+        "the thresholds that Ferre et al. (2019) saw: over a first injury at 5, both are blended until the "
+        "second reaches 5; over one at 10, the second begins to show at 3 and has its whole effect at 8. At "
+        "equal severities, they saw the speed of the faster of both."
+    )
+    layout = {"xaxis": axis("severity of the second injury", dtick=1), "yaxis": axis("cm")}
+    chart = Chart(
+        "second-sweep", "A second injury, swept", caption, (), layout, 340, "Injuries", options, layouts
+    )
+    return chart if options else None
+
+
+def _threshold(severity: float) -> dict[str, Any]:
+    """A dotted vertical line."""
+    (shape,) = reference_line(severity, "")["shapes"]
+    return shape
 
 
 def _trained(response: Mapping[str, Any]) -> bool:
@@ -264,9 +385,11 @@ def sweep_charts(rows: Rows, falling: Rows = (), untrained: Collection[str] = ()
     caption = (
         "The character moves on while the severity of one link rises from 0 to 10 and falls again. Each "
         "point is measured over whole gait cycles at one severity. A smooth curve means that the walk "
-        "changes gradually. A gap between left and right is a limp. A jump between neighbouring points means "
-        "that the network switches between two gaits. The first chart shows how far the pose is from the "
-        "healthy walk and from the walk at severity 10: the mean distance of the joints at the same phase."
+        "changes gradually. A gap between left and right is a limp. A jump between neighbouring points "
+        "means that the network switches between two gaits. The first chart shows how far the pose is from "
+        "the healthy walk and from the walk at severity 10: the mean distance of the joints at the same "
+        "phase. Dotted lines divide the ranges that Ferre et al. (2019) saw: little change to 3, then a "
+        "change of speed and pose, and from 7 on the walk of the clips."
     )
     if falling:
         caption += " Dotted lines show falling severity."
@@ -298,6 +421,7 @@ def _panel_chart(
         "xaxis": axis("severity", dtick=2, range=[-0.3, 10.3]),
         "yaxis": axis(unit),
         "showlegend": len(lines) > 1,
+        "shapes": [_threshold(x) for x in (3.5, 6.5)] if name in ("pose", "speed") else [],
     }
     keys = [key for key, *_ in lines]
     ranges = {
@@ -441,17 +565,37 @@ def divided_chart(rows: Rows) -> Chart | None:
         of_line = [row for row in rows if row["link"] == link and row["scale"] == scale]
         return _line(f"divided by {scale:g}", of_line, "from_healthy_cm", colour, mode="lines+markers")
 
+    links = list(dict.fromkeys(row["link"] for row in rows))
+    options = {
+        link: [line(link, scale, colour) for scale, colour in zip(scales, COLOURS, strict=False)]
+        for link in links
+    }
+    smooth, layouts = "smoothness against range", {}
+    if all("largest_acceleration" in row for row in rows):
+        options[smooth] = []
+        for scale, colour in zip(scales, COLOURS, strict=False):
+            of_scale = [row for row in rows if row["scale"] == scale]
+            x = [max(r["from_healthy_cm"] for r in of_scale if r["link"] == link) for link in links]
+            y = [max(r["largest_acceleration"] for r in of_scale if r["link"] == link) for link in links]
+            hover = {"text": links, "hovertemplate": "%{text}: %{x:.1f} cm, %{y:.2f}<extra></extra>"}
+            dots = {"size": 9, "color": colour}
+            options[smooth].append(marker_trace(f"divided by {scale:g}", x, y, dots, **hover))
+        axes = {
+            "xaxis": axis("largest change of the pose, cm"),
+            "yaxis": axis("largest acceleration, cm/frame²"),
+        }
+        layouts[smooth] = axes
     return Chart(
         "divided",
         "Severities divided by a number",
-        "As in an experiment of Ferre, the severities are divided by a number before the network gets them. "
-        "Each line belongs to one number. Its height is the distance of the pose from the healthy walk.",
+        "As in an experiment of Ferre et al., the severities are divided by a number before the network "
+        "gets them. Each line belongs to one number. Its height is the distance of the pose from the "
+        "healthy walk. Smoothness against range: a dot for each link, with the largest change of the pose "
+        "and the largest acceleration of a joint while severity rises. Division makes both smaller.",
         layout={"xaxis": axis("severity", dtick=2), "yaxis": axis("cm per joint", rangemode="tozero")},
         choose="Link",
-        options={
-            link: [line(link, scale, colour) for scale, colour in zip(scales, COLOURS, strict=False)]
-            for link in dict.fromkeys(row["link"] for row in rows)
-        },
+        options=options,
+        option_layouts=layouts,
     )
 
 

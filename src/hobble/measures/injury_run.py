@@ -1,11 +1,11 @@
 """Measures how a walk and a jog change while the severity of one link rises from 0 to 10 and falls again.
 
-A link is the piece of the body between two neighbouring joints. All figures (copies of the character) walk
-at once, each with its own injuries, in stretches in which severities and gaits stay the same. In the sweep
-there is a figure for each gait and link. It walks healthy until it has reached its speed. Then the severity
-of its link is 0, 1, ..., 10, 9, ..., 0. A second crowd shows how fast the walk changes: each severity jumps
-from 0 to 10 and later back to 0. Three more cases are measured: a second injury, a change from walking to
-jogging, and divided severities.
+A link is the piece of the body between two neighbouring joints. All figures (copies of the character) walk at
+once, each with its own injuries, in stretches in which severities and gaits stay the same. In the sweep there
+is a figure for each gait and link. It walks healthy until it has reached its speed. Then the severity of its
+link is 0, 1, ..., 10, 9, ..., 0. A second crowd shows how fast the walk changes: each severity jumps from 0
+to 10 and later back to 0. The other experiments of Ferre et al. (2019) are made, too: a second injury, a
+change from walking to jogging, and divided severities.
 
 The distance of a walk from a reference walk is the mean distance of its joints, in cm, from the mean cycle of
 the reference walk at the same phase. The spread of a walk is its distance from its own mean cycle.
@@ -20,6 +20,7 @@ from typing import Any
 
 import numpy as np
 
+from hobble.channels.injury.shown import link_index_by_part
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 from hobble.hurt.effects import part_of_link
@@ -55,9 +56,15 @@ WALK_IN = 0.75  # time at the beginning in which figures reach their speed, as a
 JUMP_STRETCHES = 2
 FIRST_SEVERITY = 7.0  # of the first of two injuries
 SECOND_SEVERITIES = (0.0, 5.0, 10.0)  # of the second of two injuries, in the order of the stretches
+# The experiment of Ferre et al. with two injuries: a first one at each of FIRST_SEVERITIES, while the second
+# one is swept over SEVERITIES, for the pairs of parts that hurt in their films.
+FIRST_SEVERITIES = (5.0, 10.0)
+PAIRS = (("left shank", "right thigh"), ("left shank", "right shank"), ("right thigh", "right shank"))
+CHANGE_BEGINS, CHANGE_ENDS = 0.1, 0.9  # shares of the whole change of a walk at which it begins and is over
 SEVERITIES_TO_DIVIDE = (0.0, 2.5, 5.0, 7.5, 10.0)  # each is divided by each of DIVISORS
 DIVISORS = (1.0, 2.0, 5.0)
-JOG_SEVERITIES = (5.0, 10.0)  # of figures that change from walking to jogging
+STRIP_SEVERITIES = (0, 4, 7, 10)  # of the poses of a strip, as in Figure 3 of Ferre et al.
+SECOND_STRIP = (0, 5)  # severities of the second injury in a strip, as in their Figure 4
 JOG_SPEED_SHARE = 0.9  # a figure jogs once it has this share of its final speed
 LEAST_EFFECT_CM = 0.05  # no share of a smaller effect is computed
 # Keys of a response of which `summary` has the mean.
@@ -100,6 +107,10 @@ class Crowd:
         motion = (a[span, figure] for a in (self.walks.local, self.walks.contacts, self.walks.root))
         return gait_measures(self.skeleton, *motion)
 
+    def acceleration(self, stretch: int, figure: int) -> Array:
+        """The largest acceleration of any joint in each frame of a stretch, cm per frame squared."""
+        return self.walks.acceleration[self.walks.starts[stretch] : self.walks.starts[stretch + 1], figure]
+
     def speed(self, stretch: int, figure: int) -> float:
         """A figure's mean speed in a stretch, cm/s."""
         return float(self.measures(stretch, figure)["speed"] or 0.0)
@@ -137,7 +148,8 @@ def injury_response(
     """
     links = list(links or network.channels[INJURY])
     trained = [link for link in links if link in network.trained_labels(INJURY)]
-    rows, falling, responses = _sweep(network, links, trained, motion, seconds, runtime)
+    rows, falling, responses, strips = _sweep(network, links, trained, motion, seconds, runtime)
+    sweep, thresholds, second_strips = second_sweep(network, trained, seconds, runtime)
     return {
         "configuration": configuration,
         "applies": True,
@@ -150,8 +162,11 @@ def injury_response(
         "falling": falling,
         "responses": responses,
         "second": second_injuries(network, trained, seconds, runtime),
-        "into_a_jog": into_a_jog(network, links, seconds, runtime),
+        "second_sweep": sweep,
+        "second_thresholds": thresholds,
+        "into_a_jog": into_a_jog(network, links, trained, seconds, runtime),
         "divided": divided_severities(network, trained, seconds, runtime),
+        "strips": strips + second_strips,
         "summary": _summary([r for r in responses if r["trained"]]),
         "summary_untrained": _summary([r for r in responses if not r["trained"]]),
     }
@@ -164,8 +179,8 @@ def _sweep(
     motion: Iterable[Captured],
     seconds: float,
     runtime: Runtime,
-) -> tuple[Rows, Rows, Rows]:
-    """`rows` (rising severity), `falling` and `responses` of `injury_response`."""
+) -> tuple[Rows, Rows, Rows, Rows]:
+    """`rows` (rising severity), `falling`, `responses` and the first `strips` of `injury_response`."""
     captured = largest_accelerations(motion, network)
     figures = [(gait, link) for gait in GAITS for link in links]
 
@@ -179,6 +194,7 @@ def _sweep(
     rising: Rows = []
     falling: Rows = []
     responses: Rows = []
+    strips: Rows = []
     for figure, (gait, link) in enumerate(figures):
         rows = sweep_rows(gradual, figure, gait, link)
         rising += rows[: WORST + 1]
@@ -197,7 +213,16 @@ def _sweep(
                 "clip_acceleration_share": share,
             }
         )
-    return rising, falling, responses
+        if gait == "walk" and link in trained:
+            cycles = [gradual.cycle(1 + severity, figure) for severity in STRIP_SEVERITIES]
+            strips.append({"link": link, "first": None, **strip_of(cycles), "severities": STRIP_SEVERITIES})
+    return rising, falling, responses, strips
+
+
+def strip_of(cycles: Sequence[Array]) -> dict[str, Any]:
+    """Poses (J, 3), cm, at one phase of some mean cycles: where the last differs most from the first."""
+    at = int(np.linalg.norm(cycles[-1] - cycles[0], axis=-1).mean(axis=1).argmax())
+    return {"phase": round(at / len(cycles[0]), 5), "poses": [np.round(c[at], 1).tolist() for c in cycles]}
 
 
 def sweep_rows(crowd: Crowd, figure: int, gait: str, link: str) -> Rows:
@@ -342,6 +367,85 @@ def second_injuries(network: Network, links: Sequence[str], seconds: float, runt
     return out
 
 
+def second_sweep(
+    network: Network, links: Sequence[str], seconds: float, runtime: Runtime
+) -> tuple[Rows, Rows, Rows]:
+    """The experiment of Ferre et al. (2019) with two injuries: rows, thresholds and strips.
+
+    For each of PAIRS whose links are in `links`, and each of FIRST_SEVERITIES, a row for each severity of the
+    second injury. from_first_cm, from_second_cm: distance from the walk with only the first injury, and from
+    that with only the second at the same severity. speed, speed_of_first, speed_of_second: cm/s, with both
+    and with only one. thresholds: severity of the second injury at which the walk begins to change
+    (`begins`), has changed (`capped`, both by the shares CHANGE_BEGINS and CHANGE_ENDS) and is nearer to that
+    with only the second (`second_leads`); and how fast both injuries at the same severity are, from 0 (as the
+    slower of the walks with only one) to 1 (as the faster).
+    """
+    assert network.skeleton is not None
+    named = {part: links[i] for part, i in link_index_by_part(network.skeleton, links).items()}
+    pairs = [(named[a], named[b]) for a, b in PAIRS if a in named and b in named]
+    # (first link, its severity, second link) of each figure; those without a first link show the second
+    # alone.
+    figures: list[tuple[str | None, float, str]] = [(None, 0.0, k) for k in dict.fromkeys(sum(pairs, ()))]
+    figures += [(a, severity, b) for (a, b), severity in product(pairs, FIRST_SEVERITIES)]
+    if not pairs:
+        return [], [], []
+
+    def injuries(second: float) -> list[Injury]:
+        return [{**({a: first} if a else {}), b: second} for a, first, b in figures]
+
+    stretches: list[Stretch] = [(WALK_IN, injuries(0)), *((1, injuries(s)) for s in SEVERITIES)]
+    crowd = walk_crowd(network, ["walk"] * len(figures), stretches, seconds, runtime)
+    alone = {b: i for i, (a, _, b) in enumerate(figures) if a is None}
+    rows, thresholds, strips = [], [], []
+    for i, (first, first_severity, second) in enumerate(figures):
+        if first is None:
+            continue
+        labels = {"first": first, "second": second, "first_severity": first_severity}
+        only_first, of_pair = crowd.cycle(1, i), []
+        speed_of_first = crowd.speed(1 + int(first_severity), alone[first])
+        for severity in SEVERITIES:
+            at = 1 + int(severity)
+            only_second = crowd.cycle(at, alone[second])
+            row = {
+                "from_first_cm": crowd.distance(at, i, only_first) - crowd.distance(1, i, only_first),
+                "from_second_cm": crowd.distance(at, i, only_second)
+                - crowd.distance(at, alone[second], only_second),
+                "speed": crowd.speed(at, i),
+                "speed_of_first": speed_of_first,
+                "speed_of_second": crowd.speed(at, alone[second]),
+            }
+            of_pair.append(
+                {**labels, "severity": float(severity), **{key: round(v, 5) for key, v in row.items()}}
+            )
+        rows += of_pair
+        thresholds.append({**labels, **second_thresholds(of_pair, int(first_severity))})
+        if first_severity == FIRST_SEVERITIES[0]:
+            strip = strip_of([crowd.cycle(1 + severity, i) for severity in SECOND_STRIP])
+            strips.append({"link": second, **labels, **strip, "severities": SECOND_STRIP})
+    return rows, thresholds, strips
+
+
+def second_thresholds(rows: Rows, equal: int) -> dict[str, float | None]:
+    """The thresholds of `second_sweep`. rows: of one pair and severity of the first. equal: this severity.
+
+    A threshold is None if the walk does not change, or is never nearer to that with only the second.
+    """
+    change = [row["from_first_cm"] for row in rows]
+    reached = [
+        next((r["severity"] for r, c in zip(rows, change, strict=True) if c >= share * change[-1]), None)
+        for share in (CHANGE_BEGINS, CHANGE_ENDS)
+        if change[-1] > LEAST_EFFECT_CM
+    ] or [None, None]
+    leads = [r["severity"] for r in rows if r["from_second_cm"] < r["from_first_cm"]]
+    slow, fast = sorted((rows[equal]["speed_of_first"], rows[equal]["speed_of_second"]))
+    return {
+        "begins": reached[0],
+        "capped": reached[1],
+        "second_leads": leads[0] if leads else None,
+        "equal_speed_share": round((rows[equal]["speed"] - slow) / (fast - slow), 5) if fast > slow else None,
+    }
+
+
 def first_link_of_each_part(skeleton: Skeleton, links: Sequence[str]) -> list[str]:
     """For each part of the body (such as the thigh), the first of `links` that belongs to it.
 
@@ -354,8 +458,12 @@ def first_link_of_each_part(skeleton: Skeleton, links: Sequence[str]) -> list[st
     return list(first.values())
 
 
-def into_a_jog(network: Network, links: Sequence[str], seconds: float, runtime: Runtime) -> Rows:
-    """Figures that change from walking to jogging: one without injury, then each link at severities 5 and 10.
+def into_a_jog(
+    network: Network, links: Sequence[str], trained: Sequence[str], seconds: float, runtime: Runtime
+) -> Rows:
+    """Figures that change from walking to jogging: one without injury, then each link at severities 1 to 10.
+
+    A link that is not in `trained` is only hurt at severity 10.
 
     link: None for the healthy figure. walk_speed, jog_speed: cm/s. reach_seconds: time from the change until
     the figure has nine tenths of `jog_speed`; None if it never has. walk_from_healthy_cm,
@@ -364,7 +472,8 @@ def into_a_jog(network: Network, links: Sequence[str], seconds: float, runtime: 
     largest_acceleration: of any joint in the first `seconds` of the jog, cm per frame squared.
     """
     assert network.skeleton is not None
-    figures: list[tuple[str | None, float]] = [(None, 0.0), *product(links, JOG_SEVERITIES)]
+    figures: list[tuple[str | None, float]] = [(None, 0.0)]
+    figures += [(link, s) for link in links for s in (SEVERITIES[1:].tolist() if link in trained else [10.0])]
     hurt = channel_values(network, INJURY, [{link: s} if link else {} for link, s in figures])
     frames = _frames(1, seconds)
     # In stretch 0 the figures reach their speed.
@@ -400,6 +509,7 @@ def divided_severities(network: Network, links: Sequence[str], seconds: float, r
     """How much of each link's effect remains if the runtime divides severities by `scale`: 1, 2 or 5.
 
     from_healthy_cm: distance from the healthy walk. speed_share: speed, divided by the healthy speed.
+    largest_acceleration: of any joint from the change to this severity on, cm per frame squared.
     """
     stretches: list[Stretch] = [
         (WALK_IN, [{}] * len(links)),
@@ -419,6 +529,7 @@ def divided_severities(network: Network, links: Sequence[str], seconds: float, r
                     "severity": severity,
                     "from_healthy_cm": round(crowd.distance(stretch, i, healthy) - spread, 5),
                     "speed_share": round(crowd.speed(stretch, i) / max(speed, 1e-9), 5),
+                    "largest_acceleration": round(float(crowd.acceleration(stretch, i).max()), 5),
                 }
                 out.append(row)
     return out
@@ -455,6 +566,7 @@ def run(inputs: MeasureInputs, options: Any) -> Outcome:
         runtime=inputs.runtime,
         seconds=options.seconds,
     )
-    tables = {name: result[name] for name in ("second", "into_a_jog", "divided")}
+    names = ("second", "second_sweep", "second_thresholds", "into_a_jog", "divided")
+    tables = {name: result[name] for name in names}
     tables["sweep"] = [*result["rows"], *result["falling"]]
     return Outcome(with_sample(result, sample), tables, str(result["summary"]))
