@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 import shlex
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -160,3 +161,13 @@ def test_a_shell_completes_commands_and_their_options(shell, capsys):
             call = f"COMP_WORDS=({words}); COMP_CWORD={len(asked) - 1}; _hobble; echo ${{COMPREPLY[*]}}"
             done = subprocess.run(["bash", "-c", f"{script}\n{call}"], capture_output=True, text=True)
             assert done.stdout.strip() == wanted
+
+
+@pytest.mark.shared
+def test_a_hurt_cycle_that_the_command_repeated_can_be_labelled(shared: Path, tmp_path, capsys):
+    """Injured_Walk_RUL leans to its sound side by 5.6 degrees; one cycle is too short to call that a tilt."""
+    (tmp_path / "one").mkdir()
+    shutil.copy(shared / "mocap/ferre/Injured_Walk_RUL.bvh", tmp_path / "one")
+    assert main(["motion", str(tmp_path / "one"), str(tmp_path / "eight"), "--loops", "8"]) == 0
+    assert main(["labels", str(tmp_path / "eight"), str(tmp_path / "labels")]) == 0, capsys.readouterr().out
+    assert len((tmp_path / "labels/Injured_Walk_RUL_footsteps.txt").read_text().splitlines()) > 5

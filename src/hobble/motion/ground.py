@@ -53,6 +53,9 @@ BALANCED, BALANCED_SHORT, LONG = 5.0, 9.0, 0.2
 # and the line across the body all lean to the same side by more than this. In the 172 clips the least of the
 # three leans is at most 7.5, in a walk with a hurt leg.
 MOST_SIDEWAYS = 8.0
+# Two poses are the same if no component of a quaternion differs by more, which is 2 degrees. Steps of people
+# differ by more. A cycle has more frames than SHORTEST_CYCLE.
+SAME_POSE, SHORTEST_CYCLE = 0.02, 10
 FORWARD_LEAN = 4.0  # degrees by which a walking body usually leans forward
 # The spread of feet along an axis is the standard deviation of their positions, in leg lengths. First the
 # slope is measured only along axes with a spread above WIDE, then along all axes with a spread above NARROW.
@@ -103,14 +106,27 @@ def put_on_floor(clip: Clip) -> tuple[Clip, list[str], list[str]]:
 
 def check_tilt(path: Path, clip: Clip, leave: bool) -> None:
     """Raise InputError if the world is tilted. leave: whether any tilt is accepted."""
-    tilt = None if leave else world_tilt(clip)
+    # A cycle that `hobble motion --loops` repeated shows no more than the cycle alone. Counted eight times,
+    # its short stands would seem long enough to judge the balance strictly.
+    tilt = None if leave else world_tilt(clip.part(slice(_cycle_length(clip))))
     if tilt is not None:
         raise InputError(
             path,
             f"the ground or the body is tilted by {tilt:.0f} degrees, so the whole world seems tilted",
             fix="Make the floor level in the program that the clip comes from, and export the clip again. If "
-            "the figure walked on a slope or really leans that far, set motion.defects: leave.",
+            "the figure walked on a slope or really leans that far, set motion.defects: leave "
+            "(--defects leave).",
         )
+
+
+def _cycle_length(clip: Clip) -> int:
+    """The frames of a cycle that the whole clip only repeats, at least twice; else those of the clip."""
+    rotations = clip.rotations.reshape(len(clip), -1)
+    same = np.flatnonzero(np.abs(rotations[: len(clip) // 2 + 1] - rotations[0]).max(axis=1) < SAME_POSE)
+    repeats = (
+        n for n in same[same > SHORTEST_CYCLE] if np.abs(rotations[n:] - rotations[:-n]).max() < SAME_POSE
+    )
+    return int(next(repeats, len(clip)))
 
 
 def world_tilt(clip: Clip) -> float | None:
