@@ -1,4 +1,4 @@
-"""The subcommands of `hobble` for BVH files: look, rig, motion, labels, hurt, injury."""
+"""The subcommands of `hobble` for BVH files: look, rig, motion, labels, hurt, combine, injury."""
 
 from __future__ import annotations
 
@@ -26,6 +26,7 @@ from hobble.core.bvh import write_bvh
 from hobble.core.clip import Clip
 from hobble.core.errors import InputError
 from hobble.core.files import write_text
+from hobble.hurt.combine import PARTS, combine_clips
 from hobble.hurt.hurt_clip import hurt_clip
 from hobble.labels.clip_labels import GAITS, Labels
 from hobble.labels.label import label_clip
@@ -238,6 +239,31 @@ def _hurt_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--injury", required=True, help="what hurts: Joint-Joint[severity];...")
 
 
+def combine(options: argparse.Namespace) -> int:
+    """Combine two clips by parts of the body, such as the legs of one with the arms of another.
+
+    hobble combine LEGS.bvh ARMS.bvh OUT.bvh --part arms
+
+    Both are retargeted to the skeleton holden31. The steps of the second clip keep time with those of the
+    first.
+    """
+    pairs = [_labelled(file.stem, file, options) for file in (options.body, options.other)]
+    (body, _, labels, warnings), (other, _, other_labels, more) = pairs
+    name = options.out.stem
+    write_bvh(options.out, combine_clips(body, labels, other, other_labels, options.part, name))
+    print_result(options, str(options.out), "\n".join([*warnings, *more, str(options.out)]))
+    return 0
+
+
+def _combine_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("body", type=Path, help="the BVH file whose path, legs and trunk are kept")
+    parser.add_argument("other", type=Path, help="the BVH file from which a part of the body is taken")
+    parser.add_argument("out", type=Path, help="the BVH file to write")
+    parser.add_argument("--part", choices=list(PARTS), default="arms", help="what is taken (default arms)")
+    add_json(parser)
+    add_motion_options(parser)
+
+
 def injury(options: argparse.Namespace) -> int:
     """Write status files from a table. A status file says which links hurt in a clip, when and how much.
 
@@ -272,5 +298,6 @@ COMMANDS = {
     "motion": Command("clips", _motion_arguments, motion),
     "labels": Command("clips", _labels_arguments, labels),
     "hurt": Command("limps", _hurt_arguments, hurt),
+    "combine": Command("limps", _combine_arguments, combine),
     "injury": Command("limps", _injury_arguments, injury),
 }

@@ -26,6 +26,7 @@ from hobble.measures.compare import (
     ConfigurationResults,
     compare_series,
     fit_line,
+    flatten,
     mean_and_sd,
     published_differences,
     published_row,
@@ -551,9 +552,16 @@ def _published_regression(fits: Sequence[Json], row: Json) -> list[dict[str, Any
 
 def _lap_rows(entry: Json) -> list[Row]:
     """A row for each lap in one phase mode. entry: from `mode_entries`."""
-    from hobble.measures.responsivity_run import lap_rows  # here, because planning need not load numba
-
-    return [{"configuration": entry["configuration"], **row} for row in lap_rows({"modes": [entry]})]
+    rows: list[Row] = []
+    for lap in entry["laps"]:
+        times = lap["milliseconds"]
+        row = {key: value for key, value in lap.items() if key != "milliseconds"}
+        of_steps = {f"milliseconds_{key}": times[key] for key in (*STEPS, "total")}
+        of_steps |= {f"milliseconds_{key}_sd": sd for key, sd in times["sd"].items()}
+        spread = {f"milliseconds_{key}": value for key, value in flatten(times["spread"]).items()}
+        head = {"configuration": entry["configuration"], "mode": entry["mode"]}
+        rows.append({**head, **row, **of_steps, **spread})
+    return rows
 
 
 def published_lap_rows(published: Json) -> list[Row]:

@@ -1,0 +1,65 @@
+"""Tables of results as data frames, and the notebook that uses them."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import matplotlib
+import pytest
+
+import hobble
+from hobble.core.errors import HobbleError
+from hobble.core.files import write_csv, write_tables
+
+
+@pytest.fixture
+def checkout(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder in which the workflow has made the results of `test`."""
+    folder = tmp_path / "results/test"
+    clips = [
+        {"clip": c, "split": "train", "mean": m, "position_error_cm": 2.0}
+        for c, m in (("a", 0.1), ("b", 0.2))
+    ]
+    write_tables(folder / "evaluation/accuracy", {"clips": clips, "excerpts": []})
+    laps = [
+        {"mode": m, "lap": n, "milliseconds_total": 0.1 * n} for m in ("constant", "cubic") for n in (1, 3)
+    ]
+    write_tables(folder / "evaluation/responsivity", {"laps": laps})
+    (folder / "network").mkdir()
+    history = [{"pass": p, "section": s, "train_mse": 1 / (p + s)} for p in (1, 2) for s in (1, 2)]
+    write_csv(folder / "network/history.csv", history)
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def test_each_table_is_a_data_frame_with_its_numbers(checkout: Path) -> None:
+    tables = hobble.results("test")
+    assert sorted(tables) == ["accuracy/clips", "history", "responsivity/laps"]
+    assert tables["accuracy/clips"].set_index("clip").loc["b", "mean"] == 0.2
+    (checkout / "results/compare/tables").mkdir(parents=True)
+    write_csv(checkout / "results/compare/tables/stages.csv", [{"stage": "training", "seconds": 3.5}])
+    assert hobble.results("compare")["stages"]["seconds"].sum() == 3.5
+    with pytest.raises(HobbleError, match=r"results/none has no tables. Make them: snakemake"):
+        hobble.results("none")
+    with pytest.raises(AttributeError, match="no attribute 'result'"):
+        hobble.result  # noqa: B018
+
+
+def test_published_tables_are_data_frames(checkout: Path) -> None:
+    published = hobble.results("published")
+    assert published["laps"]["holden"].std() == pytest.approx(0.0173, abs=5e-5)
+    assert len(published["clip_means"]) == 80
+    assert published["accuracy"].set_index("configuration").loc["ava", "sd"] == 0.00283
+
+
+def test_the_notebook_runs(checkout: Path, root: Path) -> None:
+    matplotlib.use("agg")
+    notebook = json.loads((root / "examples/results.ipynb").read_text())
+    names: dict[str, object] = {}
+    for cell in notebook["cells"]:
+        if cell["cell_type"] == "code":
+            assert cell["outputs"] == []
+            exec("".join(cell["source"]), names)
+    assert list(names["worst"]["clip"]) == ["b", "a"]
+    assert names["laps"].loc["cubic", "std"] == pytest.approx(0.1 * 2**0.5)
