@@ -1,6 +1,6 @@
 """Hobble: from motion capture to a character controller that limps the way the body would.
 
-`hobble.results(configuration)` gives the tables of results as data frames, see `hobble.measures.results`.
+The function `results` of this package gives tables of results as data frames (`hobble.measures.results`).
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Tables of results as pandas data frames, to go on with in a notebook: `hobble.results("holden")`."""
+"""Tables of results as pandas data frames, for a notebook. The package `hobble` has the function, too."""
 
 from __future__ import annotations
 
