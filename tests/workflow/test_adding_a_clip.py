@@ -9,7 +9,7 @@ import pytest
 
 from hobble.database.reader import Database
 
-pytestmark = pytest.mark.workflow
+pytestmark = [pytest.mark.workflow, pytest.mark.slow]
 
 TARGET = "results/datasets/mine/database/injury"
 DATASET = "skeleton: holden31\nfolder: mine\nmirror: false\nterrain: {patches: 100}\n"

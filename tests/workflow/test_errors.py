@@ -153,6 +153,7 @@ def test_a_full_disk_gives_a_message_and_the_next_run_completes(workflow, small_
     assert {p: p.read_bytes() for p in whole} == whole
 
 
+@pytest.mark.slow
 def test_one_bad_clip_of_a_batch_does_not_stop_the_others(clips: list[Path], workflow) -> None:
     """There are enough clips for shared batches. Only one batch, of three clips, is requested."""
     names = [f"clip-{number}" for number in range(200)]

@@ -49,10 +49,10 @@ def test_a_hurt_version_has_the_mood_of_its_clip(base: Path) -> None:
     assert set(project.configurations.splits("both")) == both
     database = project.configurations.database("both")
     assert database.endswith("mine/database/injury+mood"), "in the order of the list of channels"
-    people = project.measurements.people("both", "manners")
+    people = project.measurements.params("both", "manners")["people"]
     assert {clip for clip, person in people.items() if person == "ann"} == {c for c in both if c[0] in "ac"}
     assert {person for clip, person in people.items() if clip[0] == "b"} == {"b"}
-    assert project.measurements.people("both", "accuracy") == {}
+    assert project.measurements.params("both", "accuracy")["people"] == {}
 
 
 def test_a_status_in_the_data_set_replaces_the_file(base: Path) -> None:

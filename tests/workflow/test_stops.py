@@ -61,12 +61,10 @@ def same_network(one: Path, other: Path) -> bool:
 
 @pytest.mark.parametrize(
     ("number", "to_all"),
-    [
-        pytest.param(signal.SIGINT, True, id="Ctrl-C"),
-        pytest.param(signal.SIGTERM, False, id="SIGTERM", marks=pytest.mark.slow),
-    ],
+    [pytest.param(signal.SIGINT, True, id="Ctrl-C"), pytest.param(signal.SIGTERM, False, id="SIGTERM")],
 )
-def test_a_signal_ends_all_jobs_and_leaves_no_lock(
+@pytest.mark.slow
+def test_a_signal_ends_all_jobs_and_the_training_continues(
     finished, copied, number: signal.Signals, to_all: bool
 ) -> None:
     process = started(copied, "-c2", WEIGHTS, until=without_network(copied))
@@ -81,6 +79,20 @@ def test_a_signal_ends_all_jobs_and_leaves_no_lock(
     copied.run("-c2", WEIGHTS)
     assert same_network(finished.folder, copied.folder)
     assert not list(copied.folder.rglob("*.part"))
+
+
+def test_ctrl_c_ends_all_jobs_at_once_and_leaves_no_lock(workflow) -> None:
+    target = "results/datasets/tiny/terrain/patches.npz"
+    process = started(workflow, "-c2", target, until=lambda: list(workflow.folder.glob("results/**/*.log")))
+    jobs = jobs_of(process)
+    assert running(jobs)
+    asked = time.monotonic()
+    os.killpg(process.pid, signal.SIGINT)
+    assert process.wait(timeout=20) == 1
+    assert time.monotonic() - asked < 5
+    assert not running(jobs)
+    assert "Traceback" not in (workflow.folder / "said.txt").read_text()
+    assert workflow.planned(target) == {"terrain_patches": 1}
 
 
 @pytest.mark.slow

@@ -18,13 +18,7 @@ rule measure:
             w.configuration, w.measure, attempt
         ),
     params:
-        configuration=lambda w: w.configuration,
-        module=lambda w: measurements.module_of(w.measure),
-        splits=lambda w: measurements.splits(w.configuration, w.measure),
-        summaries=lambda w: measurements.summaries(w.configuration, w.measure),
-        people=lambda w: measurements.people(w.configuration, w.measure),
-        runtime=lambda w: measurements.runtime(w.configuration, w.measure),
-        options=lambda w: measurements.options(w.configuration, w.measure),
+        measured=lambda w: measurements.params(w.configuration, w.measure),
         code=lambda w: measurements.code(
             w.measure, configurations.model_package(w.configuration)
         ),
@@ -50,14 +44,8 @@ rule measure_piece:
             w.configuration, w.measure, attempt
         ),
     params:
-        configuration=lambda w: w.configuration,
+        measured=lambda w: measurements.params(w.configuration, w.measure),
         piece=lambda w: w.piece,
-        module=lambda w: measurements.module_of(w.measure),
-        splits=lambda w: measurements.splits(w.configuration, w.measure),
-        summaries=lambda w: measurements.summaries(w.configuration, w.measure),
-        people=lambda w: measurements.people(w.configuration, w.measure),
-        runtime=lambda w: measurements.runtime(w.configuration, w.measure),
-        options=lambda w: measurements.options(w.configuration, w.measure),
         code=lambda w: measurements.code(
             w.measure,
             configurations.model_package(w.configuration),

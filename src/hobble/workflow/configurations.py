@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+from collections.abc import Iterable
 from typing import Any
 
 from hobble.config.load_configuration import Catalogue
@@ -180,8 +181,9 @@ class Measurements:
         chosen = measure_named(name)
         if chosen.pieces is None:
             return []
-        options = chosen.options.model_validate(self.options(configuration, name))
-        runtime = Runtime.model_validate(self.runtime(configuration, name))
+        params = self.params(configuration, name)
+        options = chosen.options.model_validate(params["options"])
+        runtime = Runtime.model_validate(params["runtime"])
         pieces = chosen.pieces(options, runtime, self.configurations.network_options(configuration).modes)
         return [piece_file(configuration, name, piece) for piece in pieces] if len(pieces) > 1 else []
 
@@ -199,43 +201,32 @@ class Measurements:
             return self.package.published_file()
         return result_file(configuration, measure_named(item).name)
 
-    def splits(self, configuration: str, name: str) -> dict[str, str]:
-        """Clip -> "train" or "held_out"; {} if the measurement does not read clips."""
-        return self.configurations.splits(configuration) if "clips" in measure_named(name).inputs else {}
+    def params(self, configuration: str, name: str) -> dict[str, Any]:
+        """What the script of a measurement gets, as plain data.
 
-    def summaries(self, configuration: str, name: str) -> list[str]:
-        """The clips whose summaries of rows the measurement reads."""
-        return (
-            list(self.configurations.splits(configuration))
-            if "summaries" in measure_named(name).inputs
-            else []
-        )
-
-    def people(self, configuration: str, name: str) -> dict[str, str]:
-        """Clip -> the person who walks in it; {} if the measurement does not need this.
-
-        If the data set does not name the person in a clip, the clip's name stands for one more person. The
-        mirror and the hurt versions of a clip have the clip's person.
+        module: full name of the module that holds the measurement. splits: clip -> "train" or "held_out"; {}
+        if it does not read clips. summaries: the clips whose summaries of rows it reads. people: clip -> the
+        person who walks in it; {} if it does not need this. (If the data set does not name the person in a
+        clip, the clip's name stands for one more person. Mirrors and hurt versions have the clip's person.)
+        options, runtime: the keys of the sections `evaluation` and `runtime` that it uses.
         """
-        if not measure_named(name).people:
-            return {}
-        dataset = self.configurations.dataset(configuration)
-        splits = self.configurations.splits(configuration)
-        return {clip: self.clips.entry(dataset, clip).person or original(clip) for clip in splits}
+        chosen, configurations = measure_named(name), self.configurations
+        dataset, splits = configurations.dataset(configuration), configurations.splits(configuration)
 
-    def options(self, configuration: str, name: str) -> dict[str, Any]:
-        """Key -> value of the section `evaluation`, for the keys that the measurement uses."""
-        keys = measure_named(name).options.model_fields
-        return self.configurations.section(configuration, "evaluation", *keys) if keys else {}
+        def keys(section: str, names: Iterable[str]) -> dict[str, Any]:
+            return configurations.section(configuration, section, *names) if names else {}
 
-    def runtime(self, configuration: str, name: str) -> dict[str, Any]:
-        """Key -> value of the section `runtime`, for the keys that the measurement uses."""
-        keys = measure_named(name).runtime
-        return self.configurations.section(configuration, "runtime", *keys) if keys else {}
-
-    def module_of(self, name: str) -> str:
-        """Full name of the Python module that holds the measurement."""
-        return measure_named(name).module
+        return {
+            "configuration": configuration,
+            "module": chosen.module,
+            "splits": splits if "clips" in chosen.inputs else {},
+            "summaries": list(splits) if "summaries" in chosen.inputs else [],
+            "people": {clip: self.clips.entry(dataset, clip).person or original(clip) for clip in splits}
+            if chosen.people
+            else {},
+            "options": keys("evaluation", chosen.options.model_fields),
+            "runtime": keys("runtime", chosen.runtime),
+        }
 
     def code(self, name: str, *modules: str, script: str = "measure") -> str:
         """Hash of the code of the measurement `name`.

@@ -29,6 +29,7 @@ from hobble.workflow.contents import stamp
 from hobble.workflow.lifetime import ends_with_run
 
 if TYPE_CHECKING:
+    from hobble.core.section import Section
     from hobble.measures.measure import Measure, MeasureInputs
 
 # The disk is full, a quota is used up, or the disk is read-only. Every other clip would fail, too.
@@ -88,34 +89,29 @@ class Inputs:
         return {clip: self(name.replace("{clip}", clip)) for clip in clips}
 
 
-def measure_of(snakemake: Any) -> Measure:
-    """The measurement of a job.
+def measure_of(snakemake: Any) -> tuple[Measure, Section, MeasureInputs]:
+    """The measurement of a job, its options and its inputs.
 
     Only this measurement's module is imported. A job runs again if code that its script imports changes. So
     if the script imported all measurements, each new one would make all others run again.
     """
-    measure: Measure = importlib.import_module(snakemake.params.module).MEASURE
-    return measure
-
-
-def measure_inputs(snakemake: Any) -> MeasureInputs:
-    """The inputs of the measurement of a job."""
     from hobble.measures.measure import MeasureInputs
     from hobble.runtime.options import Runtime
 
-    params, files = snakemake.params, dict(snakemake.input.items())
+    params, files = snakemake.params.measured, dict(snakemake.input.items())
+    measure: Measure = importlib.import_module(params["module"]).MEASURE
     find = Inputs(files.pop("batches", ()))
-    clips = find.each("database/clips/{clip}.npz", params.splits)
-    return MeasureInputs(
-        params.configuration,
+    inputs = MeasureInputs(
+        params["configuration"],
         {name: Path(file) for name, file in files.items() if name != "pieces"},
-        {clip: Path(file) for clip, file in clips.items()},
-        params.splits,
-        params.people,
-        [Path(file) for file in find.each("database/clips/{clip}.json", params.summaries).values()],
-        Runtime.model_validate(params.runtime),
+        {clip: Path(find(f"database/clips/{clip}.npz")) for clip in params["splits"]},
+        params["splits"],
+        params["people"],
+        [Path(find(f"database/clips/{clip}.json")) for clip in params["summaries"]],
+        Runtime.model_validate(params["runtime"]),
         {Path(file).stem: Path(file) for file in files.get("pieces", ())},
     )
+    return measure, measure.options.model_validate(params["options"]), inputs
 
 
 @dataclass(frozen=True)
