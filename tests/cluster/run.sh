@@ -102,7 +102,7 @@ say "$submitted jobs submitted, $restarts of them a second time"
 # By its last file, not by its status, which bash may have forgotten among thousands of processes since.
 wait "$local_run"
 [ -e "$folder/local/$target" ] || { tail -n 40 "$folder/local.log" >&2; fail "the local run failed"; }
-"$python" "$here/same.py" "$folder/local" "$folder/cluster" || fail "the results differ"
+(cd "$root" && "$python" -m tests.faults.same "$folder/local" "$folder/cluster") || fail "the results differ"
 "${through_slurm[@]}" >"$log" 2>&1 && grep -q 'Nothing to be done' "$log" || fail "a second run had something to do"
 
 # The same batches once more by two tasks, as on two machines: srun starts torchrun twice, on the one node there is.

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from hobble.core import quat
-from hobble.core.ik import aim_bone, two_bone_knee
+from hobble.core.skeleton import aim_bone, two_bone_knee
 
 FEW = settings(max_examples=60, deadline=None)
 points = arrays(float, 3, elements=st.floats(-60, 60, allow_subnormal=False))

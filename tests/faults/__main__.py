@@ -13,7 +13,7 @@ from collections.abc import Callable
 from pathlib import Path
 from random import Random
 
-from . import attacks, runs, texts, throws
+from . import runs, texts, throws
 from .grammar import Case
 from .judging import FAULT, REFUSED, REMADE, SKIPPED, UNHARMED, Throw
 from .lab import ROOT, Lab
@@ -56,7 +56,6 @@ def main() -> int:
         )
         if arguments.only is None:
             thrown += _texts(lab, Path(scratch), arguments.seed, arguments.rounds * TEXTS_PER_ROUND)
-            thrown += attacks.thrown(Path(scratch))
     listed = _list(thrown)
     print(listed)
     if arguments.page:

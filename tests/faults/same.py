@@ -1,4 +1,4 @@
-"""Compares two artefacts without measured times."""
+"""Compares artefacts without times; `python -m tests.faults.same FOLDER FOLDER` those of two runs."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import csv
 import io
 import json
 import re
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -69,3 +70,22 @@ def _checkpoint(a: Path, b: Path) -> bool:
             if not np.array_equal(x, y, equal_nan=x.dtype.kind == "f"):
                 return False
     return True
+
+
+# .made has notes of how long each clip took.
+OF_THE_RUN = {"logs", "benchmarks", "checkpoints", "page", ".made", "report.html"}
+
+
+def main(first: str, second: str) -> int:
+    """Compare results/ of two runs. Returns 1 if a file differs, or if only one of them has it."""
+    runs = [Path(folder, "results") for folder in (first, second)]
+    names = {str(file.relative_to(run)) for run in runs for file in run.rglob("*") if file.is_file()}
+    names = {name for name in names if not OF_THE_RUN & set(Path(name).parts)}
+    different = sorted(name for name in names if not same(runs[0] / name, runs[1] / name))
+    said = f"{len(names)} artefacts are the same, bit for bit"
+    print("\n".join(f"differs: {name}" for name in different) or said)
+    return int(bool(different or not names))
+
+
+if __name__ == "__main__":
+    sys.exit(main(*sys.argv[1:]))

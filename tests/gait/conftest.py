@@ -11,9 +11,8 @@ import pytest
 
 from hobble.cli.gait import read_clip
 from hobble.core.clip import Clip
-from hobble.core.ik import two_bone_knee
 from hobble.core.quat import Array
-from hobble.core.skeleton import Skeleton
+from hobble.core.skeleton import Skeleton, two_bone_knee
 
 CYCLE = 60  # frames
 THIGH, SHANK = 41.0, 40.0

@@ -13,8 +13,7 @@ import pytest
 from hobble.core import quat
 from hobble.core.bvh import write_bvh
 from hobble.core.clip import Clip
-from hobble.core.ik import aim_bone, two_bone_knee
-from hobble.core.skeleton import Skeleton, local_rotations
+from hobble.core.skeleton import Skeleton, aim_bone, local_rotations, two_bone_knee
 from hobble.motion.options import ClipMotion
 
 OPTIONS: dict[str, Any] = ClipMotion().model_dump()

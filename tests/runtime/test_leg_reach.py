@@ -7,8 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hobble.core import quat
-from hobble.core.ik import two_bone_knee
-from hobble.core.skeleton import Skeleton
+from hobble.core.skeleton import Skeleton, two_bone_knee
 from hobble.runtime.feet import leg_joints, rest_facing
 from hobble.runtime.leg_reach import MOST_ADDED, bend_leg, move_heel
 from tests.runtime.one_figure import Feet, crouched

@@ -9,9 +9,8 @@ import numpy as np
 
 from hobble.core import quat
 from hobble.core.clip import Clip
-from hobble.core.ik import two_bone_knee
 from hobble.core.quat import Array
-from hobble.core.skeleton import Skeleton
+from hobble.core.skeleton import Skeleton, two_bone_knee
 from hobble.core.smooth import gaussian, interpolate_curve, smooth_above
 from hobble.hurt.effects import SIDES, Effects
 from hobble.hurt.healthy_clip import (

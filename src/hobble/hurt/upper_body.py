@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from hobble.core import quat
-from hobble.core.ik import aim_bone
 from hobble.core.quat import Array
-from hobble.core.skeleton import Skeleton
+from hobble.core.skeleton import Skeleton, aim_bone
 from hobble.core.smooth import gaussian
 from hobble.hurt.amounts import HARMONICS
 from hobble.hurt.effects import LEFT, RIGHT, SIDES, Effects, joint_and_ancestors

@@ -21,9 +21,8 @@ import numpy as np
 from hobble.core import quat
 from hobble.core.clip import Clip
 from hobble.core.errors import HobbleError, InputError
-from hobble.core.ik import aim_bone, two_bone_knee
 from hobble.core.quat import Array
-from hobble.core.skeleton import Skeleton, local_rotations, rest_positions
+from hobble.core.skeleton import Skeleton, aim_bone, local_rotations, rest_positions, two_bone_knee
 from hobble.core.smooth import smoothstep
 from hobble.motion.axes import rest_frame, unit
 from hobble.motion.body import SIDES

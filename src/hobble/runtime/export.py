@@ -13,9 +13,8 @@ from hobble.core.bvh import write_bvh
 from hobble.core.clip import Clip
 from hobble.core.errors import HobbleError
 from hobble.core.files import load_npz
-from hobble.core.ik import two_bone_knee
 from hobble.core.quat import Array
-from hobble.core.skeleton import Skeleton, forward_kinematics, local_rotations
+from hobble.core.skeleton import Skeleton, forward_kinematics, local_rotations, two_bone_knee
 from hobble.figure.gltf import BodyMotion, fitted_rotations, write_glb
 from hobble.models.network import Network
 from hobble.runtime.feet import leg_joints

@@ -87,8 +87,8 @@ def move_heel(
     position: (J, 3), changed in place. ahead: the direction in which a straight knee bends. Bone lengths
     stay. The knee keeps bending to the same side, but is at least KNEE_AHEAD ahead of the line between hip
     and heel. If the target is out of reach, the leg stretches to 99.9% of its length. The knee's angle
-    follows from the law of cosines, as in `hobble.core.ik.two_bone_knee`. If `shift` is 0 and the knee is far
-    enough ahead, nothing changes.
+    follows from the law of cosines, as in `hobble.core.skeleton.two_bone_knee`. If `shift` is 0 and the knee
+    is far enough ahead, nothing changes.
     """
     # Vectors: s shift; h hip; t thigh, from hip to knee; l shank, from knee to heel; a from hip to heel;
     # w from hip to the shifted heel. `upper` and `lower` are the lengths of thigh and shank.

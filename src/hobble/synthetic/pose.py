@@ -6,9 +6,8 @@ import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
 from hobble.core import quat
-from hobble.core.ik import two_bone_knee
 from hobble.core.quat import Array
-from hobble.core.skeleton import Skeleton, local_rotations
+from hobble.core.skeleton import Skeleton, local_rotations, two_bone_knee
 from hobble.core.smooth import smooth_above
 from hobble.synthetic.feet import FootPoses
 from hobble.synthetic.plan import Ground, PlannedPath, flat
