@@ -21,7 +21,6 @@ from hobble.measures.injury_run import (
     into_a_jog,
     largest_accelerations,
     respond,
-    second_injuries,
     second_sweep,
     second_thresholds,
     sweep_rows,
@@ -126,7 +125,6 @@ def test_every_link_is_swept_and_those_never_hurt_are_marked(hurtable) -> None:
     assert len(result["rows"]) == 2 * 30 * 11
     assert len(result["falling"]) == 2 * 30 * 10
     assert [r["link"] for r in result["responses"] if r["trained"]] == 2 * hurt
-    assert [(r["first"], r["second"]) for r in result["second"]] == [tuple(hurt)]  # two thighs: one first
     assert result["second_sweep"] == [], "none of the published pairs"
     assert [(r["link"], r["severities"], np.shape(r["poses"])) for r in result["strips"]] == [
         (link, (0, 4, 7, 10), (4, 31, 3)) for link in hurt
@@ -137,23 +135,6 @@ def test_every_link_is_swept_and_those_never_hurt_are_marked(hurtable) -> None:
 
 def test_two_measurements_give_the_same_numbers(hurtable) -> None:
     assert response(hurtable, seconds=0.5) == response(hurtable, seconds=0.5)
-
-
-def test_a_second_injury_adds_to_the_first(hurtable) -> None:
-    """Each injury lowers the head by its own amount, whatever the other is."""
-    other = "RightLeg-RightFoot"
-    found = second_injuries(slowing(hurtable, (KNEE, other)), [KNEE, other], 2.0, RUNTIME)
-    assert [(r["first"], r["second"]) for r in found] == [(KNEE, other), (other, KNEE)]
-    for row in found:
-        assert row["share"] == pytest.approx(1, rel=0.03)
-        assert row["spearman"] == pytest.approx(1)
-        # The first, at 7, is still seen beside the second at 10.
-        assert row["from_second_cm"] == pytest.approx(0.7 * row["from_first_cm"], rel=0.05)
-    # One that the network does not feel adds nothing.
-    deaf = second_injuries(slowing(hurtable), [KNEE, other], 2.0, RUNTIME)
-    assert deaf[0]["share"] is None
-    assert deaf[0]["from_first_cm"] == pytest.approx(0, abs=0.01)
-    assert deaf[1]["share"] == pytest.approx(1, rel=0.03)
 
 
 def test_a_second_injury_is_swept_over_a_first_as_published(hurtable) -> None:

@@ -12,6 +12,7 @@ import yaml
 
 from hobble.core.skeleton import Skeleton
 from hobble.measures import accuracy as of_accuracy
+from hobble.measures import responsivity as of_laps
 from hobble.measures.compare import ConfigurationResults, compare_configurations
 from hobble.measures.measure import all_measures
 from hobble.models.load import load_network
@@ -120,16 +121,34 @@ def test_training_is_drawn_over_passes_seconds_and_samples(
     assert chart.options["passes"][0]["x"][-1] == max(material.history["pass"])
 
 
-def test_every_pair_is_in_the_table_and_the_map(compared: dict[str, Any]) -> None:
-    table, chart = of_accuracy.difference_table(compared), of_accuracy.difference_map(compared)
-    assert table is not None
-    assert chart is not None
+def test_every_pair_is_in_the_map(compared: dict[str, Any]) -> None:
+    chart = of_accuracy.difference_map(compared)
     held_out = chart.options["held-out clips, sd of single frames"]
     of_means = chart.options["held-out clips, sd of the means of clips"][0]["z"][0][1]
-    overall = next(row for row in table.rows if row[2] == "error, held out")
-    assert held_out[0]["z"][0][1] == overall[-2] == held_out[0]["z"][1][0]
-    assert of_means == overall[-1]
-    assert of_means != overall[-2]
+    (overall,) = [row for row in compared["difference"] if row["over"] == "held_out"]
+    assert held_out[0]["z"][0][1] == overall["difference"] == held_out[0]["z"][1][0]
+    assert of_means == overall["difference_of_means"] != overall["difference"]
+
+
+def test_published_clips_and_laps_are_drawn_beside_ours(compared: dict[str, Any]) -> None:
+    """Figures 5.1, 5.2, 5.6, 5.7 and 5.11 of Segerstedt, and his tables of the appendix."""
+    lines = of_accuracy.clip_lines(compared)
+    assert lines is not None
+    means = {trace["name"]: trace for trace in lines.options["mean"]}
+    assert set(means) == {"holden", "holden, published", "ava", "ava, published"}
+    assert means["holden, published"]["y"][0] == pytest.approx(4.96)
+    assert means["holden, published"]["x"][1] == "LocomotionFlat01_000_mirror"
+    assert "ava, published" not in {trace["name"] for trace in lines.options["standard deviation"]}
+    laps = {trace["name"]: trace for trace in of_laps.lap_lines(compared).options["constant phase"]}
+    assert (len(laps["ava, published"]["y"]), laps["ava, published"]["y"][-1]) == (19, 1.397291)
+    assert [t["name"] for t in of_laps.lap_boxes(compared).traces][:2] == [
+        "holden, ours",
+        "holden, published",
+    ]
+    chart = compare_page.training_curves(compared)
+    assert chart is not None
+    (curve,) = [t for t in chart.options["passes"] if t["name"] == "holden, published"]
+    assert (curve["x"][-1], curve["y"][0], curve["y"][-1]) == (20, 0.442, 0.254)
 
 
 def test_published_figures_are_shown_with_ours(compared: dict[str, Any]) -> None:

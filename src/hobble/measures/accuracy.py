@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from hobble.report.gather import ReportMaterial
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from itertools import combinations, product
 from typing import Any
 
@@ -44,7 +44,6 @@ from hobble.report.parts import (
     TemplatePart,
     Trace,
     axis,
-    bar_trace,
     citation,
     configuration_colours,
     configuration_names,
@@ -99,49 +98,12 @@ def _rows(found: Json) -> list[dict[str, Any]]:
     return sorted(rows, key=lambda row: (row["split"] != "held_out", row["mean"]))
 
 
-def _height(count: int) -> int:
-    """The height in pixels of a chart with a row for each of `count` clips."""
-    return max(260, 110 + 21 * count)
+def clip_boxes(found: Json, material: ReportMaterial) -> Chart:
+    """A box for each clip: quantiles of its error over frames and joints. Published means are diamonds.
 
-
-def clip_bars(found: Json, material: ReportMaterial) -> Chart | None:
-    """A bar with the mean relative error of each clip, and a line at the published mean.
-
-    A whisker on each bar shows the standard deviation. None if no clip was measured.
+    Held-out clips come first, then the others by their mean error. A line is at the published mean of all
+    clips.
     """
-    rows = _rows(found)[::-1]  # plotly puts the first clip at the bottom
-    if not rows:
-        return None
-    traces = []
-    for split, name in NAMES.items():
-        chosen = [row for row in rows if row["split"] == split]
-        means, clips = [100 * row["mean"] for row in chosen], [row["clip"] for row in chosen]
-        bars = bar_trace(name, means, clips, COLOURS[split], "%{y}: %{x:.2f} %<extra></extra>")
-        sds = {"array": [100 * (row.get("sd") or 0) for row in chosen], "arrayminus": [0 for _ in chosen]}
-        whiskers = {"type": "data", "symmetric": False, "color": "@faint", "thickness": 1, "width": 2, **sds}
-        traces.append({**bars, "orientation": "h", "error_x": whiskers})
-    theirs = _published_means(material.published, material.name)
-    if shown := [row["clip"] for row in rows if row["clip"] in theirs]:
-        diamond = {"symbol": "diamond-open", "size": 7, "color": "@ink"}
-        traces.append(marker_trace("published", [100 * theirs[clip] for clip in shown], shown, diamond))
-    published = material.published_entry("accuracy")
-    line = reference_line(100 * published["mean"], f"{published['label']}, published") if published else {}
-    held_out = any(row["split"] == "held_out" for row in rows)
-    return Chart(
-        "accuracy-clips",
-        "Error of each clip",
-        "The error of a joint is the distance between its predicted and its captured position, divided by "
-        "its distance from the root (eq. 3.1 of Segerstedt). Bars are means over frames and joints. Whiskers "
-        "are one standard deviation long."
-        + (" Held-out clips come first: the network was not trained on them." if held_out else ""),
-        traces,
-        {**_clip_axes(row["clip"] for row in rows), **line, "bargap": 0.35, "barmode": "overlay"},
-        height=_height(len(rows)),
-    )
-
-
-def clip_boxes(found: Json) -> Chart:
-    """A box for each clip: quantiles of its error over frames and joints."""
     rows = [row for row in _rows(found)[::-1] if has_quantiles(row)]  # plotly puts the first at the bottom
     traces = []
     for split, fill, line in (("held_out", "@accent-wash", "@accent"), ("train", "@sunken", "@faint")):
@@ -149,21 +111,28 @@ def clip_boxes(found: Json) -> Chart:
             box = boxes(NAMES[split], chosen, COLOURS[split])
             place = {"orientation": "h", "y": [row["clip"] for row in chosen]}
             traces.append({**box, **place, "line": {"width": 1.4, "color": line}, "fillcolor": fill})
+    theirs = _published_means(material.published, material.name)
+    if shown := [row["clip"] for row in rows if row["clip"] in theirs]:
+        diamond = {"symbol": "diamond-open", "size": 7, "color": "@ink"}
+        traces.append(marker_trace("published mean", [100 * theirs[clip] for clip in shown], shown, diamond))
+    published = material.published_entry("accuracy")
+    mean = reference_line(100 * published["mean"], f"{published['label']}, published") if published else {}
+    axes = {"xaxis": axis("relative error, %", rangemode="tozero")}
+    axes["yaxis"] = ordered_axis(row["clip"] for row in rows)
+    held_out = any(row["split"] == "held_out" for row in rows)
     return Chart(
         "accuracy-boxes",
-        "Spread within each clip",
-        "Each box holds the middle half of the errors of a clip. The solid line in it is the median, "
-        "the dotted line the mean. Whiskers reach from the 5th to the 95th percentile. A box near zero with "
-        "a long whisker means that the clip is easy except for a few moments.",
+        "Error of each clip",
+        "The error of a joint is the distance between its predicted and its captured position, divided by "
+        "its distance from the root (eq. 3.1 of Segerstedt). Each box holds the middle half of the errors "
+        "of a clip. The solid line in it is the median, the dotted line the mean. Whiskers reach from the "
+        "5th to the 95th percentile. A box near zero with a long whisker means that the clip is easy except "
+        "for a few moments."
+        + (" Held-out clips come first: the network was not trained on them." if held_out else ""),
         traces,
-        {**_clip_axes(row["clip"] for row in rows), "boxmode": "overlay"},
-        height=_height(len(rows)),
+        {**axes, **mean, "boxmode": "overlay"},
+        height=max(260, 110 + 21 * len(rows)),
     )
-
-
-def _clip_axes(clips: Iterable[str]) -> dict[str, Any]:
-    """The axes of a chart with a row for each clip, from the bottom."""
-    return {"xaxis": axis("relative error, %", rangemode="tozero"), "yaxis": ordered_axis(clips)}
 
 
 def boxes(name: str, errors: Sequence[Json], colour: str) -> Trace:
@@ -236,8 +205,7 @@ def section(found: Json, material: ReportMaterial) -> PageSection:
             SectionPart(0, Paragraph(INTRODUCTION + explain_endings(found) + describe_sample(found))),
             SectionPart(9, Paragraph(caveat(found, material))),
             SectionPart(10, published_table(found, material), open=True, short=True),
-            SectionPart(20, clip_bars(found, material), tall=True),
-            SectionPart(30, clip_boxes(found), tall=True),
+            SectionPart(30, clip_boxes(found, material), tall=True),
             SectionPart(60, accuracy_table(found, material.name)),
             SectionPart(90, TemplatePart("captured.html.j2")),
         ],
@@ -486,19 +454,6 @@ def _published_clips(all_measured: Sequence[ConfigurationResults], published: Js
     ]
 
 
-# Columns of the table of pairs of configurations: key in compare.json -> heading. "one" and "other" are the
-# two configurations of a pair. "sd of frames" is the standard deviation over single frames. "sd of means" is
-# that of the means of clips, or, for frame times, of the means of laps on the test track.
-PAIR_COLUMNS = {
-    "mean_a": "mean, one",
-    "sd_a": "sd of frames, one",
-    "sd_of_means_a": "sd of means, one",
-    "mean_b": "mean, other",
-    "sd_b": "sd of frames, other",
-    "sd_of_means_b": "sd of means, other",
-    "difference": "eq. 3.2, frames",
-    "difference_of_means": "eq. 3.2, means",
-}
 # The difference between two configurations is the difference of their mean errors, divided by standard
 # deviations (sd; eq. 3.2 of Segerstedt 2021). compare.json has it twice, with different standard deviations.
 # Key of the difference -> what it is divided by, for the menu of the chart.
@@ -513,7 +468,6 @@ def compared_section(compared: Compared) -> PageSection:
         [
             SectionPart(10, error_boxes(compared)),
             SectionPart(30, difference_map(compared)),
-            SectionPart(40, difference_table(compared)),
             SectionPart(50, clip_lines(compared)),
             SectionPart(60, published_clips_table(compared)),
         ],
@@ -582,23 +536,6 @@ def _boxes_of_means(compared: Compared, split: str, label: str) -> dict[str, lis
                 box = {"type": "box", "name": f"{name}, {whose}", "y": y, "boxmean": True, "boxpoints": False}
                 traces.append({**box, "line": {"width": 1.6, "color": colour}})
     return {label: traces} if any(clip_means(entry, split) for entry in compared["accuracy"]) else {}
-
-
-def difference_table(compared: Compared) -> Table:
-    """Errors and frame times of each pair of configurations, and their difference.
-
-    By eq. 3.2 of Segerstedt (2021), the difference of two means is divided by the mean of their standard
-    deviations. One column has the result for deviations over single frames, another for those over means of
-    clips or laps.
-    """
-    pairs = [("error", r) for r in compared["difference"]]
-    pairs += [("mean ms a frame", r) for r in compared["milliseconds"].get("difference", ())]
-    rows = [
-        [r["a"], r["b"], f"{what}, {r['over'].replace('_', ' ')}", *(r.get(key) for key in PAIR_COLUMNS)]
-        for what, r in pairs
-    ]
-    columns = [*map(Column, ("one", "other", "measured")), *map(Column.number, PAIR_COLUMNS.values())]
-    return Table("compare-difference", columns, rows, "Differences between all pairs")
 
 
 def clip_lines(compared: Compared) -> Chart | None:

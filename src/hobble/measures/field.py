@@ -132,7 +132,7 @@ def compared(all_measured: Sequence[ConfigurationResults], published: Json) -> C
         entries=[
             {"configuration": m.name, **_flat(m.results_of("field"))}
             for m in all_measured
-            if m.results_of("field")
+            if m.results_of("field").get("straight")
         ]
     )
 

@@ -19,7 +19,6 @@ from hobble.core.files import Json
 from hobble.core.section import PositiveFloat
 from hobble.measures.compare import ComparisonAddition, ConfigurationResults
 from hobble.measures.measure import Cost, Measure, SampleOptions
-from hobble.measures.recognition import NAMED_AXES
 from hobble.report.parts import (
     Chart,
     ChartGroup,
@@ -34,7 +33,6 @@ from hobble.report.parts import (
     Trace,
     axis,
     format_number,
-    heatmap,
     line_trace,
     marker_trace,
     ordered_axis,
@@ -211,7 +209,7 @@ def with_spoken_links(found: Json, material: ReportMaterial) -> dict[str, Any]:
 def _parts(found: Json, material: ReportMaterial) -> list[SectionPart]:
     """The parts of the section. found: injury.json, with links renamed."""
     name, published = material.name, material.published["severities"]
-    rows, responses, second = (found.get(key) or [] for key in ("rows", "responses", "second"))
+    rows, responses = (found.get(key) or [] for key in ("rows", "responses"))
     sweep, thresholds = (found.get(key) or [] for key in ("second_sweep", "second_thresholds"))
     untrained = {r["link"] for r in responses if not _trained(r)}
     words = {"from_worst": "from severity 10"}
@@ -226,10 +224,8 @@ def _parts(found: Json, material: ReportMaterial) -> list[SectionPart]:
         SectionPart(15, strip_chart(found.get("strips") or (), material.network["skeleton"])),
         SectionPart(20, sweep_charts(rows, found.get("falling") or (), untrained) if rows else None),
         SectionPart(25, range_table(name, rows, untrained, published["one_link"]), open=True, short=True),
-        SectionPart(40, second_chart(second)),
         SectionPart(42, sweep_chart(sweep, published)),
         SectionPart(45, table_of_rows(f"{name}-second-thresholds", thresholds, both), open=True, short=True),
-        SectionPart(50, table_of_rows(f"{name}-second-injury", second, "Every walk with two injuries")),
         SectionPart(51, table_of_rows(f"{name}-second-sweep", sweep, "Every step of a second injury")),
         SectionPart(60, ChartPair([divided_chart(found.get("divided") or ()), jog_chart(jogs, untrained)])),
         SectionPart(
@@ -517,39 +513,6 @@ def response_table(name: str, responses: Rows) -> Table:
     ]
     title = "Every link at severity 10, and the rank correlation of its effects with severity (Spearman's ρ)"
     return Table.of(f"{name}-injury-responses", columns, records, title)
-
-
-def second_chart(rows: Rows) -> Chart | None:
-    """The effect of a second injury in addition to a first one, with a cell for each pair of links.
-
-    rows: `second` of injury.json. None if it is empty.
-    """
-    if not rows:
-        return None
-    first_links, second_links = (list(dict.fromkeys(row[key] for row in rows)) for key in ("first", "second"))
-    by_pair = {(row["first"], row["second"]): row for row in rows}
-
-    def cells(key: str, number: str) -> list[Trace]:
-        """key: of a row. number: format of its value."""
-        values = [[by_pair.get((a, b), {}).get(key) for b in second_links] for a in first_links]
-        hover = f"%{{x}} in addition to %{{y}}: %{{z:{number}}}<extra></extra>"
-        return [heatmap(second_links, first_links, values, hover, texttemplate=f"%{{z:{number}}}")]
-
-    return Chart(
-        "second-injury",
-        "A second injury in addition to a first",
-        "Each row names the part of the body that is hurt first, at severity 7; if the part has several "
-        "links, one of them is hurt. Each column is a second injury, at severity 10. The cell says how much "
-        "the second injury changes the walk, in centimetres or as a share of its effect on a healthy body. A "
-        "pale cell means that the second injury hardly shows.",
-        layout=NAMED_AXES,
-        height=max(300, 190 + 24 * len(first_links)),
-        choose="Unit",
-        options={
-            "centimetres per joint": cells("from_first_cm", ".1f"),
-            "share of its effect on a healthy body": cells("share", ".0%"),
-        },
-    )
 
 
 def divided_chart(rows: Rows) -> Chart | None:

@@ -23,7 +23,6 @@ import numpy as np
 from hobble.channels.injury.shown import link_index_by_part
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
-from hobble.hurt.effects import part_of_link
 from hobble.measures.measure import MeasureInputs, Outcome
 from hobble.measures.sample import captured_motion, sample_to_measure, with_sample
 from hobble.measures.walks import (
@@ -54,8 +53,6 @@ WORST = len(SEVERITIES) - 1  # index in STEPS of the highest severity
 WALK_IN = 0.75  # time at the beginning in which figures reach their speed, as a share of a stretch's time
 # In the second crowd, a link hurts for the time of this many stretches, and then is healthy for as long.
 JUMP_STRETCHES = 2
-FIRST_SEVERITY = 7.0  # of the first of two injuries
-SECOND_SEVERITIES = (0.0, 5.0, 10.0)  # of the second of two injuries, in the order of the stretches
 # The experiment of Ferre et al. with two injuries: a first one at each of FIRST_SEVERITIES, while the second
 # one is swept over SEVERITIES, for the pairs of parts that hurt in their films.
 FIRST_SEVERITIES = (5.0, 10.0)
@@ -161,7 +158,6 @@ def injury_response(
         "rows": rows,
         "falling": falling,
         "responses": responses,
-        "second": second_injuries(network, trained, seconds, runtime),
         "second_sweep": sweep,
         "second_thresholds": thresholds,
         "into_a_jog": into_a_jog(network, links, trained, seconds, runtime),
@@ -316,57 +312,6 @@ def largest_accelerations(
     return out
 
 
-def second_injuries(network: Network, links: Sequence[str], seconds: float, runtime: Runtime) -> Rows:
-    """Walks in which a first link hurts at severity 7 and a second link at severities 0, 5 and 10.
-
-    There is one first link for each part of the body (`first_link_of_each_part`), because all 30 links would
-    take longer than all other measurements. Each of the other links is a second link. The result has a row
-    for each pair.
-
-    from_first_cm: distance between the walk with both injuries, the second at 10, and the walk with only the
-    first. share: `from_first_cm`, divided by the distance between the walk with only the second injury and
-    the healthy walk. from_second_cm: distance between the walk with both injuries and the walk with only the
-    second. It is 0 if the first injury does not show. spearman: rank correlation between the severity of the
-    second injury and the distance from the walk with only the first.
-    """
-    assert network.skeleton is not None
-    firsts = first_link_of_each_part(network.skeleton, links)
-    # (first link, second link) of each figure. Where the first is None, the second hurts alone.
-    pairs = [(a, b) for a, b in product([None, *firsts], links) if a != b]
-
-    def with_second_at(severity: float) -> list[Injury]:
-        return [{**({a: FIRST_SEVERITY} if a else {}), b: severity} for a, b in pairs]
-
-    stretches: list[Stretch] = [
-        (WALK_IN, [{}] * len(pairs)),
-        *((1, with_second_at(s)) for s in SECOND_SEVERITIES),
-    ]
-    crowd = walk_crowd(network, ["walk"] * len(pairs), stretches, seconds, runtime)
-    last = len(SECOND_SEVERITIES)  # number of the last stretch, because stretch 0 is only the beginning
-    alone: dict[str, tuple[Array, float, float]] = {}  # second link -> its cycle, spread and effect alone
-    out = []
-    for i, (first, second) in enumerate(pairs):
-        if first is None:
-            healthy, cycle = crowd.cycle(1, i), crowd.cycle(last, i)
-            effect = crowd.distance(last, i, healthy) - crowd.distance(1, i, healthy)
-            alone[second] = cycle, crowd.distance(last, i, cycle), effect
-            continue
-        cycle_of_second, spread, effect_alone = alone[second]
-        cycle_of_first = crowd.cycle(1, i)
-        from_first = [crowd.distance(1 + k, i, cycle_of_first) for k in range(last)]
-        added = from_first[-1] - from_first[0]  # the second item is the spread
-        row = {
-            "first": first,
-            "second": second,
-            "from_first_cm": round(added, 5),
-            "share": round(added / effect_alone, 5) if effect_alone > LEAST_EFFECT_CM else None,
-            "from_second_cm": round(crowd.distance(last, i, cycle_of_second) - spread, 5),
-            "spearman": spearman(SECOND_SEVERITIES, from_first),
-        }
-        out.append(row)
-    return out
-
-
 def second_sweep(
     network: Network, links: Sequence[str], seconds: float, runtime: Runtime
 ) -> tuple[Rows, Rows, Rows]:
@@ -444,18 +389,6 @@ def second_thresholds(rows: Rows, equal: int) -> dict[str, float | None]:
         "second_leads": leads[0] if leads else None,
         "equal_speed_share": round((rows[equal]["speed"] - slow) / (fast - slow), 5) if fast > slow else None,
     }
-
-
-def first_link_of_each_part(skeleton: Skeleton, links: Sequence[str]) -> list[str]:
-    """For each part of the body (such as the thigh), the first of `links` that belongs to it.
-
-    Left and right count as the same part.
-    """
-    pairs = dict(zip(skeleton.link_names, skeleton.links, strict=True))
-    first: dict[str, str] = {}
-    for link in links:
-        first.setdefault(part_of_link(skeleton, pairs[link]).name, link)
-    return list(first.values())
 
 
 def into_a_jog(
@@ -566,7 +499,7 @@ def run(inputs: MeasureInputs, options: Any) -> Outcome:
         runtime=inputs.runtime,
         seconds=options.seconds,
     )
-    names = ("second", "second_sweep", "second_thresholds", "into_a_jog", "divided")
+    names = ("second_sweep", "second_thresholds", "into_a_jog", "divided")
     tables = {name: result[name] for name in names}
     tables["sweep"] = [*result["rows"], *result["falling"]]
     return Outcome(with_sample(result, sample), tables, str(result["summary"]))

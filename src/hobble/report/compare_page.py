@@ -27,7 +27,7 @@ from hobble.report.parts import (
     line_trace,
     log_axis,
 )
-from hobble.report.sections import passes_axis, stage_axes
+from hobble.report.sections import passes_axis, published_curve, stage_axes
 from hobble.report.templates import chart_specs, compared_by, render_page
 
 LARGEST_PAGE = 19_850_000  # bytes; the page must stay under 20 MB
@@ -129,13 +129,19 @@ def training_curves(compared: Compared) -> Chart | None:
                 values += held_out
             traces.append(line_trace(f"{name}, training", x, train, colours[name], width=1.2, dash="dot"))
             values += train
+            passes, published = published_curve(compared["published"], name)
+            if key == "pass" and passes:
+                label = f"{name}, published"
+                traces.append(line_trace(label, passes, published, colours[name], width=1.2, dash="dashdot"))
+                values += published
     if not options:
         return None
     return Chart(
         "compare-training",
         "Error during training",
         "Mean squared error of the standardised output. Solid lines: held-out clips. Dotted lines: training "
-        "clips, measured with dropout.",
+        "clips, measured with dropout. Dash-dotted lines: the training errors of Segerstedt (2021; Figure "
+        "5.11), on the clips of Holden et al.",
         layout={"yaxis": log_axis("mean squared error", values)},
         height=420,
         choose="Horizontal axis",
@@ -168,6 +174,7 @@ def stage_charts(compared: Compared) -> list[Chart]:
 LONGER_NAMES = {
     "patches": "patches: pieces of ground cut from height maps (ours: all files of the terrain stage)",
     "database": "database, on disk",
+    "captured clips": "captured clips (ours: on the target skeleton, at 60 Hz)",
     "weights of 50 phases": "weights of 50 phases, as the code of Holden et al. stores them",
 }
 

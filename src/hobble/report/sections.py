@@ -56,6 +56,17 @@ def passes_axis(history: Mapping[str, Sequence[float | None]]) -> list[float]:
     ]
 
 
+def published_curve(published: Mapping[str, Any], configuration: str) -> tuple[list[float], list[float]]:
+    """(passes, mean squared errors) of Tables A.6 to A.9 of Segerstedt (2021); empty if none has the network.
+
+    He counts each of 20 passes a hundred times: ten sections, ten times each. Every tenth of these "epochs"
+    is printed. The curve of HOLDEN-XT begins after the 20 passes of HOLDEN.
+    """
+    errors = published["curves"].get(configuration, [])
+    before = 20 if configuration == "holden-xt" else 0
+    return [before + (n + 1) / 10 for n in range(len(errors))], errors
+
+
 def learning_curve(material: ReportMaterial) -> Chart:
     """The training error and, if clips were held out, the held-out error, on a logarithmic scale."""
     history = material.history
@@ -72,6 +83,10 @@ def learning_curve(material: ReportMaterial) -> Chart:
         "Mean squared error of the standardised output, on a logarithmic scale. A network that always "
         f"predicts the mean has error 1. The training error is measured with dropout{more}"
     )
+    passes, errors_of_his = published_curve(material.published, material.name)
+    if passes:
+        traces.append(line_trace("published", passes, errors_of_his, "@g2", dash="dot", width=1.4))
+        caption += " Dotted: the training error of Segerstedt (2021), on other data."
     errors = log_axis("mean squared error", [v for t in traces for v in t["y"]])
     layout = {"xaxis": axis("pass", rangemode="tozero"), "yaxis": errors}
     return Chart("learning-curve", "Error over the passes", caption, traces, layout)
