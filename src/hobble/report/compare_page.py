@@ -131,8 +131,8 @@ def training_curves(compared: Compared) -> Chart | None:
             values += train
             passes, published = published_curve(compared["published"], name)
             if key == "pass" and passes:
-                label = f"{name}, published"
-                traces.append(line_trace(label, passes, published, colours[name], width=1.2, dash="dashdot"))
+                whose = f"{name}, published"
+                traces.append(line_trace(whose, passes, published, colours[name], width=1.2, dash="dashdot"))
                 values += published
     if not options:
         return None
