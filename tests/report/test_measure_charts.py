@@ -62,7 +62,7 @@ def test_links_never_hurt_in_training_are_told_from_the_others(material: ReportM
     marked = [o.endswith("(never hurt in training)") for o in curves.charts[0].options]
     assert marked == sorted(marked)
     assert sum(marked) == 2 * len(never)
-    names = [trace["name"] for trace in into_a_jog.traces]
+    names = [trace["name"] for trace in into_a_jog.options["pose, cm per joint"]]
     assert not never & set(names)
     assert names[-1] == "never hurt in training"
 
