@@ -20,14 +20,14 @@ WALK, JOG = 1, 2
 
 @pytest.fixture
 def limited(make_network) -> Network:
-    """A gliding network. An injury of the knee at 10 halves the speed of the walk, one at 5 makes a jog
+    """A gliding network. An injury of the knee at 10 halves the speed of the walk, one at 9 makes a jog
     impossible; an arm takes a tenth of the speed.
     """
     network = make_network(links=30, scale=0.0)
     speeds = np.full((6, 30, 2), UNLIMITED)
     speeds[WALK], speeds[JOG] = 2.0, 7.0
     knee, arm = (network.channels["injury"].index(link) for link in (KNEE, ARM))
-    speeds[WALK, knee, 1], speeds[JOG, knee, 1] = 1.0, 3.0
+    speeds[WALK, knee, 1], speeds[JOG, knee, 1] = 1.0, 1.0
     speeds[WALK, arm, 1], speeds[JOG, arm, 1] = 1.8, 6.3
     return replace(network, limits={"injury": Limits(np.array([0.0, 10.0]), speeds, speeds.max(axis=(1, 2)))})
 
@@ -53,17 +53,18 @@ def test_the_target_speed_is_limited_by_all_injuries(limited: Network, hurt, spe
     assert speed_and_gait(limited, (0, 2.5), hurt, limits=False)[0] == pytest.approx(2.5, abs=1e-6)
 
 
-def test_a_target_below_the_limit_is_unchanged(limited: Network) -> None:
-    assert speed_and_gait(limited, (0, 0.8), {KNEE: 10})[0] == pytest.approx(0.8, abs=1e-6)
+def test_a_slow_target_is_slowed_by_the_same_share_as_a_usual_one(limited: Network) -> None:
+    assert speed_and_gait(limited, (0, 0.8), {KNEE: 10})[0] == pytest.approx(0.4, abs=1e-6)
+    assert speed_and_gait(limited, (0, 0.8), {})[0] == pytest.approx(0.8, abs=1e-6)
     assert speed_and_gait(limited, (0, 0.0), {KNEE: 10})[0] == 0.0
 
 
 def test_a_body_that_cannot_jog_walks_a_little_faster_instead(limited: Network) -> None:
-    speed, gait = speed_and_gait(limited, (0, 7.0), {KNEE: 8})
-    assert speed == pytest.approx(1.25 * 1.2, abs=1e-6)
+    speed, gait = speed_and_gait(limited, (0, 7.0), {KNEE: 9})
+    assert speed == pytest.approx(1.25 * 1.1, abs=1e-6)
     assert gait[WALK] > 0.99
-    speed, gait = speed_and_gait(limited, (0, 7.0), {KNEE: 3})  # 5.8 is a jog still
-    assert speed == pytest.approx(5.8, abs=1e-6)
+    speed, gait = speed_and_gait(limited, (0, 7.0), {KNEE: 6})  # 3.4 is a jog still
+    assert speed == pytest.approx(3.4, abs=1e-6)
     assert gait[JOG] > 0.99
     assert speed_and_gait(limited, (0, 7.0), {KNEE: 8}, limits=False)[1][JOG] > 0.99
 

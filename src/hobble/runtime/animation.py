@@ -24,6 +24,7 @@ from hobble.runtime.controller import Controller, ControllerOptions
 from hobble.runtime.ground import as_ground
 from hobble.runtime.network_rows import ChannelValues
 from hobble.runtime.trajectory import target_facing
+from hobble.runtime.variation import count_steps, vary_step
 from hobble.runtime.waypoints import Follower, Waypoint
 
 # Largest x or z of a start position, cm (100 km). Farther from the origin, floats are imprecise.
@@ -75,6 +76,8 @@ class ProceduralAnimation:
         foot_locking: bool = True,
         steering: float = 2.0,
         limits: bool = True,
+        variation: float = 0.0,
+        seed: int = 0,
         axes: Axes | None = None,
         position: Any = None,
         facing: Any = None,
@@ -84,6 +87,7 @@ class ProceduralAnimation:
         for name, value, least in (
             ("characters", characters, 1),
             ("steering", steering, 0),
+            ("variation", variation, 0),
             *((f"the rate of {name}", value, 1e-9) for name, value in (rates or {}).items()),
             *((f"the scale of {name}", value, 1e-9) for name, value in (scales or {}).items()),
         ):
@@ -94,6 +98,7 @@ class ProceduralAnimation:
         self.characters, self.axes = characters, axes or Axes()
         self._channel_values = ChannelValues(network, scales or {})
         self._limit_speed = limits
+        self._variation, self._seeds = variation, seed + np.arange(characters)
         self._controller_options: ControllerOptions = {
             "rates": {name: channel(name).rate for name in network.channels} | dict(rates or {}),
             "foot_locking": foot_locking,
@@ -128,6 +133,8 @@ class ProceduralAnimation:
         steering: how strongly the runtime corrects a velocity that differs from the target; 0: not at all, as
             in the runtime of Holden et al. (2017).
         limits: whether the target speed is limited to what a body with these channel values can reach.
+        variation: how much steps differ from each other: 0 not at all, 1 as those of people do.
+        seed: of this variation; character i has the seed `seed` + i. The same seed gives the same walk.
         axes: the caller's axes and unit. position, facing: see `reset`.
 
         Raises InputError for a file that is not a usable network, ValueError for an option out of range, and
@@ -176,7 +183,7 @@ class ProceduralAnimation:
         if self.follower is not None:
             raise ValueError("characters that follow waypoints cannot be copied")
         out = copy.copy(self)
-        out.characters = len(of)
+        out.characters, out._seeds = len(of), self._seeds[of]
         out._targets = CallerTargets(self.network.gaits, self.axes, len(of))
         out._continue_from(self.state.copies(of))
         out._controller.copy_drawn_pose(self._controller, of)
@@ -276,12 +283,25 @@ class ProceduralAnimation:
                 self.state.channel_targets[:, columns] = values
             if self._limit_speed:
                 self._limiter.limit(self.state.channel_values, velocity, shares)
+            if self._variation:
+                self._vary(velocity)
             controller.advance_frame((velocity, direction, strafe, shares), self._terrain[1])
         except BaseException:
             if before is not None:  # on flat ground nothing in a frame can fail
                 before.restore()
             raise
         return self._pose()
+
+    def _vary(self, velocity: Array) -> None:
+        """Make each character's step differ, see `hobble.runtime.variation`. Changes `velocity` (C, 2)."""
+        state, controller, columns = self.state, self._controller, self._channel_values.columns
+        count_steps(state.step, state.phase)
+        slowing = [(columns[name], channel(name)) for name in columns if channel(name).slows]
+        shares = [state.channel_values[:, at].max(axis=1, initial=0.0) / each.highest for at, each in slowing]
+        hurt = np.minimum(np.max([np.zeros(self.characters), *shares], axis=0), 1.0)
+        pace, speed, shown = vary_step(self._seeds, state.step, hurt, self._variation)
+        controller.pace[:], controller.shown[:] = pace, shown
+        velocity *= speed[:, None]
 
     def _choose_target(self, velocity: Any, facing: Any, gait: Any) -> tuple[Array, Array, Any]:
         """Target velocity (C, 2), facing (C, 2) and gait, from the caller or the waypoints.

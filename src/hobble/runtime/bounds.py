@@ -115,7 +115,7 @@ def mark_unsound(state: tuple[Any, ...], unsound: Any) -> bool:
 # cm a frame: if the caller names no gait, a target of at least this speed is a jog. It is half way between
 # walking at 2.5 and jogging at 7.5.
 JOG_FROM = 5.0
-LAME_BELOW = 4.5  # cm a frame: a body whose limit for a jog is lower is lame, and walks instead
+LAME_BELOW = 2.2  # cm a frame: a body whose limit for a jog is lower is lame, and walks instead
 HURRY_FACTOR = 1.25  # if the target is a jog, a lame body walks up to this many times its walking limit
 
 
@@ -135,6 +135,8 @@ class SpeedLimiter:
     def limit(self, values: Array, velocity: Array, shares: Array) -> None:
         """Limit target velocities (C, 2) and shares of the gaits (C, G), in place.
 
+        A target at or above the usual speed of a healthy body in this gait becomes at most `highest`, the
+        limit. A slower target is slowed by the same share, `highest / usual`. So a limp shows at any speed.
         values: (C, K) channel values. A body that cannot jog as fast as LAME_BELOW gets a hurried walk
         instead of a jog.
         """
@@ -157,5 +159,6 @@ class SpeedLimiter:
         total = moving.sum(axis=1)
         weighted = (moving * np.where(moving > 0, self._allowed, 0.0)).sum(axis=1)
         highest = np.where(total > 0, hurry * weighted / np.maximum(total, 1e-9), np.inf)
+        usual = moving @ self._channel_limits[0][1].usual / np.maximum(total, 1e-9)
         speed = np.hypot(velocity[:, 0], velocity[:, 1])
-        velocity *= np.minimum(1.0, highest / np.maximum(speed, 1e-9))[:, None]
+        velocity *= np.minimum(1.0, highest / np.maximum(np.maximum(speed, usual), 1e-9))[:, None]

@@ -38,6 +38,7 @@ class Character:
     foot_lift (C, 2), foot_added (C, 2, 2, 4), leg_shown (C, 2, 3, 3), body_lift (C,): the rest of foot
     placement, see `Feet` and `carry_body` in `hobble.runtime.feet`.
     placed: (C,) bool, whether the joints have been lifted to the ground, which happens once, at the start.
+    step: (C,) half cycles since the start, see `hobble.runtime.variation`.
     memory: (C, M) the network's own state of the character, see `Network.memory_size`.
     """
 
@@ -65,6 +66,7 @@ class Character:
     leg_shown: Array
     body_lift: Array
     placed: np.ndarray
+    step: Array
     memory: Array
 
     def copies(self, of: np.ndarray) -> Character:
@@ -137,6 +139,7 @@ def start_characters(
         leg_shown=in_world[:, legs].copy(),
         body_lift=np.zeros(count),
         placed=np.zeros(count, bool),
+        step=np.zeros(count),
         memory=np.zeros((count, network.memory_size)),
     )
 

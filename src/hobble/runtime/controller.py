@@ -244,6 +244,8 @@ class Controller:
         self.yaw = np.arctan2(ahead[:, 0], ahead[:, 1])
         self.bounds = Bounds.of(network)
         # An argument of `evaluate`, but only if the network has a memory.
+        # Factors of the next change of phase and of the channel values, see `hobble.runtime.variation`.
+        self.pace, self.shown = np.ones(count), np.ones(count)
         self._memory = (character.memory,) if network.memory_size else ()
         self._unsound = np.zeros(count, bool)
         self.pose_position = character.joint_position.copy()
@@ -365,6 +367,7 @@ class Controller:
             self._path, c.ground, c.root_height, self._joints, c.channel_values, self._x_columns,
             self.layout.step, self.x,
         )  # fmt: skip
+        self.x[:, self._x_columns[1]] *= self.shown[:, None]
 
     def _output(self, ground: Ground | None) -> None:
         c = self.character
@@ -391,6 +394,7 @@ class Controller:
         steered = self.steering > 0  # otherwise the root moves as predicted
         loss = BACKWARD_LOSS if steered and not recorded_poses else 0.0
         pull = PULL if steered and recorded_poses else 0.0
+        self.y[:, self.layout.y_phase_change] *= self.pace[:, None]
         advance(
             self.y, self._y_columns, velocity, loss, recorded_poses, pull, self._path, self.character.phase
         )

@@ -218,13 +218,15 @@ export const createTargets = (spec, c) => {
       gait[walk] += gait[jog];
       gait[jog] = 0;
     }
-    let total = 0, highest = 0;
+    let total = 0, highest = 0, usual = 0;
     gaits.forEach((name, g) => {
       if (name === "stand" || !(gait[g] > 0)) return;
       total += gait[g];
       highest += gait[g] * highestSpeeds[g];
+      usual += gait[g] * limited[0].limits.usual[g];
     });
-    const held = total > 0 ? min(1, hurry * highest / total / max(hypot(...velocity), 1e-9)) : 1;
+    // A target below the usual speed is slowed by the same share, so that a limp shows at any speed.
+    const held = total > 0 ? min(1, hurry * highest / total / max(hypot(...velocity), usual / total, 1e-9)) : 1;
     return velocity.map((v) => v * held);
   };
 
