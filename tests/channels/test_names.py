@@ -18,7 +18,7 @@ ALLOWED = ("channels/__init__.py", "hurt/", "synthetic/")
 # What asks for one channel: its command, its films and their study. Measurements say so in `Measure.channel`.
 ENDS = (".py", "_run.py")
 ASKING = {
-    "injury": ("cli/__main__.py", "cli/commands.py", "measures/films.py", "measures/study.py"),
+    "injury": ("cli/", "measures/films.py", "measures/study.py"),
 }
 
 
