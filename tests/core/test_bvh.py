@@ -26,7 +26,7 @@ def test_every_rotation_order_round_trips(tmp_path, clip, order):
     assert file.names == clip.skeleton.joints
     assert file.parents == clip.skeleton.parents
     assert file.channels[1] == tuple(f"{axis}rotation" for axis in order)
-    back = decode_channels(file, 0.1)
+    back = decode_channels(file)
     assert quat.angle(back.rotations, clip.rotations).max() < 1e-6
     np.testing.assert_allclose(back.root, clip.root, atol=1e-7)
     np.testing.assert_allclose(file.offsets, clip.skeleton.offsets, atol=1e-6)
@@ -36,7 +36,7 @@ def test_every_rotation_order_round_trips(tmp_path, clip, order):
 
 def test_five_decimals_are_good_to_a_hundredth_of_a_millimetre(tmp_path, clip):
     write_bvh(tmp_path / "a.bvh", clip)
-    back = decode_channels(read_bvh(tmp_path / "a.bvh"), 0.1)
+    back = decode_channels(read_bvh(tmp_path / "a.bvh"))
     positions = forward_kinematics(clip.skeleton, back.rotations, back.root)[1]
     assert np.abs(positions - clip.positions).max() < 1e-3
 
@@ -46,6 +46,6 @@ def test_joint_translations_are_written_as_six_channels(tmp_path, clip):
     moved[:, 5] += np.linspace(0, 3, 20)[:, None]
     moving = Clip("m", clip.skeleton, 60.0, clip.rotations, clip.root, moved)
     write_bvh(tmp_path / "a.bvh", moving, decimals=8)
-    back = decode_channels(read_bvh(tmp_path / "a.bvh"), 0.1)
+    back = decode_channels(read_bvh(tmp_path / "a.bvh"))
     assert back.translations is not None
     np.testing.assert_allclose(back.translations[:, 5], moved[:, 5], atol=1e-6)

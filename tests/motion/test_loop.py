@@ -82,7 +82,7 @@ def test_a_data_set_can_ask_for_loops(walk, bvh, make):
     assert "repeated 4 times" in report["repairs"][-1]
     assert clip.root[-1, 0] > 380
     with pytest.raises(HobbleError, match="walk: 2 frames are too few"):
-        make(bvh(part(walk, 0, 3)), loops=4)
+        make(bvh(part(walk, 0, 3)), loops=4, accept_doubt=True)
 
 
 @pytest.mark.shared
@@ -95,7 +95,7 @@ def test_injured_cycles_loop_without_a_jerk(shared, make, file):
 
 
 @pytest.mark.shared
-@pytest.mark.parametrize(("file", "degrees"), [("Walk_LLL", 6), ("Run_LLL", 7), ("Walk_RUL", 10)])
+@pytest.mark.parametrize(("file", "degrees"), [("Walk_LLL", 6), ("Run_LLL", 8), ("Walk_RUL", 10)])
 def test_legs_move_as_in_the_retargeting_by_the_authors(shared, root, make, file, degrees):
     """Their loops of the same motion on 31 joints; their arms hang from shrugged shoulders.
 

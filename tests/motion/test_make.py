@@ -42,12 +42,13 @@ def test_the_unit_is_found_from_the_legs(walk, bvh, make, scaled, factor, unit):
     np.testing.assert_allclose(clip.positions, walk.positions[::2], atol=2e-3 if factor < 1 else 1e-4)
 
 
-def test_the_unit_can_be_set_and_has_to_be_for_a_rig_of_no_known_size(walk, bvh, make, scaled):
+def test_the_unit_can_be_set_and_is_in_doubt_for_a_rig_of_no_known_size(walk, bvh, make, scaled):
     clip, report = make(bvh(walk), unit=2.0, proportions="clip")
     assert report["unit"] == 2.0
     np.testing.assert_allclose(clip.positions, 2 * walk.positions[::2], atol=1e-3)
-    with pytest.raises(InputError, match=r"walk.bvh: no unit gives .* a person's size.*Set motion.unit"):
-        make(bvh(scaled(walk, 500.0)))
+    giant, report = make(bvh(scaled(walk, 500.0)))
+    assert any("No unit gives this rig a person's size" in doubt for doubt in report["unsure"])
+    np.testing.assert_allclose(giant.positions, make(bvh(walk))[0].positions, atol=0.5)
 
 
 @pytest.mark.parametrize("proportions", ["skeleton", "clip"])

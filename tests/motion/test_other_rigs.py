@@ -128,7 +128,7 @@ def two_figures() -> str:
     return f"scene|-|ground\n{one}\n{other}"
 
 
-PAIRS = r"in doubt: .*two equal legs and two equal arms[\s\S]*roles:"
+PAIRS = r"in doubt .*two equal legs and two equal arms\. .* cannot be used"
 
 
 @pytest.mark.shared
@@ -138,7 +138,7 @@ PAIRS = r"in doubt: .*two equal legs and two equal arms[\s\S]*roles:"
         (without("shoulder", "upper_arm", "forearm", "hand"), PAIRS),
         (without("thigh", "shin", "foot", "toe"), PAIRS),
         (without("upper_arm_r", "forearm_r", "hand_r"), PAIRS),
-        (without("neck", "head"), r"in doubt: .*no joint for the head[\s\S]*roles:"),
+        (without("neck", "head"), r"in doubt .*no joint for the head"),
         (two_figures(), r"two figures, \w*hips and \w*hips. Export each figure on its own"),
     ],
 )

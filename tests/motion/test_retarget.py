@@ -262,4 +262,4 @@ def test_nearly_straight_legs_bend_smoothly(shared, make, file):
             np.linalg.norm(np.diff(c.positions[:, c.skeleton.role(f"{side}_knee")], 2, axis=0), axis=-1)
             for c in (source, made)
         )
-        assert after.max() < report["scale"] * before.max() + 4
+        assert after.max() < report["scale"] * before.max() + 5

@@ -59,4 +59,4 @@ def test_a_rate_that_is_wrong_by_two_is_noted_with_the_true_rate(shared, root, c
     (seen,) = summarise_clips(file, maps / "holden31.yaml", maps, ClipMotion(source_fps=float(rate))).clips
     noted = [warning for warning in seen.warnings if "source_fps" in warning]
     assert len(noted) == (times != 1.0)
-    assert all(note.endswith("(source_fps: 120)") for note in noted)
+    assert all(note.endswith("(source_fps: 120).") for note in noted)

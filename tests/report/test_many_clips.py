@@ -92,8 +92,8 @@ def test_many_remarks_are_grouped_by_kind(material: ReportMaterial, monkeypatch:
     motion = [{**material.motion[0], "clip": f"c{i}", "repairs": [s]} for i, s in enumerate(sentences)]
     table = data_section.remarks_table(replace(material, motion=motion, labels=[], channels=[]))
     assert table is not None
-    assert table.title == "4 messages on repairs, doubts and warnings, by kind"
+    assert table.title == "4 messages on doubts, warnings and repairs, by kind"
     assert table.rows == [
-        [3, "motion", "c0", "frames 1-3 held"],
-        [1, "motion", "c3", "no foot down for 2.5 s"],
+        [3, "repair", "c0", "frames 1-3 held"],
+        [1, "repair", "c3", "no foot down for 2.5 s"],
     ]

@@ -10,7 +10,7 @@ from hobble.core.files import read_json
 from hobble.database.options import Merging
 from hobble.database.split_check import refuse_split_pairs
 from hobble.database.write import write_database
-from hobble.motion.look import clip_digest, duplicate_pairs
+from hobble.motion.duplicates import clip_digest, duplicate_pairs
 from hobble.workflow.job import Inputs, job
 
 with job(snakemake) as log:

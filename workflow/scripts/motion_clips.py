@@ -5,10 +5,13 @@ The clips are checked, retargeted to the data set's skeleton and resampled at 60
 
 from hobble.core.clip import load_clip, save_clip
 from hobble.core.files import write_json
+from hobble.core.messages import group_messages, in_words
 from hobble.motion.edit import mirror_clip, mirror_report
 from hobble.motion.make import make_clip
 from hobble.motion.options import ClipMotion
 from hobble.workflow.job import make_each
+
+doubts = []  # (clip, stage, sentence) of all clips of this job
 
 
 def make_motion(piece, log):
@@ -27,7 +30,8 @@ def make_motion(piece, log):
     for sentence in report["repairs"]:
         log.info("%s", sentence)
     for sentence in report["unsure"]:
-        log.warning("%s: %s", piece.name, sentence)
+        log.info("%s", sentence)
+        doubts.append((piece.name, "doubt", sentence))
     save_clip(piece.output["clip"], clip)
     write_json(piece.output["report"], report)
     if "mirror" in piece.output:
@@ -36,9 +40,16 @@ def make_motion(piece, log):
         write_json(piece.output["mirror_report"], mirror_report(report, mirror.name))
 
 
+def warn_of_doubts(log):
+    """One warning for each kind of doubt, not one for each clip."""
+    for group in group_messages(doubts):
+        log.warning("%s", in_words(group))
+
+
 make_each(
     snakemake,
     make_motion,
+    after=warn_of_doubts,
     writes={
         "clip": "motion/{clip}.npz",
         "report": "motion/{clip}.json",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -14,6 +15,7 @@ from hobble.channels.injury.status import FPS, InjurySpell, Status, parse_links,
 from hobble.channels.injury.table import skeleton_links, write_statuses
 from hobble.cli.command import (
     Command,
+    Message,
     add_folders,
     add_json,
     add_motion_options,
@@ -35,8 +37,9 @@ from hobble.labels.options import LabelOptions
 from hobble.motion.edit import loop_clip, mirror_clip, resample
 from hobble.motion.limbs import Doubt, find_body
 from hobble.motion.look import format_table, picture_of_file, summarise_clips
-from hobble.motion.make import load_source, make_clip, raw_clip, rig_in_file
-from hobble.motion.read import read_bvh
+from hobble.motion.make import clip_problems, load_source, make_clip, raw_clip, rig_in_file
+from hobble.motion.options import accept
+from hobble.motion.other_formats import read_motion
 from hobble.motion.skeleton_file import (
     draft_skeleton_file,
     find_skeleton,
@@ -69,7 +72,7 @@ def look(options: argparse.Namespace) -> int:
 
 def _look_arguments(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
-    add("folder", type=Path, help="a folder of BVH files, or one file")
+    add("folder", type=Path, help="a folder of BVH, glTF or FBX files, or one file")
     _add_skeleton(parser, "skeleton to which the clips are retargeted")
     add("--skeletons", type=Path, help="folder of the skeleton files (default config/skeletons)")
     picture = (
@@ -93,7 +96,7 @@ def rig(options: argparse.Namespace) -> int:
 
 def skeleton_draft(file: Path) -> str:
     """A draft of a skeleton file for the rig of a BVH file, with `?` for roles whose joint is not known."""
-    bvh = read_bvh(file)
+    bvh = read_motion(file)
     skeleton = rig_in_file(bvh)
     try:
         body, _ = find_body(skeleton.joints, skeleton.parents, raw_clip(bvh).positions)
@@ -110,16 +113,17 @@ def _rig_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def motion(options: argparse.Namespace) -> int:
-    """Turn a folder of BVH files into a folder of checked BVH files.
+    """Turn a folder of BVH, glTF or FBX files into a folder of checked BVH files.
 
     hobble motion FOLDER OUT --fps 60
     hobble motion FOLDER OUT --skeleton holden31 --mirror
 
-    Files may have any rotation order, unit, axes and frame rate. Each file is checked, repaired if this is
-    safe, and written in centimetres, Y up. Rotations are interpolated as quaternions, not as Euler angles.
+    Files may have any rotation order, unit, axes and frame rate. FBX files need Blender. Each file is
+    checked, repaired if this is safe, and written in centimetres, Y up. Rotations are interpolated as
+    quaternions, not as Euler angles.
     """
 
-    def convert(name: str, file: Path) -> list[str]:
+    def convert(name: str, file: Path) -> list[Message]:
         clip, notes = convert_file(name, file, options)
         write_bvh(options.out / f"{name}.bvh", clip)
         if options.mirror:
@@ -129,7 +133,7 @@ def motion(options: argparse.Namespace) -> int:
     return process_clips(options, convert)
 
 
-def convert_file(name: str, file: Path, options: argparse.Namespace) -> tuple[Clip, list[str]]:
+def convert_file(name: str, file: Path, options: argparse.Namespace) -> tuple[Clip, list[Message]]:
     """Convert a BVH file. Returns the clip and notes, such as what was repaired.
 
     name: of the clip. options: the arguments of `hobble motion`. Raises InputError for a bad file.
@@ -138,12 +142,21 @@ def convert_file(name: str, file: Path, options: argparse.Namespace) -> tuple[Cl
     if options.skeleton:
         target = find_skeleton(options.skeleton)
         clip, report = make_clip(file, target, skeleton_folder(), name, target.stem, settings)
-        return resample(clip, options.fps), report["repairs"] + report["unsure"] + report["notes"]
-    source = load_source(read_bvh(file), load_skeleton(find_skeleton(SKELETON)), skeleton_folder(), settings)
+        return resample(clip, options.fps), report_messages(report)
+    target_file, folder = load_skeleton(find_skeleton(SKELETON)), skeleton_folder()
+    source = load_source(read_motion(file), target_file, folder, settings)
+    doubts = accept(file, clip_problems(source.clip, source.clip.fps, 1.0, settings), settings)
     clip = resample(source.clip, options.fps)
     if settings.loops > 1:
         clip = loop_clip(clip, settings.loops, settings.heading)
-    return replace(clip, name=name), source.repairs + source.unsure + source.notes
+    found = {"unsure": source.unsure + doubts, "repairs": source.repairs, "notes": source.notes}
+    return replace(clip, name=name), report_messages(found)
+
+
+def report_messages(report: Mapping[str, Any]) -> list[Message]:
+    """The doubts, repairs and notes of a clip's report."""
+    kinds = {"doubt": "unsure", "repair": "repairs", "note": "notes"}
+    return [(kind, sentence) for kind, key in kinds.items() for sentence in report[key]]
 
 
 def _motion_arguments(parser: argparse.ArgumentParser) -> None:
@@ -168,7 +181,7 @@ def labels(options: argparse.Namespace) -> int:
     return process_clips(options, lambda name, file: write_labels(name, file, options))
 
 
-def write_labels(name: str, file: Path, options: argparse.Namespace) -> list[str]:
+def write_labels(name: str, file: Path, options: argparse.Namespace) -> list[Message]:
     """Write the three label files of one clip. Returns notes and warnings.
 
     file: the clip's BVH file. options: the arguments of `hobble labels`. Raises InputError if the clip cannot
@@ -185,7 +198,8 @@ def write_labels(name: str, file: Path, options: argparse.Namespace) -> list[str
     # Seconds of each gait, for the note.
     seconds = np.bincount(found.gait.argmax(axis=1), minlength=len(GAITS)) / clip.fps
     gaits = ", ".join(f"{s:.1f} s {g}" for s, g in zip(seconds, GAITS, strict=True) if s > 0)
-    return [f"{len(found.cycles)} cycles, {gaits}", *report["repairs"], *warnings]
+    about = ("found", f"{len(found.cycles)} cycles, {gaits}")
+    return [*(("warning", warning) for warning in warnings), *report_messages(report), about]
 
 
 def _labelled(
@@ -221,7 +235,7 @@ def hurt(options: argparse.Namespace) -> int:
     pairs = parse_links(options.injury, links, "--injury")
     values = dict(pairs)
 
-    def make(name: str, file: Path) -> list[str]:
+    def make(name: str, file: Path) -> list[Message]:
         clip, _, found, warnings = _labelled(name, file, options)
         severity = np.tile([values.get(link, 0.0) for link in clip.skeleton.link_names], (len(clip), 1))
         result = hurt_clip(clip, found, severity, f"{name}_limps", flat=options.ground in (None, "flat"))
@@ -229,7 +243,8 @@ def hurt(options: argparse.Namespace) -> int:
         frames = len(result.clip)
         status = Status(frames, (InjurySpell(1, frames, pairs),))
         write_status(options.out / f"{name}_limps_injuries.txt", status)
-        return [f"{len(clip) / FPS:.1f} s became {frames / FPS:.1f} s", *warnings]
+        about = ("found", f"{len(clip) / FPS:.1f} s became {frames / FPS:.1f} s")
+        return [*(("warning", warning) for warning in warnings), about]
 
     return process_clips(options, make)
 

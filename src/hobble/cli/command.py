@@ -15,9 +15,13 @@ from tqdm import tqdm
 from hobble.config.load_configuration import validate
 from hobble.core.clip_files import clips_in
 from hobble.core.errors import HobbleError, keep_traceback
+from hobble.core.messages import group_messages, in_words
 from hobble.motion.options import ClipMotion
+from hobble.motion.other_formats import MOTION_SUFFIXES
 
-MOTION_KEYS = tuple(name for name in ClipMotion.model_fields if name != "fps")
+MOTION_KEYS = tuple(name for name in ClipMotion.model_fields if name not in ("fps", "frames"))
+Message = tuple[str, str]  # one of KINDS, and a sentence
+KINDS = ("warning", "doubt", "repair", "found", "note")  # of messages about clips, the worst first
 
 
 @dataclass(frozen=True)
@@ -63,35 +67,38 @@ def motion_options(options: argparse.Namespace) -> ClipMotion:
 
 def add_folders(parser: argparse.ArgumentParser, out: str) -> None:
     """Add the arguments of a command that makes files from each clip of a folder. out: help text of OUT."""
-    parser.add_argument("folder", type=Path, help="a folder of BVH files, or one file")
+    parser.add_argument("folder", type=Path, help="a folder of BVH, glTF or FBX files, or one file")
     parser.add_argument("out", type=Path, help=out)
     add_json(parser)
     add_motion_options(parser)
 
 
-def process_clips(options: argparse.Namespace, process: Callable[[str, Path], list[str]]) -> int:
-    """Call `process(name, file)` for every clip. Print the notes that it returns, and a summary.
+def process_clips(options: argparse.Namespace, process: Callable[[str, Path], list[Message]]) -> int:
+    """Call `process(name, file)` for every clip. Print errors, then the messages by kind, and a summary.
 
     If a clip fails, its error message is printed, and the next clip is processed. options: the arguments
     FOLDER and OUT. Returns the exit status: 1 if a clip failed, else 0.
     """
     options.out.mkdir(parents=True, exist_ok=True)
-    clips, results = clips_in(options.folder), []
+    clips, results = clips_in(options.folder, MOTION_SUFFIXES), []
+    messages: list[tuple[str, str, str]] = []
     for name, file in progress(clips.items()):
-        notes, error = [], ""
+        found, error = list[Message](), ""
         try:
-            notes = process(name, file)
+            found = process(name, file)
         except HobbleError as refused:
             error = str(refused)
         except Exception as bug:
             error = keep_traceback(bug, f"{file}: ")
-        results.append({"clip": name, "notes": notes, "error": error})
-        for note in [] if options.json else [*notes, *([error] if error else [])]:
-            # An error message already begins with the path of the file.
-            tqdm.write(note if note.startswith(str(file)) else f"{name}: {note}")
+        results.append({"clip": name, "notes": [sentence for _, sentence in found], "error": error})
+        messages += [(name, kind, sentence) for kind, sentence in found]
+        if error and not options.json:
+            tqdm.write(error)  # begins with the path of the file
+    messages.sort(key=lambda message: KINDS.index(message[1]))
     failed = sum(bool(result["error"]) for result in results)
     summary = f"{len(clips) - failed} of {len(clips)} clips done"
-    print_result(options, results, summary + (f", {failed} failed: see above" if failed else ""))
+    summary += f", {failed} failed: see above" if failed else ""
+    print_result(options, results, "\n".join([*map(in_words, group_messages(messages)), summary]))
     return 1 if failed else 0
 
 

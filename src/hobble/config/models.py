@@ -9,7 +9,16 @@ from pydantic import AfterValidator, Field, create_model, field_validator, model
 
 from hobble.channels import CHANNEL_NAMES, channel
 from hobble.core.clip_files import CLIP_NAME_RULE, is_valid_clip_name
-from hobble.core.section import Finite, Gait, Ground, Positive, PositiveFloat, RelativePath, Section
+from hobble.core.section import (
+    Finite,
+    FrameRange,
+    Gait,
+    Ground,
+    Positive,
+    PositiveFloat,
+    RelativePath,
+    Section,
+)
 from hobble.database.options import DatabaseOptions
 from hobble.hurt.options import Hurt
 from hobble.labels.options import LabelOptions
@@ -56,6 +65,12 @@ class ClipEntry(Section):
     channels: dict[ChannelName, Any] = Field({}, description="channel -> its value in all frames of the clip")
     person: Name | None = Field(
         None, description="who walks; needed by measurements that leave out all clips of a person"
+    )
+    file: ClipName | None = Field(
+        None, description="name of the BVH file without .bvh; by default that of the clip"
+    )
+    frames: FrameRange | None = Field(
+        None, description="first and last frame of the file that are used, counted from 1"
     )
     recipe: str | None = Field(
         None,

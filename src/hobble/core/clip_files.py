@@ -34,12 +34,12 @@ def is_valid_clip_name(clip: str) -> bool:
     return is_short and clip.isprintable() and VALID_NAME.fullmatch(clip) is not None
 
 
-def find_clips(folder: Path) -> dict[str, list[Path]]:
+def find_clips(folder: Path, suffixes: Collection[str] = (BVH_SUFFIX,)) -> dict[str, list[Path]]:
     """The BVH files (.bvh or .BVH) in a folder and its subfolders, as clip name -> paths.
 
-    A clip has several paths if files in several folders have its name. Folders are searched in alphabetical
-    order. Follows links, but enters each folder only once. Skips hidden files and folders. Raises InputError
-    if a folder cannot be read.
+    suffixes: other suffixes to find, in lower case. A clip has several paths if files in several folders have
+    its name. Folders are searched in alphabetical order. Follows links, but enters each folder only once.
+    Skips hidden files and folders. Raises InputError if a folder cannot be read.
     """
 
     def raise_input_error(error: OSError) -> None:
@@ -55,7 +55,7 @@ def find_clips(folder: Path) -> dict[str, list[Path]]:
         folders[:] = sorted(name for name in folders if not name.startswith("."))
         for name in sorted(files):
             stem, suffix = os.path.splitext(name)
-            if suffix.lower() == BVH_SUFFIX and not name.startswith("."):
+            if suffix.lower() in suffixes and not name.startswith("."):
                 found.setdefault(stem, []).append(Path(here, name))
     return found
 
@@ -76,18 +76,20 @@ def require_single_file(clip: str, files: list[Path]) -> Path:
     return files[0]
 
 
-def clips_in(folder: Path) -> dict[str, Path]:
+def clips_in(folder: Path, suffixes: Collection[str] = (BVH_SUFFIX,)) -> dict[str, Path]:
     """Clip name -> BVH file, for all files in a folder and its subfolders. `folder` may also be one file.
 
-    Raises InputError if there are none, or if two files have the same clip name.
+    suffixes: other suffixes to find, in lower case. Raises InputError if there are none, or if two files have
+    the same clip name.
     """
     if folder.is_file():
         return {folder.stem: folder}
     if not folder.is_dir():
         raise InputError(folder, "no such file or folder")
-    found = {name: require_single_file(name, files) for name, files in sorted(find_clips(folder).items())}
+    files = sorted(find_clips(folder, suffixes).items())
+    found = {name: require_single_file(name, paths) for name, paths in files}
     if not found:
-        raise InputError(folder, "no .bvh files here")
+        raise InputError(folder, f"no {' or '.join(suffixes)} files here")
     return found
 
 

@@ -23,10 +23,18 @@ def _check_relative_path(path: str) -> str:
     return path
 
 
+def _check_frame_range(frames: tuple[int, int]) -> tuple[int, int]:
+    """Return (first, last) if the last frame comes after the first; else raise ValueError."""
+    if frames[0] >= frames[1]:
+        raise ValueError("the last frame must come after the first")
+    return frames
+
+
 # The upper bound keeps a mistyped or hostile configuration from using up the memory.
 Positive = Annotated[int, Field(gt=0, le=1_000_000)]
 PositiveFloat = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
+FrameRange = Annotated[tuple[Positive, Positive], AfterValidator(_check_frame_range)]
 Share = Annotated[float, Field(ge=0, lt=1)]
 # A path that cannot leave the folder to which it is relative, such as the mocap folder (all motion files).
 RelativePath = Annotated[str, AfterValidator(_check_relative_path)]

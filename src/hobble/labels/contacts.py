@@ -30,6 +30,10 @@ DIP_SHARE = 0.8
 # Leg lengths. A person stands on tiptoe if the heel is this much higher above the toe than in the stances in
 # which the foot is flattest. Then the heel is not in contact.
 ON_TIPTOE = 0.03
+# How flat a foot stands is measured while its heel and its toe are both down. A stance counts for at most
+# MOST_COUNTED frames, so that one long rest does not outweigh all steps. FLATTER: the share of these frames
+# in which a foot may be flatter than a flat foot, because a foot that lands on its heel has its toe up.
+MOST_COUNTED, FLATTER = 15, 0.4
 # Leg lengths. A person on one leg holds the other foot up: the hip is less than the first value above the
 # heel of the raised foot, and more than the second value above the other heel.
 DRAWN_UP, STRETCHED = 0.55, 0.8
@@ -71,9 +75,9 @@ def find_stance_contacts(clip: Clip, options: LabelOptions) -> np.ndarray:
         heel_level = _find_stances(height[:, heel], speed[:, heel], edges, HEEL_HEIGHTS, out[:, heel])
         toe_level = _find_stances(height[:, toe], speed[:, toe], edges, TOE_HEIGHTS, out[:, toe])
         heel_above_toe = heel_level - toe_level
-        # The first and the last stance may be incomplete.
-        complete = heel_above_toe[1:-1] if len(heel_above_toe) > 3 else heel_above_toe
-        flat_foot = np.percentile(complete, 10)
+        both_down = np.add.reduceat(out[:, heel] & out[:, toe], edges[:-1], dtype=int)
+        counted = np.repeat(heel_above_toe, np.minimum(both_down, MOST_COUNTED))
+        flat_foot = np.quantile(counted, FLATTER) if len(counted) else np.inf
         for number in np.flatnonzero(heel_above_toe > flat_foot + ON_TIPTOE):
             out[edges[number] : edges[number + 1], heel] = False
     return out & ~_joints_of_raised_foot(clip)

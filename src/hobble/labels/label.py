@@ -28,6 +28,9 @@ from hobble.labels.phase import (
     rows_of_landings,
 )
 
+# A clip gets a warning if the shares of time in which its left and its right heel are down differ by more.
+UNLIKE_HEELS = 0.3
+
 
 def label_clip(
     clip: Clip,
@@ -62,8 +65,15 @@ def label_clip(
     cycles, dropped = find_cycles(footsteps, len(clip), zero, options.margins)
     if not len(cycles):
         warnings.append(_no_cycle_warning(options.margins))
+    contacts = find_contacts(clip, options)
+    left, right = contacts[:, 0].mean(), contacts[:, 2].mean()
+    if abs(left - right) > UNLIKE_HEELS:
+        warnings.append(
+            f"the left heel is down in {left:.0%} of the frames, the right heel in {right:.0%}: look whether "
+            "the person limps, or whether a foot of the rig is wrong"
+        )
     labels = Labels(
-        contacts=find_contacts(clip, options),
+        contacts=contacts,
         phase=phase if zero == "right" else (phase + 0.5) % 1.0,
         phase_known=known,
         gait=shares,

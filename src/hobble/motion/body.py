@@ -212,7 +212,8 @@ def _joints_along(
     )
     out = {target_chain[-1]: source_chain[-1]}
     for joint, share in zip(target_chain[1:-1], target_shares[1:-1], strict=True):
-        below = [j for j, s in zip(source_chain[:-1], source_shares[:-1], strict=True) if s <= share + REACH]
+        lower = max(len(source_chain) - 1, 1)  # a rig without a trunk has only the hips
+        below = [j for j, s in zip(source_chain[:lower], source_shares, strict=False) if s <= share + REACH]
         out[joint] = below[-1]
     return out
 

@@ -7,16 +7,15 @@ equally. On a real slope only the ground is tilted, and the body still balances 
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 
 from hobble.core import quat
 from hobble.core.clip import Clip
-from hobble.core.errors import InputError
 from hobble.core.quat import Array
 from hobble.motion.axes import UP, body_axes, unit
 from hobble.motion.body import SIDES
+from hobble.motion.options import Problem
 from hobble.motion.physics import Balance, find_balance
 from hobble.motion.rig import leg_length
 
@@ -90,7 +89,9 @@ def put_on_floor(clip: Clip) -> tuple[Clip, list[str], list[str]]:
     lower_toe = clip.positions[:, [clip.skeleton.role(f"{side}_toe") for side in SIDES], 1].min(axis=1)
     standing = lower_toe[:-1][np.abs(np.diff(lower_toe)) * clip.fps / 60.0 < SLOW_RISE]
     if len(standing) < max(FEWEST_FRAMES, round(SHORTEST * clip.fps)):
-        return clip, [], []
+        low = float(lower_toe.min())
+        lost = f"No foot stands long enough to show the floor, and the toes come down to {low:.0f} cm."
+        return clip, [], [lost] if abs(low) > MOST_OFF_CRAWLING else []
     low, usual, high = np.percentile(standing, [10, 25, 90])
     floor = float(usual) - SOLE
     hips = clip.positions[:, clip.skeleton.role("hips"), 1]
@@ -104,19 +105,18 @@ def put_on_floor(clip: Clip) -> tuple[Clip, list[str], list[str]]:
     return moved, [f"The floor lies at {floor:.1f} cm; the clip was moved so that it lies at 0."], []
 
 
-def check_tilt(path: Path, clip: Clip, leave: bool) -> None:
-    """Raise InputError if the world is tilted. leave: whether any tilt is accepted."""
+def tilt_problem(clip: Clip) -> Problem | None:
+    """A tilted world: what shows the tilt, and by how many degrees."""
     # A cycle that `hobble motion --loops` repeated shows no more than the cycle alone. Counted eight times,
     # its short stands would seem long enough to judge the balance strictly.
-    tilt = None if leave else world_tilt(clip.part(slice(_cycle_length(clip))))
-    if tilt is not None:
-        raise InputError(
-            path,
-            f"the ground or the body is tilted by {tilt:.0f} degrees, so the whole world seems tilted",
-            fix="Make the floor level in the program that the clip comes from, and export the clip again. If "
-            "the figure walked on a slope or really leans that far, set motion.defects: leave "
-            "(--defects leave).",
-        )
+    tilt = world_tilt(clip.part(slice(_cycle_length(clip))))
+    if tilt is None:
+        return None
+    degrees, what = tilt
+    return Problem(
+        f"{what} by {degrees:.0f} degrees, so the whole world seems tilted",
+        "Make the floor level in the program that the clip comes from, and export the clip again.",
+    )
 
 
 def _cycle_length(clip: Clip) -> int:
@@ -129,8 +129,8 @@ def _cycle_length(clip: Clip) -> int:
     return int(next(repeats, len(clip)))
 
 
-def world_tilt(clip: Clip) -> float | None:
-    """Degrees by which the world is tilted, or None if nothing shows a tilt."""
+def world_tilt(clip: Clip) -> tuple[float, str] | None:
+    """Degrees by which the world is tilted, and what is tilted, in words. None if nothing shows a tilt."""
     leg = leg_length(clip.skeleton)
     body, directions = find_balance(clip), _body_directions(clip)
     feet = _standing_balls(clip, SLOW * leg)
@@ -147,20 +147,25 @@ def world_tilt(clip: Clip) -> float | None:
             sine = float(np.linalg.norm(normal[used]))
             same = np.linalg.norm((lean - normal)[used]) < MOST_APART * sine
             if distances[0] < FAR and sine > np.sin(np.radians(smallest)) and same:
-                return float(np.degrees(np.arcsin(min(sine, 1.0))))
-        if (spread > WIDE * leg).all() and np.linalg.norm(normal) < np.sin(np.radians(LEAST_TILT)):
+                words = f"the ground under {len(feet)} standing feet slopes, and the body leans with it,"
+                return float(np.degrees(np.arcsin(min(sine, 1.0)))), words
+        # The slope along an axis is uncertain by the usual distance of feet from the plane / their spread.
+        error = distances[0] / np.maximum(spread, 1e-9)
+        if np.linalg.norm(np.abs(slope) + error) < np.tan(np.radians(LEAST_TILT)):
             return None
     return _sideways_tilt(body, _least_sideways_lean(*directions))
 
 
-def _sideways_tilt(body: Balance | None, least_lean: float) -> float | None:
-    """Degrees by which a body balances or leans to one side; None if this is too little to show a tilt."""
+def _sideways_tilt(body: Balance | None, least_lean: float) -> tuple[float, str] | None:
+    """How far a body balances or leans to one side, as `world_tilt` returns it; None if too little."""
     if body is not None:
         if abs(body.aside) > np.interp(body.seconds, [0.0, LONG], [BALANCED_SHORT, BALANCED]):
-            return abs(body.aside)
+            side = "left" if body.aside > 0 else "right"
+            return abs(body.aside), f"the body, on one foot, balances on a line that leans to its {side}"
         if body.seconds >= LONG:
             return None
-    return least_lean if least_lean > MOST_SIDEWAYS else None
+    words = "trunk, legs and hips all lean to one side"
+    return (least_lean, words) if least_lean > MOST_SIDEWAYS else None
 
 
 def _standing_balls(clip: Clip, slow: float) -> Array:

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 
@@ -45,6 +46,9 @@ PARTS = {"leg": ("thigh", "shank", "foot"), "arm": ("upperarm", "forearm", "hand
 # - The cosine of the angle between the directions from the hips to the chest and from the hips to the feet is
 #   larger than LEVEL. It is -1 in a standing person, and 0 if the trunk is level.
 STRETCHED, REACH, LEVEL, NEARLY_ALL = 0.7, 0.6, -0.5, 0.9
+# If its arms are longer than the share LONG_ARMS of its legs, as front legs are, more than the share
+# SOMETIMES of the frames is enough. People's arms are .54 to .7 leg lengths long.
+LONG_ARMS, SOMETIMES = 0.85, 0.2
 
 Triple = tuple[int, int, int]
 
@@ -285,6 +289,7 @@ def _limb_joints(rig: MovingRig, pair: Limbs, kind: str) -> tuple[Triple, ...]:
     and have a bend between them. A bone may consist of several joints in line (twist joints): its length is
     the distance of the first and the last.
     """
+    pair = _without_hub_joints(rig, pair)
     chain = pair.chains[0]
     named = [limb_parts([rig.names[j] for j in c]) for c in pair.chains]
     if all(set(PARTS[kind]) <= set(found) for found in named):
@@ -309,6 +314,17 @@ def _limb_joints(rig: MovingRig, pair: Limbs, kind: str) -> tuple[Triple, ...]:
                         best, where = total, limbs
                     break  # the lower bone ends at the first joint that fits
     return where
+
+
+def _without_hub_joints(rig: MovingRig, pair: Limbs) -> Limbs:
+    """The pair without the first joints of both chains that lie at the same place, as LHipJoint and RHipJoint
+    of CMU do. A thigh or an upper arm begins on its own side of the body."""
+    one, other = pair.chains
+    apart = (
+        i for i, (a, b) in enumerate(zip(one, other, strict=True)) if rig.distance(a, b) > 0.01 * rig.size
+    )
+    first = next(apart, 0)
+    return replace(pair, chains=(one[first:], other[first:]))
 
 
 def _at(pair: Limbs, i: int, j: int, k: int) -> tuple[Triple, ...]:
@@ -446,8 +462,10 @@ def _left_arm_first(rig: MovingRig, legs: Limbs, arms: Limbs) -> Limbs:
         np.mean(np.sum(hips * shoulders, axis=-1))
     )  # positive if arm 0 is on the side of the left leg
     votes = _named_sides(rig, arms)
-    if abs(side) < 0.2 or (votes[0] * votes[1] < 0 and (votes[0] > 0) != (side > 0)):
-        raise Doubt("its left arm and its left leg are not on the same side")
+    as_named = side * np.sign(votes[0] - votes[1]) if votes[0] * votes[1] < 0 else side
+    if abs(side) < 0.2 or as_named < 0:
+        turned = np.degrees(np.arccos(np.clip(as_named, -1, 1)))
+        raise Doubt(f"its shoulders are turned by {turned:.0f} degrees against its hips on average")
     return arms if side > 0 else _exchanged(arms)
 
 
@@ -470,14 +488,19 @@ def _named_sides(rig: MovingRig, limbs: Limbs) -> list[int]:
 def on_four_legs(body: Body, positions: Array) -> bool:
     """Whether the figure stands on hands and feet, with a level trunk, in nearly all frames.
 
+    If its arms are as long as front legs, some of the frames are enough.
+
     positions: (F, J, 3) of the joints in the world, in any unit and along any axes.
     """
     hips, feet = (middle(positions, body.legs, k) for k in (0, 2))
     chest, hands = (middle(positions, body.arms, k) for k in (1, 3))
-    bones = [bone for leg in body.legs.values() for bone in (leg[:2], leg[1:3])]
+    bones = [bone for leg in body.legs.values() for bone in pairwise(leg[:3])]
     leg_length = 0.5 * sum(np.linalg.norm(positions[:, b] - positions[:, a], axis=-1) for a, b in bones)
     # No axis needs to point up, because down is the direction from the hips to the feet.
     down, depth = unit(feet - hips), np.linalg.norm(feet - hips, axis=-1)
     trunk_level = np.sum(unit(chest - hips) * down, axis=-1) > LEVEL
     hands_low = np.sum((hands - hips) * down, axis=-1) > REACH * depth
-    return bool(np.mean(trunk_level & hands_low & (depth > STRETCHED * leg_length)) > NEARLY_ALL)
+    share = np.mean(trunk_level & hands_low & (depth > STRETCHED * leg_length))
+    bones = [bone for arm in body.arms.values() for bone in pairwise(arm[1:])]
+    arm_length = 0.5 * sum(np.linalg.norm(positions[:, b] - positions[:, a], axis=-1) for a, b in bones)
+    return bool(share > (SOMETIMES if np.median(arm_length / leg_length) > LONG_ARMS else NEARLY_ALL))

@@ -1,4 +1,4 @@
-"""Finds duplicate clips: the same file, or the same motion with another name or heading, or mirrored."""
+"""Summarises the clips of a folder before training, as a table, as a page, and as a picture of one clip."""
 
 from __future__ import annotations
 
@@ -19,114 +19,22 @@ from hobble.core.clip_files import clips_in, unused_file_notes
 from hobble.core.errors import HobbleError, InputError
 from hobble.core.quat import Array
 from hobble.motion.body import SIDES, TRUNK
+from hobble.motion.duplicates import ClipDigest, clip_digest, duplicate_pairs
 from hobble.motion.edit import resample
 from hobble.motion.make import fit_skeleton, load_source, make_clip
 from hobble.motion.options import ClipMotion
-from hobble.motion.physics import times_too_fast
-from hobble.motion.read import read_bvh
+from hobble.motion.other_formats import MOTION_SUFFIXES, read_motion
+from hobble.motion.physics import standing_seconds, step_count
 from hobble.motion.retarget import ANGLES, BONES, most_different
-from hobble.motion.rig import leg_length
 from hobble.motion.root import facing_directions
 from hobble.motion.skeleton_file import load_skeleton
 
-# cm: two clips show the same motion if their joints are on average less than this apart. The release of
-# Holden et al. (2017) contains two mirrored clips, which are 1.2 and 1.3 cm from the mirror images of their
-# originals. Two different walks or runs of one person are at least 2.6 cm apart.
-SAME_MOTION = 1.7
-LONGER = 0.02  # clips are compared only if one is longer than the other by at most this share
-POSES = 12  # number of poses of each clip that are compared
-MIRRORED = np.array([-1.0, 1.0, 1.0])  # a position times this is mirrored in the plane x = 0
+# The table: one line for each clip, and notes on all of them.
 
-
-@dataclass(frozen=True)
-class ClipDigest:
-    """The data of one clip by which it is compared with others.
-
-    sha256: checksum of the file. seconds: length of the clip. poses: (POSES, J, 3) cm, the positions of the
-    joints at times spread evenly over the clip, relative to the point of the ground below the hips at the
-    same time. They are turned so that the first pose faces +Z. mirrored: `poses` with left and right
-    exchanged, or None if the rig cannot be mirrored.
-    """
-
-    name: str
-    sha256: str
-    seconds: float
-    poses: Array = field(repr=False)
-    mirrored: Array | None = field(default=None, repr=False)
-
-
-def clip_digest(clip: Clip, sha256: str) -> ClipDigest:
-    """The data by which a clip is compared with others. sha256: checksum of its file."""
-    sampled = np.linspace(0, len(clip) - 1, POSES).round().astype(int)
-    sample = clip.part(sampled)
-    poses = sample.positions - sample.positions[:, :1] * [1.0, 0.0, 1.0]
-    ahead = facing_directions(clip.skeleton, sample.positions[:1], 0.0)[0]
-    # Turn about the vertical axis, so that the facing direction (x, z) becomes (0, 1).
-    x, z = ahead[[0, 2]] / max(float(np.hypot(ahead[0], ahead[2])), 1e-9)
-    poses = poses @ np.array([[z, 0.0, x], [0.0, 1.0, 0.0], [-x, 0.0, z]])
-    try:
-        mirrored = poses[:, clip.skeleton.mirror_joints] * MIRRORED
-    except HobbleError:  # the names of the rig's joints do not show which joint is whose counterpart
-        mirrored = None
-    return ClipDigest(clip.name, sha256, len(clip) / clip.fps, poses, mirrored)
-
-
-def duplicate_pairs(clips: Sequence[ClipDigest]) -> list[tuple[str, str, str]]:
-    """Pairs of duplicates.
-
-    Each pair is given as the names of the two clips and what they have in common: "the same file", "the same
-    motion" or "mirrors of each other".
-    """
-    out = []
-    by_length = sorted(clips, key=lambda clip: clip.seconds)
-    for i, a in enumerate(by_length):
-        for b in by_length[i + 1 :]:
-            if b.seconds - a.seconds > LONGER * a.seconds:
-                break  # all further clips are even longer
-            if reason := _why_equal(a, b):
-                out.append((min(a.name, b.name), max(a.name, b.name), reason))
-    return sorted(out)
-
-
-def _why_equal(a: ClipDigest, b: ClipDigest) -> str:
-    """What two clips have in common, in the words of `duplicate_pairs`, or "" if they are no duplicates."""
-    if a.sha256 == b.sha256:
-        return "the same file"
-    if a.poses.shape != b.poses.shape:
-        return ""
-    if np.linalg.norm(a.poses - b.poses, axis=-1).mean() < SAME_MOTION:
-        return "the same motion"
-    if a.mirrored is not None and np.linalg.norm(a.mirrored - b.poses, axis=-1).mean() < SAME_MOTION:
-        return "mirrors of each other"
-    return ""
-
-
-# Summarises a folder of clips before training: one line for each clip, and notes on all of them.
-#
-# The cadence is how often the ankles pass each other in a minute. For steps of a given length, it is nearly
-# the same for all people. So if the cadence of a clip is impossible, the frame rate in its file may be wrong.
-# A warning then names a frame rate that would make the cadence usual.
-
-
-SLOWEST, FASTEST = 40.0, 260.0  # range of the cadences of people who walk or run, steps a minute
-RATES = (24, 25, 30, 60, 120, 240)  # usual frame rates of files
-# A clip gets a warning if its accelerations show that it plays MOST_OFF times too fast or too slow. If its
-# cadence is impossible, too, AGREES times is enough. Of 163 clips of CMU, the data sets `styles` and
-# `patients`, Ferre et al. and the release of Holden et al. (2017), 6 clips get a warning at their true rates,
-# 87 % of the clips at twice the rate, 88 % at half, and all at a quarter.
-MOST_OFF, AGREES = 1.34, 1.3
-# If a clip plays at less than this share of its true speed, noise hides its accelerations. Then its cadence
-# shows the likely frame rate.
-HIDDEN = 0.41
-STILL = 3.0  # cm a second: if the hips are slower, the figure may be standing
-STANDING = 0.5  # seconds: a figure that rests for a shorter time does not count as standing
-# Leg lengths. A step is counted if one ankle moves from half of this behind the other to half of this ahead.
-LEAST_STEP = 0.25
 MANY = 5  # a warning that at least this many clips get is printed once for all of them
-# In what way two clips are duplicates (as `duplicate_pairs` says it) -> what to do. To hold a clip out is to
-# keep it from training, for tests.
-ADVICE = {"mirrors of each other": "hold both out or neither"}
-USUAL_ADVICE = "one of them is enough"
+# What to do with duplicates that do not have all in common. To hold a clip out is to keep it from training,
+# for tests.
+ADVICE, USUAL_ADVICE = "hold both out or neither", "one of them is enough"
 
 
 @dataclass(frozen=True)
@@ -177,7 +85,7 @@ def summarise_clips(
     skeleton_folder: the folder of the skeleton files. options: how the files are read (the section `motion`
     of a data set). progress: shows how far the work has come, while it hands on the files.
     """
-    files = list(clips_in(folder).values())
+    files = list(clips_in(folder, MOTION_SUFFIXES).values())
     clips = tuple(
         _summary_of_file(file, skeleton, skeleton_folder, options or ClipMotion()) for file in progress(files)
     )
@@ -234,7 +142,6 @@ def summary_of_clip(clip: Clip, report: Mapping[str, Any]) -> ClipSummary:
     seconds = len(clip) / clip.fps
     steps = step_count(clip)
     standing = standing_seconds(moves * clip.fps, clip.fps)
-    moving = max(seconds - standing, 1e-9)
     summary = summary_of_report(report)
     return replace(
         summary,
@@ -245,7 +152,6 @@ def summary_of_clip(clip: Clip, report: Mapping[str, Any]) -> ClipSummary:
         steps=steps,
         cadence=60.0 * steps / seconds,
         standing=standing,
-        warnings=(*rate_warnings(steps, moving, distance, clip, report), *summary.warnings),
         digest=clip_digest(clip, report["sha256"]),
     )
 
@@ -261,77 +167,11 @@ def _repair_warning(report: Mapping[str, Any]) -> list[str]:
     return [f"repaired: {re.split('[;.,] ', repairs[0])[0].rstrip('.')}{more}"]
 
 
-def step_count(clip: Clip) -> int:
-    """How often one ankle passes the other, seen along the facing direction.
-
-    Before and after, the ankles must be apart by half of LEAST_STEP.
-    """
-    p, role = clip.positions, clip.skeleton.role
-    left = p[:, role("left_hip")] - p[:, role("right_hip")]
-    ahead = np.cross(left, [0.0, 1.0, 0.0])
-    ahead /= np.maximum(np.linalg.norm(ahead, axis=-1, keepdims=True), 1e-9)
-    # By how many cm the left ankle is ahead of the right one.
-    left_ahead = np.sum((p[:, role("left_heel")] - p[:, role("right_heel")]) * ahead, axis=-1)
-    far = 0.5 * LEAST_STEP * leg_length(clip.skeleton)
-    foremost = np.sign(left_ahead[np.abs(left_ahead) > far])
-    return int(np.count_nonzero(foremost[1:] != foremost[:-1]))
-
-
-def standing_seconds(speed: Array, fps: float) -> float:
-    """For how many seconds the figure stands: the hips are slower than STILL for at least STANDING.
-
-    speed: (F-1,) speed of the hips, cm a second.
-    """
-    still = np.concatenate([[False], speed < STILL, [False]])
-    edges = np.flatnonzero(still[1:] != still[:-1])
-    runs = [b - a for a, b in zip(edges[::2], edges[1::2], strict=True)]
-    return float(sum(run for run in runs if run >= STANDING * fps) / fps)
-
-
-def rate_warnings(
-    steps: int, moving: float, distance: float, clip: Clip, report: Mapping[str, Any]
-) -> list[str]:
-    """A warning if no person has the clip's cadence or accelerations, else an empty list.
-
-    The warning names a frame rate that would explain them. steps: the number of steps. moving: seconds in
-    which the figure moves. distance: length of its path over the ground, cm.
-    """
-    if steps < 2:
-        return []
-    cadence = 60.0 * steps / moving
-    step_length = distance / steps
-    leg = leg_length(clip.skeleton)
-    # Cadence grows with step length (Grieve and Gear 1966). With steps of .8 leg lengths it is 110 a minute.
-    # The relation is not extended to steps shorter than .4 or longer than 1.76 leg lengths.
-    usual = 110.0 * np.clip(step_length / (0.8 * leg), 0.5, 2.2) ** 0.6
-    fps, found = report["source_fps"], times_too_fast(clip, steps, report["scale"])
-    impossible = not (SLOWEST <= cadence <= FASTEST and 0.45 < cadence / usual < 2.2)
-    # How many times too fast the clip probably plays.
-    least, likely = found or (1.0, 0.0)
-    likely = likely if likely > HIDDEN else float(cadence / usual)
-    # The usual rate nearest to the one that explains the motion, but never the file's own.
-    rate = min((r for r in RATES if r != fps), key=lambda r: abs(np.log(r * likely / fps)))
-    # The accelerations, if they can be measured, must confirm that the clip plays too fast or too slow.
-    confirmed = found is None or (least > AGREES if cadence > usual else least < 1 / AGREES)
-    if impossible and confirmed:
-        return [
-            f"{cadence:.0f} steps a minute of {step_length:.0f} cm are impossible; at {rate} fps there would "
-            f"be {cadence * rate / fps:.0f} a minute (source_fps: {rate})"
-        ]
-    if found is None or 1 / MOST_OFF < least < MOST_OFF:
-        return []
-    # Accelerations grow with the square of the speed.
-    strength = f"{likely**2:.{1 if likely > 1 else 2}f}"
-    return [
-        f"The body's accelerations are {strength} times those of people in steps of {step_length:.0f} cm; at "
-        f"{rate} fps they would be usual (source_fps: {rate})"
-    ]
-
-
 def duplicate_notes(clips: Sequence[ClipSummary]) -> list[str]:
     """A sentence for each pair of duplicate clips: which clips they are, and what to do."""
     pairs = duplicate_pairs([clip.digest for clip in clips if clip.digest is not None])
-    return [f"{a} and {b} are {what}: {ADVICE.get(what, USUAL_ADVICE)}." for a, b, what in pairs]
+    whole = ("the same file", "the same motion")
+    return [f"{a} and {b} are {what}: {USUAL_ADVICE if what in whole else ADVICE}." for a, b, what in pairs]
 
 
 def standing_notes(clips: Sequence[ClipSummary]) -> list[str]:
@@ -592,7 +432,7 @@ def picture_of_file(bvh: Path, skeleton: Path, skeleton_folder: Path, options: C
     read or that has this skeleton's bones already.
     """
     target = load_skeleton(skeleton, skeleton.stem)
-    source = load_source(read_bvh(bvh), target, skeleton_folder, options)
+    source = load_source(read_motion(bvh), target, skeleton_folder, options)
     before = resample(source.clip, options.fps)
     before = replace(before, skeleton=replace(before.skeleton, roles=source.match.roles))
     fitted = fit_skeleton(before, source, target.skeleton, options.proportions)

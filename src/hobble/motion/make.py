@@ -14,16 +14,18 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from hobble.core import quat
 from hobble.core.clip import Clip
 from hobble.core.errors import InputError
 from hobble.core.skeleton import Skeleton, rest_positions
 from hobble.motion.axes import RigAxes, straighten, turned_about_vertical
 from hobble.motion.body import Body, body_by_roles, match_joints
 from hobble.motion.edit import facing_angle, loop_clip, notes_on_spins, repair_defects, resample
-from hobble.motion.ground import check_tilt, put_on_floor
+from hobble.motion.ground import put_on_floor, tilt_problem
 from hobble.motion.limbs import on_four_legs
-from hobble.motion.options import ClipMotion
-from hobble.motion.physics import check_pace
+from hobble.motion.options import ACCEPT, ClipMotion, MotionOptions, Problem, accept
+from hobble.motion.other_formats import read_motion
+from hobble.motion.physics import pace_problem, rate_problem
 from hobble.motion.read import (
     MOST_JOINT_POSES,
     Bvh,
@@ -31,27 +33,27 @@ from hobble.motion.read import (
     check_angles,
     decode_channels,
     frame_rate,
-    read_bvh,
 )
 from hobble.motion.rest_pose import why_not_standing, with_upright_rest
-from hobble.motion.retarget import check_difference, check_knees, compare_motions, plan, retarget_clip
+from hobble.motion.retarget import compare_motions, difference_problems, knee_problem, plan, retarget_clip
 from hobble.motion.rig import (
+    LENGTH_OF_LEG,
     RigMatch,
     below_hips,
     body_in_file,
     clean_names,
     decode_below,
     find_hips,
-    leg_length,
     likely_unit,
     match_rig,
-    missing_bone,
 )
 from hobble.motion.skeleton_file import KnownSkeleton, load_skeleton
 
 STILL = 0.1  # cm: a joint that stays this close to its offset counts as fixed to its parent
 SAME = 1e-3  # cm: offsets count as equal if they differ from the target skeleton's by at most this much
 MOST_HEIGHT_ERROR = 3.0  # cm (two standard deviations): a clip whose height is more uncertain is refused
+FEWEST_FRAMES = 5  # fewer frames show no motion
+NO_MOTION = 0.01  # cm: a figure of which no joint moves further does not move
 UNKNOWN_RIG = "found"  # stands in reports instead of the rig's name if the rig is no known skeleton
 
 
@@ -74,19 +76,17 @@ def make_clip(
     `defects: refuse`, for all defects.
     """
     target = load_skeleton(skeleton, skeleton_name)
-    file = read_bvh(bvh)
+    file = read_motion(bvh)
+    if options.frames is not None:
+        file = _cut(file, *options.frames)
     source = load_source(file, target, skeleton_folder, options)
     _check_length(file, source.clip, target.skeleton, options)
     fitted = fit_skeleton(resample(source.clip, options.fps), source, target.skeleton, options.proportions)
     made, repairs, loops = fitted.clip, source.repairs + fitted.repairs, options.loops
+    problems = clip_problems(made, source.clip.fps, fitted.scale, options)
     if fitted.difference is not None:
-        check_difference(file.path, fitted.difference, source.match.rig)
-    # `defects: leave` switches these three checks off. The check of the knees is also off if the user has set
-    # the handedness, and the check of the tilt if the user has set the axis that points up.
-    leave = options.defects == "leave"
-    check_knees(file.path, made, leave or options.handedness != "auto")
-    doubtful_pace = check_pace(file.path, made, leave)
-    check_tilt(file.path, made, leave or options.up != "auto")
+        problems = [*difference_problems(file.path, fitted.difference, source.match.rig), *problems]
+    doubts = fitted.unsure + accept(file.path, problems, options)
     if loops > 1:
         made = loop_clip(made, loops, options.heading)
         frames = len(made) // loops
@@ -118,10 +118,48 @@ def make_clip(
         "cycle_frames": len(made) // loops,
         "scale": fitted.scale,
         "retarget": fitted.difference,
-        "unsure": fitted.unsure + ([doubtful_pace] if doubtful_pace else []),
+        "unsure": doubts,
         "repairs": repairs,
         "notes": source.notes,
     }
+
+
+def _cut(file: Bvh, first: int, last: int) -> Bvh:
+    """The file with the frames `first` to `last` only, counted from 1. Raises InputError if it has fewer."""
+    if last > len(file):
+        fix = "Correct `frames` in the clip's entry."
+        raise InputError(file.path, f"frames {first} to {last} are wanted, but it has {len(file)}", fix=fix)
+    return replace(file, values=file.values[first - 1 : last], declared=last - first + 1)
+
+
+def clip_problems(
+    clip: Clip, source_fps: float, scale: float, options: MotionOptions
+) -> list[Problem | None]:
+    """What speaks against a clip: its motion, knees, pace, tilt and frame rate.
+
+    source_fps: frame rate of its file. scale: size of the clip's figure / size of the captured person.
+    `defects: leave` switches the checks of knees, pace and tilt off. The check of the knees is also off if
+    the user has set the handedness, and the check of the tilt if the user has set the axis that points up.
+    """
+    found: list[Problem | None] = [_no_motion_problem(clip)]
+    if options.defects != "leave":
+        found.append(knee_problem(clip) if options.handedness == "auto" else None)
+        found.append(pace_problem(clip))
+        found.append(tilt_problem(clip) if options.up == "auto" else None)
+    return [*found, rate_problem(clip, source_fps, scale)]
+
+
+def _no_motion_problem(clip: Clip) -> Problem | None:
+    """A clip of a few frames, or of a figure that never moves, such as a T-pose alone."""
+    moved = np.ptp(clip.positions, axis=0).max()
+    if len(clip) >= FEWEST_FRAMES and moved > NO_MOTION:
+        return None
+    seen = (
+        f"{len(clip)} frames of {clip.fps:g} a second" if moved > NO_MOTION else "one pose, held all the time"
+    )
+    if moved <= NO_MOTION and np.abs(quat.positive(clip.rotations[0, 1:]) - quat.IDENTITY).max() < 1e-3:
+        seen = "the rest pose alone (all rotations are zero)"
+    return Problem(f"there is no motion in it, only {seen}", "Export the clip with its motion.")
 
 
 def _check_length(file: Bvh, clip: Clip, target: Skeleton, options: ClipMotion) -> None:
@@ -205,13 +243,7 @@ def load_source(
         if options.defects == "refuse":
             raise InputError(file.path, problem, fix="Export the clip again, or set motion.defects: repair.")
         counted = [f"The file {problem}. The {len(file)} frames are used."]
-    hips = find_hips(clean_names(file.names), target, skeleton_folder)
-    known = match_rig(rig_in_file(below_hips(file, hips)), target, skeleton_folder)
-    # The match has `followed_joints` if a map leads from the known skeleton to the target.
-    if known is not None and known.has_known_rest_pose and known.followed_joints:
-        source = _load_known_rig(file, hips, known, options)
-    else:
-        source = _load_unknown_rig(file, target, known, options)
+    source = _load_rig(file, target, skeleton_folder, options)
     clip, first, mended, notes = source.clip, 0, list[str](), source.notes
     if options.defects != "leave":
         clip, first, mended = repair_defects(clip)
@@ -224,97 +256,85 @@ def load_source(
     return replace(source, clip=clip, first_frame=first, repairs=repairs, notes=notes)
 
 
-def _load_known_rig(file: Bvh, hips: int, match: RigMatch, options: ClipMotion) -> FileMotion:
-    """The motion of a file whose rig is a known skeleton. hips: index of the hips in the file."""
-    rig = replace(rig_in_file(below_hips(file, hips)), roles=match.roles)
-    unit, unit_name = _unit(file.path, leg_length(rig), options.unit)
-    decoded = decode_below(file, hips, STILL / unit)
-    clip = _scaled(file, rig, decoded, unit, options)
-    if bone := missing_bone(clip.skeleton):
-        raise _no_length_error(file, bone)
-    straight = straighten(clip, options.up, options.handedness)
-    return FileMotion(
-        straight.clip,
-        match,
-        unit,
-        unit_name,
-        straight.axes,
-        rest_source="its zero pose",
-        has_moving_joints=decoded.translations is not None,
-        has_standing_rig=False,
-        repairs=decoded.repairs,
-        notes=decoded.notes + straight.notes,
-        unsure=straight.unsure,
-    )
+def _load_rig(file: Bvh, target: KnownSkeleton, folder: str | Path, options: ClipMotion) -> FileMotion:
+    """A file's motion along Hobble's axes, on the rig of a known skeleton or with a standing rest pose.
 
-
-def _load_unknown_rig(
-    file: Bvh, target: KnownSkeleton, known: RigMatch | None, options: ClipMotion
-) -> FileMotion:
-    """The motion of a file whose rig is no known skeleton, or has another rest pose than the known one.
-
-    The parts of the body and a standing rest pose are found. known: the known skeleton that has the rig's
-    joint names, if there is one. It tells the parts of the body.
+    The match of a rig with another rest pose than that of its known skeleton only tells the parts of the
+    body.
     """
-    decoded = _decode(file)
-    raw = raw_clip(file, decoded)
-    body, how_found = body_in_file(file.path, raw, known, options.handedness)
+    hips = find_hips(clean_names(file.names), target, folder)
+    known = match_rig(rig_in_file(below_hips(file, hips)), target, folder)
+    # The match has `followed_joints` if a map leads from the known skeleton to the target.
+    is_known = known is not None and known.has_known_rest_pose and bool(known.followed_joints)
+    decoded = decode_below(file, hips) if is_known else decode_channels(file)
+    raw = raw_clip(below_hips(file, hips) if is_known else file, decoded)
+    if is_known and known is not None:
+        body, how_found = body_by_roles(replace(raw.skeleton, roles=known.roles)), list[str]()
+    else:
+        body, how_found = body_in_file(file.path, raw, known, options.handedness)
     leg = _leg_length(file, raw, body)
-    unit, unit_name = _unit(file.path, leg, options.unit)
-    rig = replace(raw.skeleton, roles=body.roles(raw.skeleton.joints))
-    clip = _scaled(file, rig, decoded, unit, options)
-    standing = why_not_standing(body, rest_positions(clip.skeleton)) is None
+    standing = is_known or why_not_standing(body, LENGTH_OF_LEG / leg * rest_positions(raw.skeleton)) is None
     if not standing and on_four_legs(body, raw.positions):
         fix = "Only clips of figures with two legs can be used."
         raise InputError(file.path, "the figure goes on four legs", fix=fix)
+    unit, unit_name, doubts = _unit(leg, options.unit)
+    roles = known.roles if is_known and known else body.roles(raw.skeleton.joints)
+    clip = _scaled(file, replace(raw.skeleton, roles=roles), decoded, unit, options)
     try:
         straight = straighten(clip, options.up, options.handedness, standing)
     except ValueError as error:
-        fix = "Set motion.up in the data set to Y or Z."
+        fix = "Set motion.up in the data set to Y or Z (option --up)."
         raise InputError(file.path, f"the up axis is in doubt: {error}", fix=fix) from None
+    source = FileMotion(
+        straight.clip,
+        known or RigMatch(UNKNOWN_RIG, roles),
+        unit,
+        unit_name,
+        # The standing rest pose that replaces another one faces +Z.
+        straight.axes if standing else replace(straight.axes, facing="+Z"),
+        rest_source="its zero pose",
+        has_moving_joints=_has_moving_joints(decoded, body, unit),
+        has_standing_rig=False,
+        repairs=decoded.repairs,
+        notes=decoded.notes + straight.notes + how_found,
+        unsure=doubts + straight.unsure,
+    )
+    return source if is_known else _with_standing_rig(file, source, body, target, options)
+
+
+def _with_standing_rig(
+    file: Bvh, source: FileMotion, body: Body, target: KnownSkeleton, options: ClipMotion
+) -> FileMotion:
+    """The motion on a rig that has only the joints of the body and a standing rest pose that faces +Z."""
+    match = source.match
     # A rig with the target's own joint names is matched with the target by these names, and any other rig by
     # the parts of the body.
-    named = known.followed_joints if known is not None and known.rig == target.skeleton.name else {}
-    upright = with_upright_rest(straight.clip, body, target.skeleton, [rig.index(j) for j in named.values()])
+    named = match.followed_joints if match.rig == target.skeleton.name else {}
+    index = source.clip.skeleton.index
+    upright = with_upright_rest(source.clip, body, target.skeleton, [index(j) for j in named.values()])
     if upright.height_error > MOST_HEIGHT_ERROR and not options.accept_doubt:
         raise InputError(
             file.path,
             " ".join(upright.doubts),
             fix="Use a clip in which both feet stand flat, or one with a zero pose (all rotations zero) in "
-            "which a person could stand. To use this clip anyway, set motion.accept_doubt: true.",
+            f"which a person could stand. {ACCEPT}",
         )
-    new_rig, target_body = upright.clip.skeleton, body_by_roles(target.skeleton)
-    followed = named or match_joints(new_rig, upright.body, target.skeleton, target_body)
-    return FileMotion(
-        upright.clip,
-        RigMatch(known.rig if known else UNKNOWN_RIG, new_rig.roles, False, followed),
-        unit,
-        unit_name,
-        # The standing rest pose that replaces another one faces +Z.
-        straight.axes if standing else replace(straight.axes, facing="+Z"),
-        upright.rest_source,
-        has_moving_joints=_has_moving_joints(decoded, body, unit),
+    rig = upright.clip.skeleton
+    followed = named or match_joints(rig, upright.body, target.skeleton, body_by_roles(target.skeleton))
+    return replace(
+        source,
+        clip=upright.clip,
+        match=RigMatch(match.rig, rig.roles, False, followed),
+        rest_source=upright.rest_source,
         has_standing_rig=True,
-        repairs=decoded.repairs,
-        notes=decoded.notes + straight.notes + how_found,
-        unsure=straight.unsure + upright.doubts,
+        unsure=source.unsure + upright.doubts,
     )
 
 
 def raw_clip(file: Bvh, decoded: Decoded | None = None) -> Clip:
     """A file's motion in its own unit and axes, for uses in which the frame rate does not matter: it is 1."""
-    found = decoded or _decode(file)
+    found = decoded or decode_channels(file)
     return Clip(file.path.stem, rig_in_file(file), 1.0, found.rotations, found.root, found.translations)
-
-
-def _decode(file: Bvh) -> Decoded:
-    """The file's rotations and positions.
-
-    The file's unit is not known yet. So a joint counts as fixed to its parent if it moves by less than a
-    thousandth of the longest bone.
-    """
-    longest = float(np.linalg.norm(file.offsets[1:], axis=-1).max(initial=0.0))
-    return decode_channels(file, 1e-3 * longest)
 
 
 def rig_in_file(file: Bvh) -> Skeleton:
@@ -323,12 +343,6 @@ def rig_in_file(file: Bvh) -> Skeleton:
     new_name = dict(zip(file.names, names, strict=True))
     ends = {new_name[name]: sites[0] for name, sites in file.end_sites.items()}
     return Skeleton(file.path.stem, names, file.parents, file.offsets, end_sites=ends)
-
-
-def _no_length_error(file: Bvh, bone: str) -> InputError:
-    """The error for a bone without length. bone: such as "LeftUpLeg to LeftLeg"."""
-    fix = "Check its OFFSET and its position channels, and export the clip again."
-    return InputError(file.path, f"the bone from {bone} has no length", fix=fix)
 
 
 def _leg_length(file: Bvh, clip: Clip, body: Body) -> float:
@@ -340,7 +354,9 @@ def _leg_length(file: Bvh, clip: Clip, body: Body) -> float:
     for a, b in (bone for leg in body.legs.values() for bone in pairwise(leg[:3])):
         lengths.append(np.linalg.norm(clip.positions[:, b] - clip.positions[:, a], axis=-1))
         if np.median(lengths[-1]) < 1e-6:
-            raise _no_length_error(file, f"{clip.skeleton.joints[a]} to {clip.skeleton.joints[b]}")
+            bone = f"{clip.skeleton.joints[a]} to {clip.skeleton.joints[b]}"
+            fix = "Check its OFFSET and its position channels, and export the clip again."
+            raise InputError(file.path, f"the bone from {bone} has no length", fix=fix)
     return float(np.median(sum(lengths)) / 2)
 
 
@@ -354,18 +370,21 @@ def _has_moving_joints(decoded: Decoded, body: Body, unit: float) -> bool:
     return bool(np.abs(local - np.median(local, axis=0)).max() * unit > STILL)
 
 
-def _unit(path: Path, leg: float, unit: str | float) -> tuple[float, str]:
-    """Centimetres per unit of the file, and the unit in words.
+def _unit(leg: float, unit: str | float) -> tuple[float, str, list[str]]:
+    """Centimetres per unit of the file, the unit in words, and sentences on what is uncertain about it.
 
-    leg: length of thigh and shank together, in the file's unit. unit: the option, a number or "auto".
+    leg: length of thigh and shank together, in the file's unit. unit: the option, a number or "auto". If no
+    unit gives the rig a person's size, the rig gets that of an average adult.
     """
     if unit != "auto":
-        return float(unit), f"{float(unit):g} cm (given)"
-    found = likely_unit(leg)
-    if found is None:
-        problem = f"no unit gives this rig a person's size: thigh and shank together are {leg:g} units long"
-        raise InputError(path, problem, fix="Set motion.unit in the data set to the centimetres per unit.")
-    return found
+        return float(unit), f"{float(unit):g} cm (given)", []
+    if (found := likely_unit(leg)) is not None:
+        return *found, []
+    doubt = (
+        f"No unit gives this rig a person's size: thigh and shank together are {leg:.4g} units long. They "
+        f"were taken to be {LENGTH_OF_LEG:g} cm long; motion.unit (option --unit) overrides this."
+    )
+    return LENGTH_OF_LEG / leg, "unknown", [doubt]
 
 
 def _scaled(file: Bvh, rig: Skeleton, decoded: Decoded, unit: float, options: ClipMotion) -> Clip:

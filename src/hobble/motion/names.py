@@ -158,7 +158,7 @@ def limb_parts(names: Sequence[str]) -> dict[str, int]:
     out: dict[str, int] = {}
     for i, word in enumerate(parts):
         before, after = set(parts[:i]), set(parts[i + 1 :])
-        hip = None if after & {"thigh", "leg"} else "thigh"
+        hip = None if after & {"thigh", "leg", "hip"} else "thigh"
         meaning: dict[str, str | None] = {
             "shoulder": "clavicle" if after & {"upperarm", "arm"} else "upperarm",
             "arm": "forearm" if "upperarm" in before else "upperarm",

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
+from pathlib import Path
 from string import Formatter
-from typing import Annotated, Literal
+from typing import Annotated, Literal, NamedTuple
 
 from pydantic import AfterValidator, Field, model_validator
 
-from hobble.core.section import Finite, Ground, Positive, PositiveFloat, RelativePath, Section
+from hobble.core.errors import InputError
+from hobble.core.section import Finite, FrameRange, Ground, Positive, PositiveFloat, RelativePath, Section
 
 
 def _check_sixty(fps: float) -> float:
@@ -32,9 +35,10 @@ class Download(Section):
     url: str = Field(
         description="address of a clip; {clip} is the clip's name, {subject} is the name up to the first _"
     )
-    checksums: RelativePath = Field(
+    checksums: RelativePath | None = Field(
+        None,
         description="file of SHA-256 sums, as sha256sum writes them; its path is relative to the folder of "
-        "the data set's file"
+        "the data set's file. Without it, the listed clips are downloaded and not checked",
     )
 
     @model_validator(mode="after")
@@ -90,8 +94,8 @@ class MotionOptions(Section):
     )
     accept_doubt: bool = Field(
         False,
-        description="accept a clip even if the height at which its figure stands is uncertain by more than "
-        "3 cm",
+        description="use clips that would be refused because something in them is doubtful (a tilted world, "
+        "knees that point aside, sliding feet, an uncertain height); the report says what",
     )
     loops: Positive = Field(1, description="how many times a clip of one cycle is played in a row")
     heading: Finite | None = Field(
@@ -105,3 +109,30 @@ class ClipMotion(MotionOptions):
     """The options for one clip: those of the section `motion`, except where the clip's entry has its own."""
 
     ground: Ground = Field("flat", description="the clip's ground; a flat floor is moved to height 0")
+    frames: FrameRange | None = Field(
+        None, description="first and last frame of the file that are used, counted from 1"
+    )
+
+
+ACCEPT = "To use the clip as it is, set motion.accept_doubt: true (option --accept-doubt)."
+
+
+class Problem(NamedTuple):
+    """What speaks against a clip. text: what was seen, without a final dot. fix: what to do about it.
+
+    A problem without a fix is a doubt: the clip is used, and its report tells the doubt.
+    """
+
+    text: str
+    fix: str = ""
+
+
+def accept(path: Path, problems: Iterable[Problem | None], options: MotionOptions) -> list[str]:
+    """The problems as sentences. Raises InputError for the first one that `options` do not accept."""
+    out = []
+    for problem in problems:
+        if problem is not None and problem.fix and not options.accept_doubt:
+            raise InputError(path, problem.text, fix=f"{problem.fix} {ACCEPT}")
+        if problem is not None:
+            out.append(f"{problem.text[0].upper()}{problem.text[1:]}.")
+    return out

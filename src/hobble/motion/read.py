@@ -119,6 +119,9 @@ def _clean_text(path: Path, data: bytes) -> bytes:
         raise InputError(path, "the file is empty", fix=EXPORT)
     if data.startswith(b"Kaydara FBX"):
         raise InputError(path, "this is an FBX file, not BVH", fix="Export the clip as BVH.")
+    if data[:2] in (b"\xff\xfe", b"\xfe\xff") or data[:2] in (b"H\0", b"\0H"):
+        order = "utf-16" if data[:1] in b"\xff\xfe" else "utf-16-le" if data[:1] == b"H" else "utf-16-be"
+        data = data.decode(order, "replace").encode()
     if b"\0" in data[:65536] or b"\0" in data[-65536:]:
         raise InputError(path, "this is a binary file, not a BVH text file", fix=EXPORT)
     data = data.removeprefix(b"\xef\xbb\xbf")
@@ -444,14 +447,15 @@ def _columns(bvh: Bvh) -> list[tuple[int, int, str]]:
     return [(j, "XYZ".index(name[0]), name[1:]) for j, names in enumerate(bvh.channels) for name in names]
 
 
-def decode_channels(bvh: Bvh, still: float) -> Decoded:
+def decode_channels(bvh: Bvh) -> Decoded:
     """Rotations and positions of a BVH file.
 
     A position channel replaces its component of the joint's OFFSET, as all current programs intend. If the
     position channels of a joint below the root are about zero although its OFFSET is not, their values are
-    added to the OFFSET instead. still: a joint whose position stays this close to its offset (in the file's
-    unit) does not move relative to its parent.
+    added to the OFFSET instead. A joint whose position stays within a thousandth of the longest bone of its
+    offset does not move relative to its parent.
     """
+    still = 1e-3 * float(np.linalg.norm(bvh.offsets[1:], axis=-1).max(initial=0.0))
     rotations = np.broadcast_to(quat.IDENTITY, (len(bvh), len(bvh.names), 4)).copy()
     columns: list[list[int]] = [[] for _ in bvh.names]  # the rotation columns of each joint
     for column, (j, _, kind) in enumerate(_columns(bvh)):
@@ -489,7 +493,10 @@ def _notes_on_wraps(bvh: Bvh) -> list[str]:
 
 
 def _decode_positions(bvh: Bvh, still: float) -> tuple[Array, Array, Array | None, list[str]]:
-    """The fields `root`, `offsets`, `translations`, `repairs` of `Decoded`. still: see `decode_channels`."""
+    """The fields `root`, `offsets`, `translations`, `repairs` of `Decoded`.
+
+    still: a joint whose position stays this close to its offset does not move relative to its parent.
+    """
     root = np.broadcast_to(bvh.offsets[0], (len(bvh), 3)).copy()
     below_root = []
     for column, (j, axis, kind) in enumerate(_columns(bvh)):
@@ -514,7 +521,7 @@ def _judge_channels(
 
     Returns the fields `offsets`, `translations` and `repairs` of `Decoded`. local: (F, J, 3) positions
     relative to the parents; where channels must be added to the OFFSETs, this array is changed. has_channel:
-    (J, 3) bool, which components of the positions come from channels. still: as in `decode_channels`.
+    (J, 3) bool, which components of the positions come from channels. still: as in `_decode_positions`.
     """
     joints = np.flatnonzero(has_channel.any(axis=1)).tolist()
     median = np.median(local, axis=0)

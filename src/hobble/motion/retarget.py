@@ -12,7 +12,7 @@ face, roll joints) keep their rest pose relative to the joint above.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -20,14 +20,15 @@ import numpy as np
 
 from hobble.core import quat
 from hobble.core.clip import Clip
-from hobble.core.errors import HobbleError, InputError
+from hobble.core.errors import HobbleError
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton, aim_bone, local_rotations, rest_positions, two_bone_knee
-from hobble.core.smooth import smoothstep
+from hobble.core.smooth import smooth_above, smoothstep
 from hobble.motion.axes import rest_frame, unit
 from hobble.motion.body import SIDES
 from hobble.motion.ground import steady_heels
-from hobble.motion.rig import leg_length, missing_bone
+from hobble.motion.options import Problem
+from hobble.motion.rig import leg_length, leg_lengths, missing_bone
 
 # Bones of limbs, without the side: role of the joint that turns the bone -> role of the joint at its end.
 LIMB_BONES = {"shoulder": "elbow", "elbow": "wrist", "hip": "knee", "knee": "heel"}
@@ -35,7 +36,11 @@ LIMB_BONES = {"shoulder": "elbow", "elbow": "wrist", "hip": "knee", "knee": "hee
 # NEARLY_STRAIGHT or more, the target's hips come down until its leg is no straighter than the source's. If
 # the share is BENT or less, they do not come down. Between the two shares, they come down by a growing part.
 BENT, NEARLY_STRAIGHT = 0.88, 0.95
-SMOOTH = 0.08  # seconds before and after a frame over which the drop of the hips is smoothed
+SMOOTH = 0.04  # seconds: half of the time on each side of a frame over which the drop of the hips is smoothed
+# Radians by which a knee may bend less than in the source before the hips come down. They come down smoothly,
+# by more than most frames need. Without SPARED, knees would bend 4 degrees more than in the source on
+# average, in some clips 9. With 8, nearly straight knees would jerk.
+SPARED = np.radians(5.0)
 MOST_DROP = 6.0  # cm by which the hips come down at most
 # cm: a knee that is nearer than this to the line from hip to ankle hardly shows which way it bends. So its
 # direction is mixed with the forward direction.
@@ -57,9 +62,10 @@ class Retarget:
     hips come first, because the positions of a group follow from those of the groups before it.
 
     forward: (3,) the direction that the target's rest pose faces. pelvis: (3,) cm, from the target's hips to
-    the middle between its two hip joints. scale: leg length of the target / leg length of the source. lift:
-    cm by which the target's ankles are higher above the balls of its feet than the ankles of the scaled
-    source.
+    the middle between its two hip joints. scale: leg length of the target / leg length of the source. lifts:
+    (2,) cm by which the hip joint is higher above the ball of the foot than in the scaled source, if the leg
+    bends as it does there; left, then right. The hips rise by the mean. If the legs of a figure are not
+    equally long, the balls of the feet go down or up by the rest, so that no knee bends for it.
     """
 
     source: Skeleton = field(repr=False)
@@ -73,7 +79,7 @@ class Retarget:
     forward: Array = field(repr=False)
     pelvis: Array = field(repr=False)
     scale: float
-    lift: float
+    lifts: Array = field(repr=False)
 
 
 def plan(source: Skeleton, target: Skeleton, followed_joints: Mapping[str, str]) -> Retarget:
@@ -117,8 +123,8 @@ def plan(source: Skeleton, target: Skeleton, followed_joints: Mapping[str, str])
         forward=quat.rotate(rest_frame(target), np.array([0.0, 0.0, 1.0])),
         pelvis=middle - rest[target.role("hips")],
         scale=scale,
-        lift=_ankle_height(target, target_to_upright)
-        - scale * _ankle_height(source, quat.inv(upright_to_source)),
+        lifts=_hip_heights(target, target_to_upright)
+        - scale * _hip_heights(source, quat.inv(upright_to_source)),
     )
 
 
@@ -146,13 +152,14 @@ def _limb_turns(
     return out
 
 
-def _ankle_height(skeleton: Skeleton, to_upright: Array) -> float:
-    """Height of the ankles above the balls of the feet in the rest pose, cm; mean of both feet.
+def _hip_heights(skeleton: Skeleton, to_upright: Array) -> Array:
+    """(2,) cm, heights of both hip joints above the balls of the feet if the legs are straight.
 
     to_upright: (4,) rotation that makes the rest pose stand along Y and face +Z.
     """
     y = quat.rotate(to_upright, rest_positions(skeleton))[:, 1]
-    return float(np.mean([y[skeleton.role(f"{s}_heel")] - y[skeleton.role(f"{s}_toe")] for s in SIDES]))
+    ankles = [y[skeleton.role(f"{s}_heel")] - y[skeleton.role(f"{s}_toe")] for s in SIDES]
+    return np.array(ankles) + leg_lengths(skeleton)
 
 
 def _drivers(target: Skeleton, joints: Array) -> tuple[Array, Array]:
@@ -179,6 +186,7 @@ def _levels(target: Skeleton, joints: Array, drivers: Array) -> tuple[Array, ...
 def retarget_clip(clip: Clip, how: Retarget) -> Clip:
     """The clip's motion on the target skeleton. how: what `plan` returns for the two skeletons."""
     rotations = _follow_rotations(how, clip.global_rotations)
+    how = _with_measured_lifts(how, clip, rotations)
     for side in SIDES:
         heel, toe = (clip.positions[:, how.source.role(f"{side}_{part}")] for part in ("heel", "toe"))
         ankle, ball = how.target.role(f"{side}_heel"), how.target.role(f"{side}_toe")
@@ -188,6 +196,21 @@ def retarget_clip(clip: Clip, how: Retarget) -> Clip:
     positions, rotations = _place_joints(how, clip.positions, rotations, clip.fps)
     local = quat.continuous(local_rotations(how.target, rotations))
     return Clip(clip.name, how.target, clip.fps, local, positions[:, 0])
+
+
+def _with_measured_lifts(how: Retarget, clip: Clip, rotations: Array) -> Retarget:
+    """The plan with `lifts` corrected, so that nearly straight legs bend on average as in the clip.
+
+    rotations: as `_follow_rotations` returns them.
+    """
+    hips, lifts = _hips_position(how, clip.positions, rotations), how.lifts.copy()
+    for k, side in enumerate(SIDES):
+        too_high, weight = _Leg(how, clip.positions, rotations, hips, side).excess()
+        if weight.any():
+            order = np.argsort(too_high)
+            passed = np.cumsum(weight[order])
+            lifts[k] -= too_high[order][np.searchsorted(passed, 0.5 * passed[-1])]  # the weighted median
+    return replace(how, lifts=lifts)
 
 
 def retarget_pose(how: Retarget, positions: Array, rotations: Array) -> tuple[Array, Array]:
@@ -220,8 +243,13 @@ def _place_joints(
     """
     hips = _hips_position(how, source, rotations)
     legs = [_Leg(how, source, rotations, hips, side) for side in SIDES]
-    drop = np.max([leg.drop() for leg in legs], axis=0)
-    drop = (drop if fps is None else _smoothed(drop, fps))[..., None] * [0.0, 1.0, 0.0]
+    too_high = [np.maximum(excess, 0.0) * weight for excess, weight in (leg.excess(SPARED) for leg in legs)]
+    drop = np.maximum(*too_high)
+    drop = (drop if fps is None else smooth_above(drop, max(1, round(SMOOTH * fps))))[..., None] * [
+        0.0,
+        1.0,
+        0.0,
+    ]
     hips = hips - drop
     for leg in legs:
         leg.bend(leg.start - drop)
@@ -243,21 +271,13 @@ def _place_joints(
 def _hips_position(how: Retarget, source: Array, rotations: Array) -> Array:
     """(..., 3) position of the target's hips before they come down.
 
-    It puts the middle between the target's hip joints where it is in the scaled source, raised by `how.lift`.
+    It puts the middle between the target's hip joints where it is in the scaled source, raised by the mean of
+    `how.lifts`.
     The hips joint itself is not compared, because skeletons have it at different places in the pelvis.
     """
     middle = 0.5 * sum(source[..., how.source.role(f"{side}_hip"), :] for side in SIDES)
     to_middle = quat.rotate(rotations[..., how.target.role("hips"), :], how.pelvis)
-    return middle * how.scale + np.array([0.0, how.lift, 0.0]) - to_middle
-
-
-def _smoothed(drop: Array, fps: float) -> Array:
-    """A smooth curve (F,) that is nowhere below `drop` (F,): a moving average of its running maximum."""
-    reach = max(1, round(SMOOTH * fps))
-    padded = np.pad(drop, 2 * reach, mode="edge")
-    highest = np.lib.stride_tricks.sliding_window_view(padded, 2 * reach + 1).max(axis=-1)
-    window = np.hanning(2 * reach + 3)[1:-1]  # without the zeros at both ends
-    return np.convolve(highest, window / window.sum(), mode="valid")
+    return middle * how.scale + np.array([0.0, np.mean(how.lifts), 0.0]) - to_middle
 
 
 class _Leg:
@@ -281,20 +301,29 @@ class _Leg:
             self.start = self.start + quat.rotate(rotations[..., above, :], how.driver_offsets[joint])
             joint = above
         toe = source[..., how.source.role(roles[3]), :] * how.scale
+        toe = toe + np.array([0.0, np.mean(how.lifts) - how.lifts[SIDES.index(side)], 0.0])
         self.ankle = toe - quat.rotate(rotations[..., heel, :], how.driver_offsets[ball])
         hip_at, knee_at, heel_at = (source[..., how.source.role(role), :] for role in roles[:3])
         length = np.linalg.norm(knee_at - hip_at, axis=-1) + np.linalg.norm(heel_at - knee_at, axis=-1)
         self.stretch = np.linalg.norm(heel_at - hip_at, axis=-1) / length
+        along = np.sum(unit(knee_at - hip_at) * unit(heel_at - knee_at), axis=-1)
+        self.knee_bend = np.arccos(np.clip(along, -1.0, 1.0))
 
-    def drop(self) -> Array:
-        """(...) cm by which the hips must come down for the leg to be no straighter than the source's."""
-        reach = self.stretch * (np.linalg.norm(self.thigh) + np.linalg.norm(self.shank))
+    def excess(self, spared: float = 0.0) -> tuple[Array, Array]:
+        """(...) cm by which the hips are too high for the leg to bend as in the source, and a weight.
+
+        spared: radians by which the knee may bend less than in the source. The weight is from 0 for a bent
+        leg, which changes little with the height of the hips, to 1.
+        """
+        thigh, shank = np.linalg.norm(self.thigh), np.linalg.norm(self.shank)
+        bend = np.maximum(self.knee_bend - spared, 0.0)
+        reach = np.sqrt(thigh**2 + shank**2 + 2 * thigh * shank * np.cos(bend))
         from_ankle = self.start - self.ankle
-        # After the drop, the hip is at most the distance `reach` from the ankle (Pythagoras).
+        # At the right height, the hip is at the distance `reach` from the ankle (Pythagoras).
         level_squared = np.minimum(from_ankle[..., 0] ** 2 + from_ankle[..., 2] ** 2, reach**2)
-        need = np.maximum(from_ankle[..., 1] - np.sqrt(reach**2 - level_squared), 0.0)
-        share = np.clip((self.stretch - BENT) / (NEARLY_STRAIGHT - BENT), 0.0, 1.0)
-        return np.minimum(need, MOST_DROP) * smoothstep(share)
+        excess = from_ankle[..., 1] - np.sqrt(reach**2 - level_squared)
+        straightness = np.clip((self.stretch - BENT) / (NEARLY_STRAIGHT - BENT), 0.0, 1.0)
+        return np.clip(excess, -MOST_DROP, MOST_DROP), smoothstep(straightness)
 
     def bend(self, start: Array) -> None:
         """Turn thigh and shank so that the ankle reaches its position. The foot keeps its rotation.
@@ -345,11 +374,11 @@ BONES = {  # limb -> roles of its two ends, without the side
     "upper arm": ("shoulder", "elbow"),
     "forearm": ("elbow", "wrist"),
 }
-# In the same pose, bodies of different shapes have different angles at these joints: a nearly straight knee
-# bends 15 degrees more if the leg is 1.5 cm longer and hip and ankle stay where they are. So the median
-# difference is subtracted before these angles are compared.
-SHAPE_DEPENDENT = ("hip", "ankle", "knee")
-MOST_OF_KNEE = 25.0  # degrees: a larger median difference of a knee is an error and is not subtracted
+# In the same pose, bodies of different shapes have different angles at these joints. So the median difference
+# is subtracted before these angles are compared.
+SHAPE_DEPENDENT = ("hip", "ankle")
+# Degrees: the report tells of a joint whose median difference is larger.
+NOTED_CONSTANTS = {"knee": 5.0, "elbow": 5.0, "hip": 10.0, "ankle": 45.0}
 STANCE_SPEED = 0.6  # cm a frame at 60 Hz: the ball of a standing foot is slower than this
 # A clip is refused if the mean cosine of the angle between where a bent knee points and where the body faces
 # is less than this. In 172 clips of the data sets `cmu`, `styles` and `patients`, of Ferre et al. and of
@@ -367,9 +396,8 @@ def compare_motions(source: Clip, result: Clip, scale: float) -> dict[str, Any]:
     Returns a dictionary with these keys. All angles are in degrees.
 
     angles: joint, such as "left knee" -> dictionary. `source` and `result` are the 5th, 50th and 95th
-    percentile of the joint's angle in each clip. `constant` is the median difference, or 0 for joints not in
-    SHAPE_DEPENDENT. `apart` is the mean absolute difference after `constant` is subtracted; the `constant` of
-    a knee is not subtracted if it is MOST_OF_KNEE or more.
+    percentile of the joint's angle in each clip. `constant` is the median difference. For joints in
+    SHAPE_DEPENDENT it is subtracted before `apart`, the mean absolute difference, is computed.
 
     directions: limb, such as "left thigh" -> mean angle between its directions in source and result.
 
@@ -397,11 +425,10 @@ def compare_motions(source: Clip, result: Clip, scale: float) -> dict[str, Any]:
     }
 
 
-def check_difference(path: Path, differences: dict[str, Any], rig: str) -> None:
-    """Raise InputError if a result does not move like its source.
+def difference_problems(path: Path, differences: dict[str, Any], rig: str) -> list[Problem]:
+    """What is wrong with a result that does not move like its source: first the worst joint or limb.
 
-    The error names the joint or limb that differs most. path: the source's file. differences: what
-    `compare_motions` returns. rig: name of the source's rig.
+    path: the source's file. differences: what `compare_motions` returns. rig: name of the source's rig.
     """
     name, degrees = most_different(differences)
     fix = (
@@ -409,27 +436,36 @@ def check_difference(path: Path, differences: dict[str, Any], rig: str) -> None:
         f"and correct the roles of its rig. `hobble rig {path}` writes a draft for "
         "config/skeletons/."
     )
+    out = []
     if degrees > MOST_DIFFERENCE:
-        raise InputError(
-            path, f"the {name} is {degrees:.0f} degrees off its source on average (rig: {rig})", fix=fix
+        out.append(
+            Problem(f"the {name} is {degrees:.0f} degrees off its source on average (rig: {rig})", fix)
         )
     cosines = differences["knees"].values()
     if sum(cosine is not None and cosine < KNEE_BACKWARD for cosine in cosines) == 2:
-        raise InputError(path, f"both knees bend backward (rig: {rig})", fix=fix)
+        out.append(Problem(f"both knees bend backward (rig: {rig})", fix))
+    constants = {joint: angle["constant"] for joint, angle in differences["angles"].items()}
+    for joint, constant in constants.items():
+        if abs(constant) > NOTED_CONSTANTS[joint.partition(" ")[2]]:
+            more = "more" if constant > 0 else "less"
+            out.append(Problem(f"the {joint} bends {abs(constant):.0f} degrees {more} than in the file"))
+    return out
 
 
-def check_knees(path: Path, clip: Clip, leave: bool) -> None:
-    """Raise InputError if a bent knee does not point forward. leave: accept the clip even so."""
+def knee_problem(clip: Clip) -> Problem | None:
+    """A knee that, while it is bent, does not point forward."""
     at = clip.at_roles()
     for side in SIDES:
         cosine = _knee_cosine(at, side, at["head"] - at["hips"])
-        if cosine is not None and cosine < KNEE_AHEAD and not leave:
-            raise InputError(
-                path,
-                f"the {side} knee bends {np.degrees(np.arccos(cosine)):.0f} degrees away from forward on "
-                "average, so the rotation channels may be declared in another order than they were written",
-                fix="Export the clip again, or set motion.defects: leave to take it as it is.",
+        if cosine is not None and cosine < KNEE_AHEAD:
+            bends = _bend(at, side, ANGLES["knee"])
+            return Problem(
+                f"the {side} knee points {np.degrees(np.arccos(cosine)):.0f} degrees away from forward while "
+                f"it is bent (by up to {bends.max():.0f} degrees, at {bends.argmax() / clip.fps:.1f} s), so "
+                "the rotation channels may be declared in another order than they were written",
+                "Export the clip again.",
             )
+    return None
 
 
 def most_different(differences: dict[str, Any]) -> tuple[str, float]:
@@ -451,8 +487,8 @@ def _compare_angle(
     """
     source, result = (_bend(at, side, ANGLES[name]) for at in (source_at, result_at))
     difference = result - source
-    constant = float(np.median(difference)) if name in SHAPE_DEPENDENT else 0.0
-    difference = difference - (constant if name != "knee" or abs(constant) < MOST_OF_KNEE else 0.0)
+    constant = float(np.median(difference))
+    difference = difference - (constant if name in SHAPE_DEPENDENT else 0.0)
     return {
         "source": [round(float(x), 1) for x in np.percentile(source, [5, 50, 95])],
         "result": [round(float(x), 1) for x in np.percentile(result, [5, 50, 95])],
@@ -500,16 +536,17 @@ def _knee_cosine(
 ) -> float | None:
     """Mean cosine of the angle between where a knee points and where the body faces, while the knee is bent.
 
-    None if the knee is bent in less than a tenth of the frames. at: role -> (F, 3) positions. up: (3,) or
-    (F, 3), the direction up along the body.
+    A frame counts by how much further than BENT_KNEE the knee bends, since a nearly straight leg hardly shows
+    where its knee points. None if the knee is bent in less than a tenth of the frames. at: role -> (F, 3)
+    positions. up: (3,) or (F, 3), the direction up along the body.
     """
     # The body's left times its up gives its forward.
     ahead = unit(np.cross(at["left_hip"] - at["right_hip"], up))
     hip, knee, heel = (at[f"{side}_{part}"] for part in ("hip", "knee", "heel"))
-    bent = _bend(at, side, ANGLES["knee"]) > BENT_KNEE
-    if bent.mean() < 0.1:
+    weight = np.maximum(_bend(at, side, ANGLES["knee"]) - BENT_KNEE, 0.0)
+    if np.mean(weight > 0) < 0.1:
         return None
     # How far the knee lies out from the straight line between hip and heel: where it points.
     leg_line = unit(heel - hip)
     outward = knee - hip - leg_line * np.sum((knee - hip) * leg_line, axis=-1, keepdims=True)
-    return round(float(np.mean(np.sum(unit(outward[bent]) * ahead[bent], axis=-1))), 2)
+    return round(float(np.sum(unit(outward) * ahead, axis=-1) @ weight / weight.sum()), 2)

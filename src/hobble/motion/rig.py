@@ -24,7 +24,7 @@ from hobble.motion.axes import body_axes, unit
 from hobble.motion.body import ARM, LEG, SIDES, Body, body_by_roles, path_between, path_to_root, with_fingers
 from hobble.motion.limbs import Doubt, TwoFigures, find_body
 from hobble.motion.read import Bvh, Decoded, decode_channels
-from hobble.motion.skeleton_file import KnownSkeleton, draft_skeleton_file, guess_roles, load_skeleton
+from hobble.motion.skeleton_file import KnownSkeleton, load_skeleton
 
 # Name of a unit of length -> centimetres. The unit of CMU files is an inch / 0.45.
 UNITS = {"cm": 1.0, "inch": 2.54, "m": 100.0, "mm": 0.1, "CMU": 5.6444, "foot": 30.48}
@@ -43,7 +43,6 @@ MANDATORY = ("hips", "head", *(f"{side}_{part}" for side in SIDES for part in ("
 # Share of its length by which a bone may vary from the 3rd to the 97th percentile of a clip. In 172 real
 # clips, the lengths do not vary.
 STRETCH = 0.06
-MOST_SHOWN = 80  # at most this many joints are shown in a message: enough for usual rigs with all fingers
 
 
 @dataclass(frozen=True)
@@ -107,17 +106,16 @@ def below_hips(file: Bvh, hips: int) -> Bvh:
     return _with_joints(file, [j for j in range(len(file.names)) if hips in path_to_root(file.parents, j)])
 
 
-def decode_below(file: Bvh, hips: int, still: float) -> Decoded:
+def decode_below(file: Bvh, hips: int) -> Decoded:
     """Rotations and positions of the joints of `below_hips`, as if the hips had always been the root.
 
-    The motion of the joints above is added to the motion of the hips. still: a joint whose position stays
-    this close to its offset (in the file's unit) does not move relative to its parent.
+    The motion of the joints above is added to the motion of the hips.
     """
-    decoded = decode_channels(below_hips(file, hips), still)
+    decoded = decode_channels(below_hips(file, hips))
     if hips == 0:
         return decoded
     above = path_to_root(file.parents, hips)[:0:-1]
-    chain = decode_channels(_with_joints(file, above), 0.0)
+    chain = decode_channels(_with_joints(file, above))
     skeleton = Skeleton("above", tuple(map(str, above)), tuple(range(-1, len(above) - 1)), chain.offsets)
     turns, places = forward_kinematics(skeleton, chain.rotations, chain.root, chain.translations)
     rotations = decoded.rotations.copy()
@@ -242,10 +240,15 @@ def _reversed(pairs: Mapping[str, str]) -> dict[str, str]:
     return {b: a for a, b in reversed(list(pairs.items()))}
 
 
+def leg_lengths(skeleton: Skeleton) -> Array:
+    """(2,) length of thigh and shank together, left and right, in the skeleton's unit."""
+    bones = [[skeleton.role(f"{side}_{end}") for end in ("knee", "heel")] for side in SIDES]
+    return np.asarray(np.linalg.norm(skeleton.offsets[bones], axis=-1).sum(axis=-1))
+
+
 def leg_length(skeleton: Skeleton) -> float:
     """Length of thigh and shank together, mean of both sides, in the skeleton's unit."""
-    bones = [skeleton.role(f"{side}_{end}") for side in SIDES for end in ("knee", "heel")]
-    return float(np.linalg.norm(skeleton.offsets[bones], axis=-1).sum() / 2)
+    return float(leg_lengths(skeleton).mean())
 
 
 def missing_bone(skeleton: Skeleton) -> str | None:
@@ -276,9 +279,8 @@ def body_in_file(path: Path, raw: Clip, known: RigMatch | None, handedness: str)
     raw: the file's motion, in any unit and along any axes. known: the match of the rig to the skeleton file
     that describes it, or None if there is no such file. handedness: the option, "auto", "right" or "left".
 
-    Raises InputError if a bone of a limb changes its length, if the parts of the body are in doubt (the
-    message then contains a draft of a skeleton file), if there are two figures, or if neither the names of
-    joints nor `handedness` tell left from right.
+    Raises InputError if a bone of a limb changes its length, if the parts of the body are in doubt, if there
+    are two figures, or if neither the names of joints nor `handedness` tell left from right.
     """
     rig = raw.skeleton
     if known is not None:
@@ -290,7 +292,13 @@ def body_in_file(path: Path, raw: Clip, known: RigMatch | None, handedness: str)
     except TwoFigures as error:
         raise InputError(path, str(error), fix="Export each figure on its own.") from None
     except Doubt as doubt:
-        raise _doubt_error(path, rig, doubt) from None
+        raise InputError(
+            path,
+            f"it is in doubt which joints are which parts of a body: {doubt}",
+            fix="Hands, animals, props and mechanisms cannot be used. If it is a person, write a draft with "
+            f"`hobble rig {path.name} --to config/skeletons/<name>.yaml`, put the right "
+            "joints into it, and run again.",
+        ) from None
     notes = [
         "No skeleton file describes this rig. The parts of the body were found from the rig's structure, its "
         "motion and the names of its joints."
@@ -301,8 +309,8 @@ def body_in_file(path: Path, raw: Clip, known: RigMatch | None, handedness: str)
                 path,
                 "its joint names do not tell left from right. The motion does not either, because its mirror "
                 "image would also move like a person",
-                fix="Set motion.handedness in the data set to right, the standard of BVH files, or to left "
-                "if the program that wrote the file has left-handed coordinates.",
+                fix="Set motion.handedness (option --handedness) to right, the standard of BVH files, or to "
+                "left if the program that wrote the file has left-handed coordinates.",
             )
         notes.append(
             f"The joint names do not tell left from right, so motion.handedness: {handedness} was used."
@@ -335,25 +343,3 @@ def _check_bones(path: Path, rig: Skeleton, positions: Array, name: str) -> None
                     "role",
                     fix=f"Correct the roles in the skeleton file {name}.yaml.",
                 )
-
-
-def _doubt_error(path: Path, rig: Skeleton, doubt: Doubt) -> InputError:
-    """The error for a rig of which it is in doubt which joints are which parts of the body.
-
-    It shows a draft of the skeleton file, or only the beginning of a long draft. rig: the joints of the file.
-    """
-    text, hidden = draft_skeleton_file(rig, guess_roles(rig)), len(rig.joints) - MOST_SHOWN
-    command = f"hobble rig {path.name}"
-    fix = (
-        f"Put the right joints into this draft (`{command}` prints it, too), save it as "
-        "config/skeletons/<name>.yaml, and run again:"
-    )
-    if hidden > 0:
-        # The draft ends with one line for each joint.
-        shown = "\n".join(text.rstrip("\n").split("\n")[:-hidden])
-        text = f"{shown}\n  ... ({hidden} more joints; {command} writes all)\n"
-        fix = (
-            f"Write a draft with `{command} --to config/skeletons/<name>.yaml`, put the right joints into "
-            "it, and run again. The draft begins:"
-        )
-    return InputError(path, f"the parts of this rig are in doubt: {doubt}", fix=f"{fix}\n\n{text}")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -11,6 +10,7 @@ import numpy as np
 
 from hobble.channels import channel
 from hobble.channels.shown import shown_names
+from hobble.core.messages import group_messages
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 from hobble.motion.retarget import MOST_DIFFERENCE, most_different
@@ -24,7 +24,7 @@ MOST_COUNTED = 600  # at most this many clips are read to count how many seconds
 MOST_EXCERPTS = 600  # the frames of at most this many excerpts of clips are counted
 MOST_BARS = 200  # the chart of retargeted clips has at most this many bars
 MOST_NAMED = 30  # if it has more bars than this, none has a name under it
-MOST_REMARKS = 500  # the table of repairs, doubts and warnings has at most this many rows
+MOST_REMARKS = 500  # the table of doubts, warnings and repairs has at most this many rows
 # Split, its name on the page, the colour of its bars.
 SPLITS = (("train", "training", "@muted"), ("held_out", "held out", "@accent"))
 SPEED_EDGES = np.arange(0, 6.01, 0.2)  # edges of the bins of speeds, metres a second
@@ -326,43 +326,26 @@ def clip_table(material: ReportMaterial, clips: frozenset[str]) -> Table:
 
 
 def remarks_table(material: ReportMaterial) -> Table | None:
-    """A row for each repair, doubt and warning; None without any.
-
-    If there are more than MOST_REMARKS, there is a row for each kind of message instead, with the number of
-    its clips and an example. Messages of one kind differ only in numbers.
-    """
-    rows = [
-        [report["clip"], stage or report["channel"], sentence]
+    """A row for each kind of doubt, warning and repair, doubts first; None without any."""
+    messages = [
+        (report["clip"], stage or report["channel"], sentence)
         for stage, reports, key in (
-            ("motion", material.motion, "repairs"),
-            ("motion", material.motion, "unsure"),
+            ("doubt", material.motion, "unsure"),
             ("labels", material.labels, "warnings"),
             (None, material.channels, "warnings"),
+            ("repair", material.motion, "repairs"),
         )
         for report in reports
         for sentence in report.get(key) or ()
     ]
-    if not rows:
+    if not messages:
         return None
-    columns = [Column("clip"), Column("stage"), Column("message", kind="long")]
-    title = f"{len(rows):,} messages on repairs, doubts and warnings"
-    if len(rows) <= MOST_REMARKS:
-        return Table(f"{material.name}-remarks", columns, rows, title)
     columns = [Column.count("clips"), Column("stage"), Column("example"), Column("message", kind="long")]
-    return Table(f"{material.name}-remarks", columns, _by_kind(rows), f"{title}, by kind")
-
-
-def _by_kind(rows: list[list[str]]) -> list[list[Any]]:
-    """A row for each kind of message, most frequent first. Messages of one kind differ only in numbers.
-
-    rows: (clip, stage, message). A row of the result has the number of clips, the stage, the first clip, and
-    the message of the first clip.
-    """
-    kinds: dict[tuple[str, str], list[list[str]]] = {}
-    for row in rows:
-        kinds.setdefault((row[1], re.sub(r"[0-9][0-9.,:/-]*", "0", row[2])), []).append(row)
-    frequent = sorted(kinds.values(), key=len, reverse=True)[:MOST_REMARKS]
-    return [[len({row[0] for row in kind}), kind[0][1], kind[0][0], kind[0][2]] for kind in frequent]
+    rows = [
+        [len(group.clips), group.stage, group.clips[0], group.message] for group in group_messages(messages)
+    ]
+    title = f"{len(messages):,} messages on doubts, warnings and repairs, by kind"
+    return Table(f"{material.name}-remarks", columns, rows[:MOST_REMARKS], title)
 
 
 def label_chart(material: ReportMaterial, clips: frozenset[str]) -> Chart | None:

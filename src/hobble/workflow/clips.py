@@ -206,15 +206,15 @@ class Clips:
 
     def source(self, dataset: str, clip: str) -> str:
         """Path of the clip's BVH file. Raises HobbleError if there is no such clip or no file."""
-        self.entry(dataset, clip)  # raises HobbleError for an unknown clip
+        name = self.entry(dataset, clip).file or clip  # raises HobbleError for an unknown clip
         settings = self.catalogue.dataset(dataset)
         if settings.synthetic is not None:
             return str(self.folder(dataset) / f"{clip}.bvh")
-        if clip in (files := self._files(dataset)):
-            return str(require_single_file(clip, files[clip]))
-        if clip in (downloads := self._checksums(dataset)):
-            return self.download_path(settings.source or dataset, clip)
-        path = self.folder(dataset) / f"{clip}.bvh"
+        if name in (files := self._files(dataset)):
+            return str(require_single_file(name, files[name]))
+        if name in (downloads := self._checksums(dataset)):
+            return self.download_path(settings.source or dataset, name)
+        path = self.folder(dataset) / f"{name}.bvh"
         nor = f", and it is not in the download list {self._download_list(dataset)}" if downloads else ""
         raise InputError(
             path,
@@ -344,13 +344,22 @@ class Clips:
     def _download_list(self, dataset: str) -> Path:
         """Path of the data set's download list."""
         options = self.catalogue.dataset(dataset).download
-        return self.base / "config" / "datasets" / (options.checksums if options else "")
+        return self.base / "config" / "datasets" / ((options and options.checksums) or f"{dataset}.yaml")
 
     @functools.cache  # noqa: B019
     def _checksums(self, dataset: str) -> dict[str, str]:
-        """Clip -> SHA-256 from the download list; {} if the data set has no downloads."""
-        has_downloads = self.catalogue.dataset(dataset).download is not None
-        return read_checksums(self._download_list(dataset)) if has_downloads else {}
+        """Clip -> SHA-256 from the download list; {} if the data set has no downloads.
+
+        Without a list, all clips of the data set can be downloaded, and their sums are "".
+        """
+        settings = self.catalogue.dataset(dataset)
+        if settings.download is None:
+            return {}
+        if settings.download.checksums is None:
+            return dict.fromkeys(
+                (entry.file or clip if entry else clip for clip, entry in settings.clips.items()), ""
+            )
+        return read_checksums(self._download_list(dataset))
 
     @functools.cache  # noqa: B019
     def _files(self, dataset: str) -> dict[str, list[Path]]:

@@ -28,8 +28,8 @@ class Datasets:
 
     def motion_options(self, dataset: str, clip: str) -> dict[str, Any]:
         """The section `motion`, changed by the values in the clip's entry, and with the entry's `ground`."""
-        keys = {"source_fps", "loops", "heading", "ground"}
-        entry = self.clips.entry(dataset, clip).model_dump(include=keys, exclude_none=True)
+        keys = {"source_fps", "loops", "heading", "ground", "frames"}
+        entry = self.clips.entry(dataset, clip).model_dump(mode="json", include=keys, exclude_none=True)
         return {**self.options(dataset, "motion"), **entry}
 
     def frames(self, dataset: str, clip: str) -> int:

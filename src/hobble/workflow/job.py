@@ -134,6 +134,7 @@ def make_each(
     *,
     reads: Mapping[str, str] | None = None,
     writes: Mapping[str, str],
+    after: Callable[[logging.Logger], None] = lambda log: None,
 ) -> None:
     """Make the files of each clip of a batch, except those that are there already and still right.
 
@@ -151,7 +152,7 @@ def make_each(
     have, {mirror}; and {channel} for the clip's own channel, or {channels} for a list, one for each channel
     in the param `channels`. Params: `clips` is a list of mappings with the params of each clip; `files` in it
     maps names to further input files. `mirrored` says whether there are mirrors. Inputs of the rule that are
-    called neither `batches` nor `files` are inputs of each clip.
+    called neither `batches` nor `files` are inputs of each clip. after: is called after the last clip.
     """
     with _logged(snakemake) as log:
         folder = Path(snakemake.output.batch)
@@ -168,6 +169,7 @@ def make_each(
                 if isinstance(cause, OSError) and cause.errno in DISK_ERRORS:
                     break
         count = len(snakemake.params.clips)
+        after(log.logger)
         log.logger.info("%d pieces, %d of them kept from before, %d failed", count, kept, failed)
         if failed:
             sys.exit(1)

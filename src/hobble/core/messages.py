@@ -1,0 +1,41 @@
+"""Groups messages about many clips by kind, so that one that matters is not lost among hundreds."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from typing import NamedTuple
+
+
+class Group(NamedTuple):
+    """Messages of one kind: the stage or level that they come from, their clips, and one of them."""
+
+    stage: str
+    clips: tuple[str, ...]
+    message: str
+
+
+def group_messages(messages: Iterable[tuple[str, str, str]]) -> list[Group]:
+    """A group for each kind of message, of (clip, stage, sentence). Those of the first stage come first.
+
+    Messages of one kind differ only in numbers and in what stands in parentheses. Within a stage, kinds with
+    many clips come first.
+    """
+    kinds: dict[tuple[str, str], list[tuple[str, str]]] = {}
+    stages: dict[str, int] = {}
+    for clip, stage, sentence in messages:
+        stages.setdefault(stage, len(stages))
+        kind = re.sub(r"\([^()]*\)|-?[0-9][0-9.,:/-]*", "0", sentence)
+        kinds.setdefault((stage, kind), []).append((clip, sentence))
+    groups = [
+        Group(stage, tuple(dict.fromkeys(clip for clip, _ in found)), found[0][1])
+        for (stage, _), found in kinds.items()
+    ]
+    return sorted(groups, key=lambda group: (stages[group.stage], -len(group.clips)))
+
+
+def in_words(group: Group) -> str:
+    """A line about a group: its only clip, or the number of its clips and the first one."""
+    if len(group.clips) == 1:
+        return f"{group.clips[0]}: {group.message}"
+    return f"{len(group.clips)} clips, such as {group.clips[0]}: {group.message}"

@@ -1,0 +1,271 @@
+"""Reads motion from BVH, glTF and FBX files. FBX is read by way of Blender.
+
+The joints of a glTF file get axes that are parallel to the world's in its rest pose. So all rotations are
+zero there, as in a BVH file whose zero pose is a stance.
+"""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import importlib.util
+import shutil
+import subprocess
+import sys
+import tempfile
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hobble.core import quat
+from hobble.core.errors import InputError
+from hobble.core.quat import Array
+from hobble.core.untrusted import printable, read_bytes
+from hobble.motion.read import EXPORT, MOST_BYTES, MOST_JOINT_POSES, Bvh, frame_rate, read_bvh
+
+MOTION_SUFFIXES = (".bvh", ".glb", ".gltf", ".fbx")
+ORDER = "ZYX"  # of the rotation channels that the joints of a glTF file get
+POSITIONS = tuple(f"{axis}position" for axis in "XYZ")
+ROTATIONS = tuple(f"{axis}rotation" for axis in ORDER)
+MOVES = 1e-3  # longest bones: a joint that moves further relative to its parent gets position channels
+LONGEST_STEP, SPARSE = 0.11, 30.0  # seconds: keys that are further apart get frames at 30 Hz between them
+BLENDER_SECONDS = 600  # Blender may take this long for one file
+# What Blender runs: reads the FBX file and writes a glTF file with a key for each frame.
+BLENDER_SCRIPT = """
+import sys, bpy
+source, target = sys.argv[-2:]
+bpy.ops.wm.read_factory_settings(use_empty=True)
+bpy.ops.import_scene.fbx(filepath=source)
+bpy.ops.export_scene.gltf(filepath=target, export_format="GLB", export_force_sampling=True,
+    export_optimize_animation_size=False, export_morph=False, export_materials="NONE")
+"""
+
+
+def read_motion(path: str | Path) -> Bvh:
+    """Read a file by its suffix, see MOTION_SUFFIXES. Raises InputError for a bad file."""
+    path = Path(path)
+    readers = {".glb": read_gltf, ".gltf": read_gltf, ".fbx": read_fbx}
+    return readers.get(path.suffix.lower(), read_bvh)(path)
+
+
+def read_fbx(path: Path) -> Bvh:
+    """Read an FBX file, which Blender converts to glTF. Raises InputError without Blender, or if it fails."""
+    data = read_bytes(path, MOST_BYTES)
+    with tempfile.TemporaryDirectory() as folder:
+        target = Path(folder, "converted.glb")
+        if importlib.util.find_spec("bpy"):
+            command = [sys.executable, "-c", BLENDER_SCRIPT]
+        elif blender := shutil.which("blender"):
+            command = [blender, "--background", "--factory-startup", "--python-expr", BLENDER_SCRIPT, "--"]
+        else:
+            fix = (
+                "Install it (`pip install bpy`, or `blender` on the PATH), or export the clip as BVH or glTF."
+            )
+            raise InputError(path, "only Blender can read FBX files, and it is not installed", fix=fix)
+        try:
+            done = subprocess.run(
+                [*command, str(path.resolve()), str(target)],
+                capture_output=True,
+                text=True,
+                check=False,
+                timeout=BLENDER_SECONDS,
+            )
+            last = [line for line in (done.stderr or done.stdout).splitlines() if line.strip()][-1:]
+        except subprocess.TimeoutExpired:
+            last = [f"it took more than {BLENDER_SECONDS} seconds"]
+        if not target.is_file():
+            problem = f"Blender cannot convert it: {printable(' '.join(last), 200)}"
+            raise InputError(path, problem, fix="Export the clip as BVH or glTF.")
+        converted = read_gltf(target, path)
+    return replace(converted, sha256=hashlib.sha256(data).hexdigest(), bytes=len(data))
+
+
+def read_gltf(path: Path, named: Path | None = None) -> Bvh:
+    """Read the longest animation of a glTF file (.glb or .gltf).
+
+    named: the file that errors name, by default the same. Raises InputError for a file that is no glTF or has
+    no animated joints.
+    """
+    from pygltflib import GLTF2  # imported here because most jobs read BVH files
+
+    named, data = named or path, read_bytes(path, MOST_BYTES)
+    try:
+        gltf = GLTF2().load(str(path))
+        scene = _Scene.of(gltf, path)
+    except InputError:
+        raise
+    except Exception as error:  # the library raises whatever its parts raise
+        problem = f"not a readable glTF file: {printable(error, 200)}"
+        raise InputError(named, problem, fix=EXPORT) from None
+    if not scene.keys:
+        fix = "Export it with its animation."
+        raise InputError(named, "a glTF file without an animation of joints", fix=fix)
+    return replace(scene.as_bvh(named), sha256=hashlib.sha256(data).hexdigest(), bytes=len(data))
+
+
+@dataclass(frozen=True)
+class _Scene:
+    """The nodes of a glTF file that are joints or carry joints, parents first, and one animation.
+
+    rest: for each node its translation, rotation (w, x, y, z) and scale. keys: (node, "translation",
+    "rotation" or "scale") -> times, values, and the interpolation.
+    """
+
+    names: list[str]
+    parents: list[int]
+    rest: list[tuple[Array, Array, Array]]
+    keys: dict[tuple[int, str], tuple[Array, Array, str]]
+
+    @classmethod
+    def of(cls, gltf: Any, path: Path) -> _Scene:
+        above = {child: i for i, node in enumerate(gltf.nodes) for child in node.children or ()}
+        channels = _longest_animation(gltf, path)
+        joints = {j for skin in gltf.skins or () for j in skin.joints} or {node for node, _ in channels}
+        for joint in list(joints):
+            while joint in above:
+                joints.add(joint := above[joint])
+        order: list[int] = []
+        waiting = [j for j in sorted(joints, reverse=True) if j not in above]
+        roots = len(waiting)
+        while waiting:
+            order.append(node := waiting.pop())
+            waiting += [child for child in reversed(gltf.nodes[node].children or ()) if child in joints]
+        first = int(roots > 1)  # several figures, or a figure beside its mesh, hang from one root
+        new = {old: i + first for i, old in enumerate(order)}
+        names = ["Scene"] * first
+        for old in order:
+            name = printable(gltf.nodes[old].name or f"node_{old}", 100)
+            names.append(name if name not in names else f"{name}_{old}")
+        parents = [-1] * first + [new.get(above.get(old, -1), first - 1) for old in order]
+        still = (np.zeros(3), quat.IDENTITY, np.ones(3))
+        rest = [still] * first + [_rest_of(gltf.nodes[old]) for old in order]
+        keys = {(new[node], what): key for (node, what), key in channels.items() if node in new}
+        return cls(names, parents, rest, keys)
+
+    def as_bvh(self, path: Path) -> Bvh:
+        """The animation as a BVH file would have it. path: of the file."""
+        times = np.unique(np.concatenate([times for times, _, _ in self.keys.values()]))
+        steps = np.diff(times)[np.diff(times) > 1e-3]  # smaller ones are rounding errors
+        step = float(np.median(steps)) if len(steps) else 1.0
+        fps = frame_rate(step, "") if step < LONGEST_STEP else SPARSE
+        frames = round(float(times[-1] - times[0]) * fps) + 1
+        if frames * len(self.names) > MOST_JOINT_POSES:
+            raise InputError(path, f"{frames} frames of {len(self.names)} joints are too many", fix=EXPORT)
+        when = times[0] + np.arange(frames) / fps
+        places, turns = self._world(when)
+        rest_places, rest_turns = (values[0] for values in self._world(None))
+        turns = quat.mul(turns, quat.inv(rest_turns))
+        offsets = rest_places - rest_places[self.parents]
+        offsets[0] = 0.0
+        channels, columns = [], []
+        for j, p in enumerate(self.parents):
+            local, place, moves = turns[:, j], places[:, j], True
+            if p >= 0:
+                local = quat.mul(quat.inv(turns[:, p]), local)
+                place = quat.rotate(quat.inv(turns[:, p]), place - places[:, p])
+                moves = np.abs(place - offsets[j]).max() > MOVES * float(
+                    np.linalg.norm(offsets, axis=-1).max()
+                )
+            channels.append((POSITIONS if moves else ()) + ROTATIONS)
+            columns += [place] if moves else []
+            columns.append(np.degrees(quat.to_euler(local, ORDER)))
+        values = np.concatenate(columns, axis=1)
+        joints = tuple(self.names), tuple(self.parents), offsets, tuple(channels)
+        return Bvh(path, *joints, values, 1 / fps, "", {}, frames)
+
+    def _world(self, when: Array | None) -> tuple[Array, Array]:
+        """Positions (F, J, 3) and rotations (F, J, 4) in the world at F times; at rest for None."""
+        frames = 1 if when is None else len(when)
+        places, turns = np.zeros((frames, len(self.names), 3)), np.zeros((frames, len(self.names), 4))
+        scales = np.ones((frames, len(self.names), 3))
+        for j, p in enumerate(self.parents):
+            local = []
+            for what, value in zip(("translation", "rotation", "scale"), self.rest[j], strict=True):
+                key = None if when is None else self.keys.get((j, what))
+                if key is None or when is None:
+                    local.append(np.broadcast_to(value, (frames, len(value))))
+                else:
+                    local.append(_at_times(*key, when))
+            place, turn, scale = local
+            if p >= 0:
+                place = places[:, p] + quat.rotate(turns[:, p], scales[:, p] * place)
+                turn, scale = quat.mul(turns[:, p], turn), scales[:, p] * scale
+            places[:, j], turns[:, j], scales[:, j] = place, turn, scale
+        return places, turns
+
+
+def _longest_animation(gltf: Any, path: Path) -> dict[tuple[int, str], tuple[Array, Array, str]]:
+    """The keys of the animation that lasts longest, as in `_Scene`, by the file's numbers of nodes."""
+    best: dict[tuple[int, str], tuple[Array, Array, str]] = {}
+    longest = -1.0
+    for animation in gltf.animations or ():
+        found = {}
+        for channel in animation.channels:
+            node, what = channel.target.node, channel.target.path
+            if node is None or what not in ("translation", "rotation", "scale"):
+                continue
+            sampler = animation.samplers[channel.sampler]
+            times, values = _numbers(gltf, path, sampler.input)[:, 0], _numbers(gltf, path, sampler.output)
+            if what == "rotation":
+                values = values[:, [3, 0, 1, 2]]
+            found[node, what] = times, values, sampler.interpolation or "LINEAR"
+        seconds = max((float(np.ptp(times)) for times, _, _ in found.values()), default=-1.0)
+        if seconds > longest:
+            best, longest = found, seconds
+    return best
+
+
+def _numbers(gltf: Any, path: Path, number: int) -> Array:
+    """(N, width) the values of an accessor. Whole numbers stand for shares of their largest value."""
+    accessor = gltf.accessors[number]
+    view = gltf.bufferViews[accessor.bufferView]
+    uri = gltf.buffers[view.buffer].uri
+    if uri is None:
+        data = gltf.binary_blob()
+    elif uri.startswith("data:"):
+        data = base64.b64decode(uri.partition(",")[2])
+    else:
+        data = read_bytes(path.parent / Path(uri).name, MOST_BYTES)
+    kind = {5120: "i1", 5121: "u1", 5122: "<i2", 5123: "<u2", 5126: "<f4"}[accessor.componentType]
+    width = {"SCALAR": 1, "VEC3": 3, "VEC4": 4}[accessor.type]
+    size = np.dtype(kind).itemsize
+    start = (view.byteOffset or 0) + (accessor.byteOffset or 0)
+    strides = (view.byteStride or width * size, size)
+    values = np.ndarray((accessor.count, width), kind, data, start, strides).astype(float)
+    return values if kind == "<f4" else np.maximum(values / np.iinfo(kind).max, -1.0)
+
+
+def _rest_of(node: Any) -> tuple[Array, Array, Array]:
+    """Translation, rotation (w, x, y, z) and scale of a node outside of animations."""
+    if node.matrix:
+        matrix = np.array(node.matrix, float).reshape(4, 4).T
+        scale = np.linalg.norm(matrix[:3, :3], axis=0)
+        return matrix[:3, 3], quat.from_matrix(matrix[:3, :3] / scale), scale
+    x, y, z, w = node.rotation or (0.0, 0.0, 0.0, 1.0)
+    place, scale = node.translation or (0.0, 0.0, 0.0), node.scale or (1.0, 1.0, 1.0)
+    return np.array(place, float), np.array([w, x, y, z]), np.array(scale, float)
+
+
+def _at_times(times: Array, values: Array, interpolation: str, when: Array) -> Array:
+    """(F, width) an animated value at F times. It is constant before the first key and after the last one."""
+    when = np.clip(when, times[0], times[-1])
+    after = np.clip(np.searchsorted(times, when, side="right"), 1, max(len(times) - 1, 1))
+    first, last = after - 1, np.minimum(after, len(times) - 1)
+    gap = np.maximum(times[last] - times[first], 1e-9)[:, None]
+    share = (when - times[first])[:, None] / gap
+    is_rotation = values.shape[1] == 4
+    if interpolation == "CUBICSPLINE":
+        # Each key has three values: the tangent before it, the value, the tangent after it (glTF 2.0, C.5).
+        before, value, tangent = values[0::3], values[1::3], values[2::3]
+        s, s2, s3 = share, share**2, share**3
+        out = (2 * s3 - 3 * s2 + 1) * value[first] + gap * (s3 - 2 * s2 + s) * tangent[first]
+        out += (3 * s2 - 2 * s3) * value[last] + gap * (s3 - s2) * before[last]
+        return quat.normalize(out) if is_rotation else out
+    if interpolation == "STEP":
+        share = np.floor(share + 1e-9)
+    if is_rotation:
+        values = quat.continuous(quat.normalize(values))
+        return quat.slerp(values[first], values[last], share[:, 0])
+    return values[first] * (1 - share) + values[last] * share

@@ -1,0 +1,143 @@
+"""A clip written as glTF is read as the same motion; FBX is read by way of Blender, or asks for it."""
+
+from __future__ import annotations
+
+import base64
+import importlib.util
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pygltflib
+import pytest
+
+from hobble.core import quat
+from hobble.core.clip import Clip
+from hobble.core.errors import InputError
+from hobble.core.skeleton import local_rotations
+from hobble.motion.other_formats import BLENDER_SCRIPT, read_motion
+
+X, Y, _ = np.eye(3)
+ARMATURE = quat.from_axis_angle(X, -np.pi / 2)  # Blender writes its Z-up figures below such a node
+
+
+def write_gltf(path: Path, clip: Clip, interpolation: str = "LINEAR") -> Path:
+    """Write a clip as Blender does: bones point along Y of their joints; an armature scales it to metres."""
+    skeleton = clip.skeleton
+    bones = [
+        next((skeleton.offsets[k] for k in skeleton.children(j)), Y) for j in range(len(skeleton.joints))
+    ]
+    rest = np.array([quat.between(Y, bone if np.linalg.norm(bone) > 1 else Y) for bone in bones])
+    local_rest = local_rotations(skeleton, rest[None])[0]
+    local_rest[0] = quat.mul(quat.inv(ARMATURE), rest[0])
+    turns = local_rotations(skeleton, quat.mul(clip.global_rotations, rest))
+    turns[:, 0] = quat.mul(quat.inv(ARMATURE), turns[:, 0])
+    places = [
+        quat.rotate(quat.inv(rest[p]), offset)
+        for p, offset in zip(skeleton.parents, skeleton.offsets, strict=True)
+    ]
+    gltf, blob = pygltflib.GLTF2(), bytearray()
+
+    def accessor(values: np.ndarray, kind: str) -> int:
+        data = values.astype("<f4").tobytes()
+        gltf.bufferViews.append(pygltflib.BufferView(buffer=0, byteOffset=len(blob), byteLength=len(data)))
+        blob.extend(data)
+        view = len(gltf.bufferViews) - 1
+        gltf.accessors.append(
+            pygltflib.Accessor(bufferView=view, componentType=5126, count=len(values), type=kind)
+        )
+        return len(gltf.accessors) - 1
+
+    xyzw = [1, 2, 3, 0]
+    gltf.nodes = [
+        pygltflib.Node(name="Armature", children=[1], rotation=ARMATURE[xyzw].tolist(), scale=[0.01] * 3)
+    ]
+    for j, name in enumerate(skeleton.joints):
+        children = [k + 1 for k in skeleton.children(j)]
+        place = places[j] if j else quat.rotate(quat.inv(ARMATURE), clip.root[0])
+        node = pygltflib.Node(name=name, children=children, translation=place.tolist())
+        node.rotation = local_rest[j][xyzw].tolist()
+        gltf.nodes.append(node)
+    gltf.skins = [pygltflib.Skin(joints=list(range(1, len(gltf.nodes))))]
+    gltf.scenes = [pygltflib.Scene(nodes=[0])]
+    times = accessor(np.arange(len(clip))[:, None] / clip.fps, "SCALAR")
+    animation = pygltflib.Animation()
+    root = quat.rotate(quat.inv(ARMATURE), clip.root)
+    tracks = [(j + 1, "rotation", turns[:, j][:, xyzw]) for j in range(len(skeleton.joints))]
+    for node, what, values in [*tracks, (1, "translation", root)]:
+        if interpolation == "CUBICSPLINE":  # with tangents of neighbouring keys
+            slope = np.gradient(quat.continuous(values) if what == "rotation" else values, axis=0) * clip.fps
+            values = np.stack([slope, values, slope], axis=1).reshape(-1, values.shape[1])
+        out = accessor(values, "VEC4" if what == "rotation" else "VEC3")
+        animation.samplers.append(
+            pygltflib.AnimationSampler(input=times, output=out, interpolation=interpolation)
+        )
+        target = pygltflib.AnimationChannelTarget(node=node, path=what)
+        animation.channels.append(
+            pygltflib.AnimationChannel(sampler=len(animation.samplers) - 1, target=target)
+        )
+    gltf.animations = [animation]
+    uri = f"data:application/octet-stream;base64,{base64.b64encode(blob).decode()}"
+    gltf.buffers = [pygltflib.Buffer(byteLength=len(blob), uri=uri)]
+    if path.suffix == ".glb":
+        gltf.buffers[0].uri = None
+        gltf.set_binary_blob(bytes(blob))
+    gltf.save(str(path))
+    return path
+
+
+@pytest.mark.parametrize(("name", "interpolation"), [("walk.glb", "LINEAR"), ("walk.gltf", "CUBICSPLINE")])
+def test_a_gltf_file_gives_the_motion_of_the_bvh_file(tmp_path, walk, bvh, make, name, interpolation):
+    from_bvh, report = make(bvh(walk))
+    from_gltf, other = make(write_gltf(tmp_path / name, walk, interpolation))
+    assert (other["source_fps"], other["rig"], other["unit_name"]) == (120.0, report["rig"], "m")
+    assert np.abs(from_gltf.positions - from_bvh.positions).max() < 0.1
+
+
+@pytest.mark.shared
+def test_a_captured_clip_as_gltf(tmp_path, shared, make):
+    from tests.motion.scramble import source_of
+
+    file = shared / "mocap/cmu/105_16.bvh"
+    from_bvh, _ = make(file)
+    from_gltf, _ = make(write_gltf(tmp_path / "limp.glb", source_of(file)))
+    frames = min(len(from_bvh), len(from_gltf))
+    assert np.linalg.norm(from_gltf.positions[:frames] - from_bvh.positions[:frames], axis=-1).mean() < 0.3
+
+
+def test_keys_that_are_far_apart_are_interpolated(tmp_path, walk):
+    file = read_motion(write_gltf(tmp_path / "sparse.glb", replace(walk.part(slice(0, None, 30)), fps=4.0)))
+    assert (len(file), file.frame_time) == (61, 1 / 30)
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "problem"),
+    [
+        ("text.glb", b"not a model", "not a readable glTF file"),
+        ("empty.gltf", b'{"asset": {"version": "2.0"}}', "a glTF file without an animation"),
+        ("cut.fbx", b"Kaydara FBX Binary", "Blender"),
+    ],
+)
+def test_a_bad_file_gets_one_message(tmp_path, name, content, problem):
+    (tmp_path / name).write_bytes(content)
+    with pytest.raises(InputError, match=problem) as error:
+        read_motion(tmp_path / name)
+    assert str(error.value).startswith(str(tmp_path / name))
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not importlib.util.find_spec("bpy"), reason="Blender (bpy) is not installed")
+def test_an_fbx_file_gives_the_motion_of_the_bvh_file(tmp_path, walk, bvh, make):
+    begin, _, _ = BLENDER_SCRIPT.partition("bpy.ops.export")
+    script = begin.replace(
+        "bpy.ops.import_scene.fbx", "bpy.context.scene.render.fps = 120\nbpy.ops.import_scene.gltf"
+    )
+    script += "bpy.ops.export_scene.fbx(filepath=target, add_leaf_bones=False)"
+    glb = write_gltf(tmp_path / "walk.glb", walk)
+    subprocess.run([sys.executable, "-c", script, glb, tmp_path / "other.fbx"], check=True)
+    from_bvh, _ = make(bvh(walk))
+    from_fbx, _ = make(tmp_path / "other.fbx")
+    frames = min(len(from_bvh), len(from_fbx))
+    assert np.linalg.norm(from_fbx.positions[:frames] - from_bvh.positions[:frames], axis=-1).mean() < 1.0
