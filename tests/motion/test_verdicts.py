@@ -1,0 +1,139 @@
+"""Every file of shared/wild/rigs and shared/mocap comes out right, or is refused for the right reason."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hobble.core.errors import InputError
+from hobble.labels.contacts import find_contacts
+from hobble.labels.options import LabelOptions
+
+SHARED = Path(os.environ.get("HOBBLE_SHARED", Path(__file__).parents[3] / "shared"))
+REFUSED = {
+    "ammarkov/head": "219 values, but the joints have 213 channels",
+    "ammarkov/tpose": "declares 1352 frames of 498 values, more than the file can hold",
+    "dog_mann/D1_007_KAN01_001": "the figure goes on four legs",
+    "dog_mann/D1_010_KAN01_002": "the figure goes on four legs",
+    "dog_mann/D1_049_KAN01_001": "the figure goes on four legs",
+    "fairmotion/pfnn_hierarchy": "there is no motion in it, only one pose",  # its zero pose alone
+    "ganimator/Crab-dance-long": "does not show which chains are legs",  # a crab
+    "lafan_orig/decompressor_Ygnd": "neither names nor feet and knees show which side is left",  # joint_7
+    "video2bvh/cxk": "the ground under .* slopes, .* by 8 degrees",  # from a tilted camera
+    "wspr/milad": "shoulders are turned by 126 degrees against its hips",  # it is broken in the file
+}
+# What is in doubt in a file and must be told.
+TOLD = {
+    "acrnn/01": "source_fps: 60",
+    "ammarkov/102_01cc": "No unit gives this rig a person's size",
+    "npybvh/example": "source_fps: 60",
+}
+KNEES, TOLD_KNEES = (
+    5.0,
+    9.0,
+)  # degrees: a knee that bends by more than the first more than in the file is told
+
+
+def files(*folders: str) -> list[str]:
+    """The files of folders of shared, relative to it."""
+    found = sorted(file for folder in folders for file in (SHARED / folder).rglob("*.bvh"))
+    return [str(file.relative_to(SHARED)) for file in found]
+
+
+def names(folder: str) -> list[object]:
+    every = files(folder)
+    # A few of each folder run always, the others only with the slow tests.
+    marked = [
+        name if n % 12 == 0 else pytest.param(name, marks=pytest.mark.slow) for n, name in enumerate(every)
+    ]
+    return [*marked] if folder == "mocap" else list(every)
+
+
+@pytest.mark.shared
+@pytest.mark.parametrize("name", [*names("wild/rigs"), *names("mocap")])
+def test_a_file_is_right_or_rightly_refused(shared, make, name):
+    key = name.removeprefix("wild/rigs/").removesuffix(".bvh")
+    if why := REFUSED.get(key):
+        with pytest.raises(InputError, match=why):
+            make(shared / name)
+        return
+    clip, report = make(shared / name)
+    told = " ".join(report["unsure"])
+    assert TOLD.get(key, "") in told
+    hips = np.median(clip.positions[:, clip.skeleton.role("hips"), 1])
+    assert 75 < hips < 105
+    for joint, angle in (report["retarget"] or {"angles": {}})["angles"].items():
+        if "knee" in joint:
+            assert abs(angle["constant"]) < KNEES or f"The {joint} bends" in told
+            assert abs(angle["constant"]) < TOLD_KNEES
+    assert_heels_are_kept(clip)
+
+
+def assert_heels_are_kept(clip):
+    """Contacts of heels are no fewer than about half of what heights and speeds alone show."""
+    contacts = find_contacts(clip, LabelOptions()).mean(axis=0)
+    for k, side in ((0, "left"), (2, "right")):
+        heel = clip.positions[:, clip.skeleton.role(f"{side}_heel")]
+        speed = np.linalg.norm(np.gradient(heel, axis=0), axis=-1)
+        slow = speed < 1.0
+        if slow.any():
+            down = slow & (heel[:, 1] < np.median(heel[slow, 1]) + 2.0)
+            assert contacts[k] > 0.5 * down.mean() - 0.05, side
+
+
+@pytest.mark.shared
+@pytest.mark.parametrize(
+    ("name", "least"),
+    [(f"mocap/cmu/105_{n}", 0.45) for n in (10, 27, 29, 31, 34, 36, 62)]
+    + [("mocap/cmu/105_03", 0.45), ("wild/lafan1/walk2_subject3_salut", 0.5)],
+)
+def test_heels_that_a_few_raised_toes_hid_keep_their_contacts(shared, make, name, least):
+    contacts = find_contacts(make(shared / f"{name}.bvh")[0], LabelOptions()).mean(axis=0)
+    assert min(contacts[0], contacts[2]) > least
+    assert abs(contacts[0] - contacts[2]) < 0.1
+
+
+@pytest.mark.parametrize("shorter", [0.02, 0.04])
+def test_legs_of_unequal_length_do_not_bend_a_knee(walk, bvh, make, shorter):
+    offsets = walk.skeleton.offsets.copy()
+    left = [walk.skeleton.role(f"left_{part}") for part in ("knee", "heel")]
+    offsets[left] *= 1 - shorter
+    _, report = make(bvh(replace(walk, skeleton=replace(walk.skeleton, offsets=offsets))))
+    left, right = (report["retarget"]["angles"][f"{side} knee"]["constant"] for side in ("left", "right"))
+    assert max(abs(left), abs(right)) < 5
+    assert abs(left - right) < 3
+
+
+@pytest.mark.parametrize(
+    ("frames", "words"),
+    [(4, "only 4 frames of 60 a second"), (40, "only the rest pose alone .all rotations are zero.")],
+)
+def test_a_clip_without_motion_is_refused_or_accepted_as_a_doubt(walk, bvh, make, frames, words):
+    clip = walk.part(slice(0, 7))
+    if frames == 40:
+        identity = 0 * walk.rotations[:80] + [1.0, 0.0, 0.0, 0.0]
+        clip = replace(walk, rotations=identity, root=0 * walk.root[:80] + walk.root[0])
+    with pytest.raises(InputError, match=f"there is no motion in it, {words}.*--accept-doubt"):
+        make(bvh(clip))
+    assert "There is no motion" in " ".join(make(bvh(clip), accept_doubt=True)[1]["unsure"])
+
+
+@pytest.mark.parametrize("encoding", ["utf-16", "utf-16-le", "utf-16-be"])
+def test_a_file_in_utf_16_is_read(walk, bvh, make, encoding):
+    path = bvh(walk)
+    plain, _ = make(path)
+    path.write_bytes(path.read_text().encode(encoding))
+    assert (make(path)[0].positions == plain.positions).all()
+
+
+def test_frames_cut_a_clip_out_of_its_file(walk, bvh, make):
+    whole, _ = make(bvh(walk))
+    part, report = make(bvh(walk), frames=(61, 181))
+    assert (len(part), report["source_frames"]) == (61, 121)
+    np.testing.assert_allclose(part.positions, whole.positions[30:91], atol=0.2)
+    with pytest.raises(InputError, match="frames 200 to 300 are wanted, but it has 241"):
+        make(bvh(walk), frames=(200, 300))
