@@ -199,7 +199,7 @@ def write_labels(name: str, file: Path, options: argparse.Namespace) -> list[Mes
     seconds = np.bincount(found.gait.argmax(axis=1), minlength=len(GAITS)) / clip.fps
     gaits = ", ".join(f"{s:.1f} s {g}" for s, g in zip(seconds, GAITS, strict=True) if s > 0)
     about = ("found", f"{len(found.cycles)} cycles, {gaits}")
-    return [*(("warning", warning) for warning in warnings), *report_messages(report), about]
+    return [about, *(("warning", warning) for warning in warnings), *report_messages(report)]
 
 
 def _labelled(

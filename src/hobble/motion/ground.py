@@ -47,7 +47,7 @@ UNEVEN = 4.0
 # each foot stands alone for at least LONG seconds. For shorter times it is higher, up to BALANCED_SHORT at 0
 # seconds. In the 172 clips the direction leans by at most 3.9 degrees if the time is at least LONG, and by at
 # most 6 degrees if it is shorter.
-BALANCED, BALANCED_SHORT, LONG = 5.0, 9.0, 0.2
+BALANCED, BALANCED_SHORT, LONG = 5.0, 10.0, 0.2
 # Degrees. If a foot stands alone too briefly to judge the balance, the world counts as tilted if trunk, legs
 # and the line across the body all lean to the same side by more than this. In the 172 clips the least of the
 # three leans is at most 7.5, in a walk with a hurt leg.
