@@ -13,11 +13,13 @@ endif
 help:            ## list these targets
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/'
 
-env: .venv/.ready  ## make the Python environment in .venv
+# With LOCKED=yes every package must have the hash in requirements.lock, which `uv pip compile` wrote (its first lines).
+env: .venv/.ready  ## make the Python environment in .venv (LOCKED=yes checks hashes)
 
 .venv/.ready: pyproject.toml constraints.txt
 	@echo "Making the environment in .venv: PyTorch, Snakemake, SciPy and their dependencies. It takes 2 GB of disk."
 	test -x $(BIN)/python || $(PYTHON) -m venv .venv
+	$(if $(LOCKED),$(BIN)/python -m pip install --disable-pip-version-check --require-hashes -r requirements.lock)
 	$(BIN)/python -m pip install --disable-pip-version-check --constraint constraints.txt --editable ".[dev]"
 	touch $@
 

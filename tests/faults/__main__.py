@@ -13,7 +13,7 @@ from collections.abc import Callable
 from pathlib import Path
 from random import Random
 
-from . import runs, texts, throws
+from . import texts, throws
 from .grammar import Case
 from .judging import FAULT, REFUSED, REMADE, SKIPPED, UNHARMED, Throw
 from .lab import ROOT, Lab
@@ -27,9 +27,6 @@ KINDS: dict[Callable[[Lab, Random], Throw], int] = {
     throws.no_permission: 8,
     throws.changing_clip: 8,
     throws.spoilt_checkpoint: 4,
-    runs.kill_run: 5,
-    runs.two_runs: 2,
-    runs.touched: 1,
 }
 TEXTS_PER_ROUND = 5
 OUTCOMES = (REFUSED, REMADE, UNHARMED, SKIPPED, FAULT)

@@ -9,10 +9,10 @@ from random import Random
 
 import pytest
 
-from . import bvh_grammar, runs, status_grammar, texts, throws
+from . import bvh_grammar, status_grammar, texts, throws
 from .damage import DAMAGES
 from .grammar import Case, mutated
-from .judging import FAULT, REFUSED, UNHARMED
+from .judging import FAULT, REFUSED
 from .lab import Lab
 from .same import same
 
@@ -55,16 +55,6 @@ def test_a_damaged_input_is_refused_or_harmless(lab: Lab, rule: str) -> None:
     thrown = [throws.harm(lab, Random(f"{SEED}-{number}"), rule) for number in range(8)]
     assert "\n".join(one.detail for one in thrown if one.happened == FAULT) == ""
     assert sum(one.happened == REFUSED for one in thrown) >= 4
-
-
-def test_a_second_snakemake_at_once_is_refused_or_harmless(lab: Lab) -> None:
-    thrown = runs.two_runs(lab, Random(SEED))
-    assert thrown.happened in (REFUSED, UNHARMED), thrown
-
-
-def test_after_touch_of_every_tracked_file_nothing_runs_again(lab: Lab) -> None:
-    thrown = runs.touched(lab, Random(SEED))
-    assert thrown.happened == UNHARMED, thrown
 
 
 @pytest.fixture(scope="module")

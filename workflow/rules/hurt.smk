@@ -1,3 +1,6 @@
+from hobble.hurt.options import HURT_CHANNEL
+
+
 rule hurt_clips:
     """Hurt versions of healthy clips, with their labels and severities, and the mirrors of these versions."""
     input:
@@ -28,8 +31,6 @@ rule hurt_clips:
             for clip in batch_of(w).clips
         ],
         mirrored=lambda w: batch_of(w).mirrored,
-        code=lambda w: package.code(
-            "hurt_clips", *channel_packages([clips.hurt_channel])
-        ),
+        code=lambda w: package.code("hurt_clips", *channel_packages([HURT_CHANNEL])),
     script:
         "../scripts/hurt_clips.py"

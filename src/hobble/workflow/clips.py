@@ -125,13 +125,6 @@ class Clips:
             )
         return {name: entry or ClipEntry() for name, entry in listed.items()}
 
-    hurt_channel = HURT_CHANNEL  # the channel with the severities of hurt versions
-
-    @staticmethod
-    def original(clip: str) -> str:
-        """The clip from which a mirror or a hurt version is made; for other clips the clip itself."""
-        return original(clip)
-
     @staticmethod
     def is_hurt_version(clip: str) -> bool:
         """Whether a clip is a hurt version, or the mirror of one."""
@@ -142,7 +135,7 @@ class Clips:
         """Name of each hurt version -> its number among all hurt versions of the data set, from 0.
 
         The numbers go first through the first versions of all clips, then through their second versions, ...
-        Only clips in which the values of the channel `hurt_channel` are 0 get hurt versions.
+        Only clips in which the values of the channel HURT_CHANNEL are 0 get hurt versions.
         """
         options = self.catalogue.dataset(dataset).hurt
         healthy = (
@@ -248,7 +241,8 @@ class Clips:
         """Paths of the label files beside the clip: hand-made files, or the files of a synthetic clip."""
         if self.catalogue.dataset(dataset).synthetic is not None:
             return self.side_files(dataset, clip, ("_footsteps.txt", "_gait.txt"))
-        return self.side_files(dataset, clip, LABEL_SUFFIXES) if self._reads_labels(dataset) else []
+        reads = self.catalogue.dataset(dataset).labels.files
+        return self.side_files(dataset, clip, LABEL_SUFFIXES) if reads else []
 
     def side_files(self, dataset: str, clip: str, suffixes: Iterable[str]) -> list[str]:
         """Paths of the existing files <clip><suffix> beside a clip, for the given suffixes.
@@ -298,9 +292,6 @@ class Clips:
 
     def _skeleton(self, name: str) -> str:
         return str(Path(self.skeleton_folder) / f"{name}.yaml")
-
-    def _reads_labels(self, dataset: str) -> bool:
-        return self.catalogue.dataset(dataset).labels.files
 
     def _scanned(self, dataset: str) -> list[str]:
         """The names of the clips in the user's folder.
@@ -398,7 +389,7 @@ class ChannelSources:
         The keys are the fields of `hobble.channels.channel.ClipSource`, without `files`.
         """
         return {
-            "clip": self.clips.original(clip),
+            "clip": original(clip),
             "entry": self.clips.entry(dataset, clip).model_dump(
                 mode="json", exclude={"channels", "hurt", "person"}
             ),
@@ -409,7 +400,7 @@ class ChannelSources:
     @functools.cache  # noqa: B019 - one project lives as long as the process
     def is_neutral(self, dataset: str, clip: str, name: str) -> bool:
         """Whether all values of channel `name` are 0 in a clip."""
-        if self.clips.is_hurt_version(clip) and name == self.clips.hurt_channel:
+        if self.clips.is_hurt_version(clip) and name == HURT_CHANNEL:
             return False
         # The file beside a synthetic clip is not read, because it need not exist yet.
         synthetic = self.catalogue.dataset(dataset).synthetic is not None
