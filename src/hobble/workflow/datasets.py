@@ -79,7 +79,12 @@ class Datasets:
             for name in (clip, clip + MIRROR_SUFFIX) if settings.mirror else (clip,):
                 splits[name] = "held_out" if original(clip) in held_out else "train"
         if "train" not in splits.values():
-            without = f" without {' or '.join(unused)}" if unused else ""
+            leave_out = [
+                name
+                for name in unused
+                if not all(self.channel_sources.is_neutral(dataset, clip, name) for clip in clips)
+            ]
+            without = f" without {' or '.join(leave_out)}" if leave_out else ""
             raise HobbleError(
                 f"data set {dataset}: no clip{without} is left to train on. Add clips, or shorten held_out"
             )
