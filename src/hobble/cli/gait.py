@@ -115,7 +115,6 @@ def describe(name: str, compared: WalkComparison, side: str | None = None) -> st
     answer, grade = compared.answer, compared.grade
     side = side or grade.side or answer.side or RIGHT
     people = effects_of_people()
-    width = max(map(len, EFFECTS.values()))
     lines = [
         f"{name}: {grade.name} ({compared.cycles} cycles), strength {grade.strength:.2f} (mean of people "
         f"with this limp: 1), {grade.distance:.1f} standard deviations from the likeliest known walk",
@@ -127,12 +126,12 @@ def describe(name: str, compared: WalkComparison, side: str | None = None) -> st
         f"{answer.name}; {_listed(answer.probabilities)}; windows: "
         f"{_in_words(shares_of_answers(compared.window_answers))}",
         f"  effects if the {side} side is hurt. "
-        f"The last columns show limps of people: mean ± standard deviation ({SOURCE})",
-        " " * (width + 26) + "".join(f"{gait[:13]:>15}" for gait in people),
+        f"The other columns show limps of people: mean ± standard deviation ({SOURCE})",
+        " " * 24 + "".join(f"{gait[:13]:>15}" for gait in people),
     ]
     for key, text in EFFECTS.items():
         columns = "".join("{:9.2f} ±{:4.2f}".format(*of_people[key]) for of_people in people.values())
-        lines.append(f"  {key:14}{compared.effects[side][key]:8.2f}  {text:{width}}{columns}")
+        lines.append(f"  {key:14}{compared.effects[side][key]:8.2f}{columns}  {text}")
     return "\n".join(lines)
 
 
