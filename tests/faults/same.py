@@ -80,6 +80,7 @@ def main(first: str, second: str) -> int:
     """Compare results/ of two runs. Returns 1 if a file differs, or if only one of them has it."""
     runs = [Path(folder, "results") for folder in (first, second)]
     names = {str(file.relative_to(run)) for run in runs for file in run.rglob("*") if file.is_file()}
+    names = {name for name in names if not Path(name).name.startswith(".")}
     names = {name for name in names if not OF_THE_RUN & set(Path(name).parts)}
     different = sorted(name for name in names if not same(runs[0] / name, runs[1] / name))
     said = f"{len(names)} artefacts are the same, bit for bit"

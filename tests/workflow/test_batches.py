@@ -124,7 +124,7 @@ def test_a_clip_has_its_folders_and_a_hurt_version_those_of_the_stage_hurt(root:
     assert found == [f"results/datasets/tiny/batches/{stage}/uneven-1" for stage in ("motion", "terrain")]
     found = batches.folders("tiny", ["uneven-1_hurt1"], "motion", "labels", "channels", "terrain")
     stages = [folder.removeprefix("results/datasets/tiny/batches/") for folder in found]
-    assert stages == [f"{stage}/uneven-1_hurt" for stage in ("hurt", "terrain")]
+    assert stages == [f"{stage}/uneven-1_hurt" for stage in ("hurt", "channels", "terrain")]
     assert batches.named("tiny", "uneven-1_hurt").originals == ("uneven-1",)
     with pytest.raises(HobbleError, match="data set tiny has no batch 7; it has walk-straight-1, "):
         batches.named("tiny", "7")

@@ -139,9 +139,10 @@ left = int(sys.argv.pop(1))
 def count(event, arguments):
     global left
     in_folder = event in ("open", "os.mkdir", "os.rename", "os.remove") and ".snakemake" in str(arguments[0])
-    left -= in_folder or event == "fcntl.flock"
-    if left == 0:
-        os.kill(os.getpid(), signal.SIGKILL)
+    if in_folder or event == "fcntl.flock":
+        left -= 1
+        if left == 0:
+            os.kill(os.getpid(), signal.SIGKILL)
 
 sys.addaudithook(count)
 from snakemake.cli import main
