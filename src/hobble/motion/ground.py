@@ -107,9 +107,7 @@ def put_on_floor(clip: Clip) -> tuple[Clip, list[str], list[str]]:
 
 def tilt_problem(clip: Clip) -> Problem | None:
     """A tilted world: what shows the tilt, and by how many degrees."""
-    # A cycle that `hobble motion --loops` repeated shows no more than the cycle alone. Counted eight times,
-    # its short stands would seem long enough to judge the balance strictly.
-    tilt = world_tilt(clip.part(slice(_cycle_length(clip))))
+    tilt = world_tilt(clip)
     if tilt is None:
         return None
     degrees, what = tilt
@@ -153,6 +151,10 @@ def world_tilt(clip: Clip) -> tuple[float, str] | None:
         error = distances[0] / np.maximum(spread, 1e-9)
         if np.linalg.norm(np.abs(slope) + error) < np.tan(np.radians(LEAST_TILT)):
             return None
+    # A cycle that `hobble motion --loops` repeated shows no more than the cycle alone. Counted eight times,
+    # its short stands would seem long enough to judge the balance strictly.
+    if (cycle := _cycle_length(clip)) < len(clip):
+        body = find_balance(clip.part(slice(cycle)))
     return _sideways_tilt(body, _least_sideways_lean(*directions))
 
 

@@ -462,8 +462,9 @@ def _left_arm_first(rig: MovingRig, legs: Limbs, arms: Limbs) -> Limbs:
         np.mean(np.sum(hips * shoulders, axis=-1))
     )  # positive if arm 0 is on the side of the left leg
     votes = _named_sides(rig, arms)
-    as_named = side * np.sign(votes[0] - votes[1]) if votes[0] * votes[1] < 0 else side
-    if abs(side) < 0.2 or as_named < 0:
+    named = votes[0] * votes[1] < 0
+    as_named = side * np.sign(votes[0] - votes[1]) if named else abs(side)
+    if as_named < 0.2:
         turned = np.degrees(np.arccos(np.clip(as_named, -1, 1)))
         raise Doubt(f"its shoulders are turned by {turned:.0f} degrees against its hips on average")
     return arms if side > 0 else _exchanged(arms)
