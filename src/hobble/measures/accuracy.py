@@ -548,8 +548,9 @@ def clip_lines(compared: Compared) -> Chart | None:
     measured = {(row["split"], row["clip"]) for entry in compared["accuracy"] for row in entry["clips"]}
     if not measured:
         return None
-    own = [clip for _, clip in sorted(measured) if clip not in their_clips]
-    order = [*own, *their_clips]
+    order = [clip for _, clip in sorted(measured) if clip not in their_clips]
+    if set(colours) & set(published["clip_means"]) or {clip for _, clip in measured} & set(their_clips):
+        order += their_clips
     options: dict[str, list[Trace]] = {}
     for label, key, theirs in (("mean", "mean", "clip_means"), ("standard deviation", "sd", "clip_sds")):
         traces = options.setdefault(label, [])

@@ -512,8 +512,9 @@ def _published_sizes(sizes_of: Mapping[str, Json], published: Json) -> list[dict
     for row in published["computations"]:
         counts = sizes_of.get(row["configuration"], {}).get("computations", {})
         printed, in_table = counts.get("table_6_1_as_printed"), {**row, "table": "6.1"}
+        counted = {**row, "source": "hobble"}
         out.append(published_row("computations of Table 6.1", in_table, row["table_6_1"], printed))
-        out.append(published_row("parameters of a phase", row, row["parameters"], counts.get("true")))
+        out.append(published_row("parameters of a phase", counted, row["parameters"], counts.get("true")))
     for row in published["stages"]:
         if row["stage"] == "training" and "bytes" in row:
             # The published weights are those of the constant mode, which stores the weights of 50 phases.
