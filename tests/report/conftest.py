@@ -73,7 +73,7 @@ def material(inputs: dict[str, Any]) -> ReportMaterial:
 
 @pytest.fixture(scope="session")
 def play(inputs: dict[str, Any], material: ReportMaterial) -> dict[str, Any]:
-    return packed_scenes(inputs["scenarios"], material.network["skeleton"], material.network["channels"])
+    return packed_scenes(inputs["scenarios"], material.network["skeleton"])
 
 
 @pytest.fixture(scope="session")

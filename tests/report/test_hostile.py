@@ -54,7 +54,7 @@ def hostile(
     save_npz(rows, **{**arrays, "clip": np.array(HOSTILE)})
     text = render_report(
         material,
-        packed_scenes(folder / "scenarios.npz", material.network["skeleton"], material.network["channels"]),
+        packed_scenes(folder / "scenarios.npz", material.network["skeleton"]),
         playable_data(network, examples.RUNTIME),
         packed_comparisons(network, [rows], {HOSTILE: "train", "jog": "train"}),
         script,

@@ -19,7 +19,7 @@ from hobble.report.parts import (
     Table,
     join_sections,
 )
-from hobble.report.templates import chart_specs, load_template, measured_by
+from hobble.report.templates import drawn_by_script, load_template, measured_by
 
 
 def chart(name: str) -> Chart:
@@ -63,7 +63,13 @@ def test_charts_are_found_wherever_they_stand() -> None:
             SectionPart(3, chart("d")),
         ],
     )
-    assert set(chart_specs([{"x": {"y": chart("e"), "z": None}}, [section]])) == set("abcde")
+    rows = [[f"clip {i}", i / 3] for i in range(11)]
+    columns = [Column("clip"), Column.number("error")]
+    tables = [Table("long", columns, rows), Table("short", columns, rows[:10])]
+    drawn = drawn_by_script([{"x": {"y": chart("e"), "z": None}}, [section], tables])
+    assert set(drawn["charts"]) == set("abcde")
+    assert list(drawn["tables"]) == ["long"]
+    assert drawn["tables"]["long"][1] == ["clip 1", ["0.3333333333333333", "0.333"]]
 
 
 def test_words_are_escaped_and_every_kind_is_drawn() -> None:

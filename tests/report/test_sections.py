@@ -58,27 +58,20 @@ def test_turns_speeds_and_severities_are_counted_in_seconds(
     assert chart.traces[0]["z"][0][6] == pytest.approx(hurt, abs=0.02)
 
 
-def test_the_chart_of_labels_shows_the_injured_parts(material: ReportMaterial) -> None:
-    chart = data_section.label_chart(material, data_section.choose_clips(material))
-    assert chart is not None
-    assert len(chart.options) == 8, "a mirror says the same again"
-    bars = {clip: [t for t in traces if t.get("yaxis") == "y5"] for clip, traces in chart.options.items()}
-    (bar,) = bars["hurt_left_knee"]
-    assert (bar["y"], bar["opacity"]) == (["left thigh"] * 2, pytest.approx(0.15 + 0.85 * 0.7))
-    assert bars["jog"] == []
-    gaits = [t["y"] for t in chart.options["jog"] if t.get("yaxis") == "y3"]
-    assert np.sum(gaits, axis=0) == pytest.approx(1, abs=0.02)
-
-
 def test_stages_are_listed_with_published_values_of_the_same_configuration(material: ReportMaterial) -> None:
     """A published time or size is shown only for its own configuration."""
     nothing, patches = [None, None], [1680, 606.0e6]
     known = {
-        "holden": {"terrain": patches, "database": [5400, 7.12e9], "training": [43 * 3600, 122.0e6]},
+        "holden": {
+            "motion": [None, 848.0e6],
+            "labels": [None, 63.94e6],
+            "terrain": patches,
+            "database": [5400, 7.12e9],
+            "training": [43 * 3600, 122.0e6],
+        },
         "holden-xl": {"training": [47 * 3600, 176.0e6]},
-        "holden-xt": {"training": [91 * 3600, None]},
-        "ava": {"database": [55 * 60, 10.4e9], "training": [31 * 3600, 374.0e6]},
-        "ferre": {"training": [50 * 3600, None]},
+        "holden-xt": {"training": [91 * 3600, 122.0e6]},
+        "ava": {"motion": [None, 7.62e9], "database": [55 * 60, 10.4e9], "training": [31 * 3600, 374.0e6]},
         "example": {},
     }
     for name, theirs in known.items():
@@ -91,24 +84,19 @@ def test_stages_are_listed_with_published_values_of_the_same_configuration(mater
         }
 
 
-def test_ground_profiles_hold_the_present_height_under_the_root(tmp_path: Path) -> None:
-    heights = np.arange(6 * 3 * 36, dtype=np.float32).reshape(18, 36)
-    path = tmp_path / "clip.npz"
-    np.savez(
-        path, frame=np.arange(6), fits=np.full(6, 3), heights=heights, error=np.zeros((1, 10)),
-        foot_error=np.zeros((1, 10, 2)),
-    )  # fmt: skip
-    fits = sections.read_fits(path)
-    assert fits.frame.tolist() == [0, 3]
-    # Of 12 centre samples, -60 to +50 by tens, the seventh is the present one: column 12 + 6.
-    assert fits.profile.tolist() == [heights[0:3, 18].tolist(), heights[9:12, 18].tolist()]
-
-
-def test_a_damaged_terrain_file_is_named(tmp_path: Path) -> None:
-    path = tmp_path / "clip.npz"
-    np.savez(path, frame=np.arange(3))
-    with pytest.raises(InputError, match=r"clip\.npz: holds no array 'fits'"):
-        sections.read_fits(path)
+def test_fits_of_uneven_ground_are_listed_with_the_farthest_feet_first(tmp_path: Path) -> None:
+    for name, fits, distance in (("near", 10, 0.1), ("far", 10, 0.4), ("flat", 1, 0.0)):
+        feet = np.full((2, fits, 2), distance) * [1, 2]
+        error = np.arange(2.0 * fits).reshape(2, fits)
+        np.savez(tmp_path / f"{name}.npz", error=error, foot_error=feet)
+    table = sections.fit_table(sorted(tmp_path.glob("*.npz")))
+    assert table is not None
+    assert [row[0] for row in table.rows] == ["far", "near"]
+    assert table.rows[0][1:] == pytest.approx([2, 0.4, 0.8, 5.0, 14.0])
+    assert sections.fit_table([tmp_path / "flat.npz"]) is None
+    np.savez(tmp_path / "near.npz", frame=np.arange(3))
+    with pytest.raises(InputError, match=r"near\.npz: holds no array 'foot_error'"):
+        sections.fit_table([tmp_path / "near.npz"])
 
 
 def test_texts_are_escaped_for_plotly() -> None:
@@ -118,18 +106,15 @@ def test_texts_are_escaped_for_plotly() -> None:
     assert trace["hovertemplate"] == "%{y}<extra></extra>"
 
 
-def test_each_clip_on_other_bones_has_one_bar_and_mirrors_none(material):
+def test_retargeted_clips_that_differ_most_come_first(material: ReportMaterial) -> None:
     def figures(knee: float, thigh: float) -> dict:
         return {"angles": {"left knee": {"apart": knee}}, "directions": {"right thigh": thigh}}
 
-    clips = {
-        "near": figures(2.0, 1.0),
-        "far": figures(3.0, 9.5),
-        "far_mirror": figures(3.0, 9.5),
-        "own": None,
-    }
-    reports = [{"clip": name, "retarget": value} for name, value in clips.items()]
-    chart = data_section.retarget_chart(replace(material, motion=reports))
-    (bars,) = chart.traces
-    assert (bars["x"], bars["y"], bars["text"]) == (["far", "near"], [9.5, 2.0], ["right thigh", "left knee"])
-    assert data_section.retarget_chart(replace(material, motion=reports[-1:])) is None
+    clips = {"own": None, "near": figures(2.0, 1.0), "far": figures(3.0, 9.5)}
+    reports = [
+        {**report, "retarget": value} for report, value in zip(material.motion, clips.values(), strict=False)
+    ]
+    table = data_section.clip_table(replace(material, motion=reports))
+    assert [row[-2:] for row in table.rows] == [[9.5, "right thigh"], [2.0, "left knee"], [None, None]]
+    table = data_section.clip_table(replace(material, motion=reports[:1]))
+    assert table.columns[-1].label == "SHA-256"

@@ -38,8 +38,7 @@ with job(snakemake):
         rows=rows,
         measures=all_measures(),
     )
-    description = material.network
-    walks = packed_scenes(files.scenarios, description["skeleton"], description["channels"])
+    walks = packed_scenes(files.scenarios, material.network["skeleton"])
     network = load_network(files.weights)
     runtime = Runtime.model_validate(material.resolved["configuration"]["runtime"])
     character = playable_with_recogniser(network, runtime)

@@ -424,8 +424,9 @@ def skin_weights(
 
 
 # For a body in the shape of a person, these lengths are multiplied by `body_scale`.
-CORNER_SPACING = 1.9  # cm between corners of the mesh on trunk and limbs
-FINE_SPACING = {"hand": 0.64, "face": 0.85, "foot": 1.2}  # cm between corners on these finer parts
+CORNER_SPACING = 3.0  # cm between corners of the mesh on trunk and limbs
+ROD_SPACING = 1.9  # the same on the rods of a skeleton without roles
+FINE_SPACING = {"hand": 0.85, "face": 1.2, "foot": 1.8}  # cm between corners on these finer parts
 # cm over which the weights of two bones blend, for each part of the body. "": all other parts.
 BLEND_WIDTH = {"": 3.6, "hand": 0.8, "head": 2.6, "foot": 1.8}
 # For shading: (distance from a corner at which it is tested whether the body is near, cm; weight).
@@ -513,7 +514,8 @@ def _build_mesh(joints_and_roles: str) -> Mesh:
     else:
         pose, solids, joint_of = _sticks(skeleton)
         scale, fine = 1.0, []
-    corners, faces = surface_mesh(solids, CORNER_SPACING * scale, fine)
+    spacing = CORNER_SPACING * scale if is_person else ROD_SPACING
+    corners, faces = surface_mesh(solids, spacing, fine)
     slope, _ = distance_slopes(solids, corners)
     normals = slope / np.maximum(np.linalg.norm(slope, axis=1, keepdims=True), 1e-9)
     owner = nearest_joints(solids, corners, joint_of)

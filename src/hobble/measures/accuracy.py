@@ -322,14 +322,13 @@ def _worst_clip(found: Json) -> Iterator[Hint]:
     median = float(np.median([row["mean"] for row in rows]))
     worst = max(rows, key=lambda row: row["mean"])
     if worst["mean"] > 1.8 * median:
-        # The section Labels does not show mirrored clips.
         source = worst["clip"].removesuffix("_mirror")
         whose = "its labels" if source == worst["clip"] else f"the labels of {source}, which it mirrors,"
         yield Hint(
             "note",
             f"{worst['clip']} has the largest error,",
             f"{worst['mean'] / median:.1f} times the median over all clips. "
-            f"Check {whose} in the section Labels.",
+            f"Look at it under Accuracy, and check {whose} with `hobble labels`.",
         )
 
 

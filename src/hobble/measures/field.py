@@ -68,7 +68,7 @@ WORTH_A_HINT = {"skating_cm": "feet skate", "jerk": "joints jerk"}
 
 def section(found: Json, material: ReportMaterial) -> PageSection:
     """The table, and how each value was measured."""
-    if not found:
+    if "straight" not in found:
         return PageSection("field", [])
     table = Table("field", COLUMNS, rows(found), "Measures of the field")
     clips = "held-out" if found["split"] == "held_out" else "training"

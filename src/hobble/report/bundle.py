@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import base64
 import json
 import os
 import shutil
 import tempfile
+import zlib
 from pathlib import Path
 from subprocess import CompletedProcess
 from typing import Any
@@ -22,6 +24,7 @@ from hobble.runtime.options import Runtime
 
 WEB = Path(__file__).parent / "web"
 MODELS_FOLDER = Path(__file__).parents[1] / "models"
+PLOTLY = "plotly.js-cartesian-dist-min"
 PACKAGE_FILES = ("package.json", "package-lock.json")  # they name the npm packages and their hashes
 
 
@@ -53,10 +56,7 @@ def bundle_page_scripts(modules: str | Path, target: str | Path, sources: str | 
     internet. The same input gives the same bytes. Raises HobbleError if a script has an error, and says in
     which line.
     """
-    with tempfile.TemporaryDirectory() as folder:
-        networks = Path(folder, "networks.js")
-        networks.write_text(networks_module(), encoding="utf-8")
-        _bundle(Path(modules).resolve(), target, Path(sources, "index.js"), networks, "iife")
+    _bundle(Path(modules).resolve(), target, Path(sources, "index.js"), "iife")
 
 
 def bundle_module(modules: str | Path, target: str | Path) -> None:
@@ -64,10 +64,7 @@ def bundle_module(modules: str | Path, target: str | Path) -> None:
 
     modules, target, and the error that is raised: as for `bundle_page_scripts`.
     """
-    with tempfile.TemporaryDirectory() as folder:
-        networks = Path(folder, "networks.js")
-        networks.write_text(networks_module(), encoding="utf-8")
-        _bundle(Path(modules).resolve(), target, WEB / "module.js", networks, "esm")
+    _bundle(Path(modules).resolve(), target, WEB / "module.js", "esm")
 
 
 def networks_module() -> str:
@@ -82,32 +79,40 @@ def networks_module() -> str:
     return "\n".join([*imports, f"export const networks = {{ {', '.join(NETWORK_KINDS)} }};\n"])
 
 
-def _bundle(modules: Path, target: str | Path, entry: Path, networks: Path, form: str) -> None:
+def plotly_module(modules: Path) -> str:
+    """JavaScript source of a module with plotly.js as zlib data in base64, which charts.js unpacks."""
+    library = Path(modules, PLOTLY, "plotly-cartesian.min.js").read_bytes()
+    return f'export default "{base64.b64encode(zlib.compress(library, 9)).decode()}";\n'
+
+
+def _bundle(modules: Path, target: str | Path, entry: Path, form: str) -> None:
     """Bundle the script `entry` and all that it imports into the file `target`.
 
-    networks: file with the source of the module "networks". form: esbuild's output format, "iife" (a script
-    that runs by itself) or "esm" (a module).
+    form: esbuild's output format, "iife" (a script that runs by itself) or "esm" (a module).
     """
-    process = node(
-        [
-            str(modules / "esbuild" / "bin" / "esbuild"),
-            str(entry.resolve()),
-            f"--alias:networks={networks}",
-            "--bundle",
-            f"--format={form}",
-            "--minify",
-            "--target=es2022",
-            "--charset=utf8",
-            "--legal-comments=eof",
-            "--loader:.min.js=text",  # plotly.js as text, which charts.js runs when it draws the first chart
-            "--log-level=error",
-        ],
-        return_completed_process=True,
-        capture_output=True,
-        text=True,
-        encoding="utf-8",
-        env={**os.environ, "NODE_PATH": str(modules)},
-    )
+    made = {"networks": networks_module(), PLOTLY: plotly_module(modules)}
+    with tempfile.TemporaryDirectory() as folder:
+        for name, source in made.items():
+            Path(folder, f"{name}.js").write_text(source, encoding="utf-8")
+        process = node(
+            [
+                str(modules / "esbuild" / "bin" / "esbuild"),
+                str(entry.resolve()),
+                *(f"--alias:{name}={Path(folder, name)}.js" for name in made),
+                "--bundle",
+                f"--format={form}",
+                "--minify",
+                "--target=es2022",
+                "--charset=utf8",
+                "--legal-comments=eof",
+                "--log-level=error",
+            ],
+            return_completed_process=True,
+            capture_output=True,
+            text=True,
+            encoding="utf-8",
+            env={**os.environ, "NODE_PATH": str(modules)},
+        )
     if process.returncode:
         raise HobbleError(f"the page's scripts could not be bundled: {_one_line_output(process)[:300]}")
     write_text(target, str(process.stdout))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import itertools
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
@@ -276,6 +277,8 @@ OPENING_FRAMES = (
     120  # frames of walking before the page opens: two seconds, enough to get up to speed and to limp
 )
 
+IN_STEP = 0.03  # share of a gait cycle by which characters in step may differ
+
 # Fields of `hobble.runtime.character.Character` that the page has as flat lists, with names in camel case.
 FLAT_FIELDS = (
     "gait",
@@ -311,15 +314,27 @@ def opening_walk(
         column = channel["columns"][channel["sliders"][chosen["part"]]]
         # The value is in tenths of the highest value of the channel.
         values.insert(0, {channel["name"]: {column: chosen["value"] / 10 * channel["highest"]}})
-    return chosen | {"walked": [_state_after_walk(network, runtime, each) for each in values]}
+    walked: list[dict[str, Any]] = []
+    for each in values:
+        walked.append(_state_after_walk(network, runtime, each, walked[0]["phase"] if walked else None))
+    return chosen | {"walked": walked}
 
 
 def _state_after_walk(
-    network: Network, runtime: Runtime, channels: Mapping[str, Mapping[str, float]]
+    network: Network, runtime: Runtime, channels: Mapping[str, Mapping[str, float]], phase: float | None
 ) -> dict[str, Any]:
-    """The state of a character after the opening walk. channels: channel -> column -> value."""
-    *_, (animation, pose) = walk_straight(network, runtime, OPENING_FRAMES, channels)  # only the last frame
-    state = animation.state
+    """The state of a character after the opening walk.
+
+    channels: channel -> column -> value. phase: if given, it walks on for up to a gait cycle until it is in
+    step with a character in this phase.
+    """
+    walk = walk_straight(network, runtime, 2 * OPENING_FRAMES, channels)
+    animation, pose = next(itertools.islice(walk, OPENING_FRAMES - 1, None))
+    state = animation.state  # of the present frame
+    while phase is not None and (float(state.phase[0]) - phase) % 1.0 > IN_STEP:
+        if (after := next(walk, None)) is None:
+            break
+        pose = after[1]
     values = {name: np.ravel(getattr(state, name)[0]) for name in FLAT_FIELDS}
     values |= {name: getattr(state, name)[0] for name in NESTED_FIELDS}
     for axis, name in enumerate("xz"):

@@ -28,7 +28,7 @@ from hobble.report.parts import (
     log_axis,
 )
 from hobble.report.sections import passes_axis, published_curve, stage_axes
-from hobble.report.templates import chart_specs, compared_by, render_page
+from hobble.report.templates import compared_by, compressed, drawn_by_script, render_page
 
 LARGEST_PAGE = 19_850_000  # bytes; the page must stay under 20 MB
 RESERVED = 60_000  # bytes of LARGEST_PAGE that are kept free for the page's text, style and tables
@@ -62,10 +62,10 @@ def render_comparison(
     playables = playables or {}
     measurements = join_sections(compared_by(measures, "compared_section", compared))
     names = configuration_names(compared)
-    charts = chart_specs([sections, measurements])
+    drawn = drawn_by_script([sections, measurements])
     # Configurations with the same skeleton share a body. Its key is in the entry `body` of a character.
     bodies = {spec["body"]: packed_body(skeleton_of(spec)) for spec in playables.values()}
-    used = len(bundle.encode()) + len(embedded(charts).encode()) + len(embedded(bodies).encode())
+    used = sum(map(len, (bundle.encode(), embedded(bodies), *map(compressed, drawn.values()))))
     on_page, left_out = select_fitting(playables or {}, LARGEST_PAGE - RESERVED - used)
     rounded = {name: round_weights(spec) for name, spec in playables.items()} if left_out else {}
     if left_out:
@@ -73,7 +73,7 @@ def render_comparison(
     bodies = {spec["body"]: bodies[spec["body"]] for spec in on_page.values()}
     return render_page(
         "compare.html.j2",
-        {"name": NAME, "charts": charts, "playable": on_page, "bodies": bodies},
+        {"name": NAME, **drawn, "playable": on_page, "bodies": bodies},
         bundle,
         name=NAME,
         measured_sections=measurements,

@@ -9,24 +9,23 @@ from typing import Any
 import numpy as np
 
 from hobble.channels import channel
-from hobble.channels.shown import shown_names
 from hobble.core.messages import group_messages
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 from hobble.motion.retarget import MOST_DIFFERENCE, most_different
 from hobble.report.gather import ReportMaterial
-from hobble.report.parts import Chart, Column, Table, Trace, axis, bar_trace, line_trace
+from hobble.report.parts import Chart, Column, Table, axis, bar_trace
 from hobble.rows.clip_rows import Excerpt, cut_into_excerpts, load_excerpt, row_count, shuffle_key
 from hobble.rows.layout import GAITS
 
-MOST_SHOWN = 150  # at most this many clips have label curves, a row in the table and views of their ground
+MOST_SHOWN = 150  # the terrain of at most this many clips is shown
+MOST_ROWS = 2000  # the table of clips has at most this many rows
 MOST_COUNTED = 600  # at most this many clips are read to count how many seconds of data there are
 MOST_EXCERPTS = 600  # the frames of at most this many excerpts of clips are counted
-MOST_BARS = 200  # the chart of retargeted clips has at most this many bars
-MOST_NAMED = 30  # if it has more bars than this, none has a name under it
 MOST_REMARKS = 500  # the table of doubts, warnings and repairs has at most this many rows
 # Split, its name on the page, the colour of its bars.
 SPLITS = (("train", "training", "@muted"), ("held_out", "held out", "@accent"))
+SPLIT_WORDS = {split: words for split, words, _ in SPLITS}
 SPEED_EDGES = np.arange(0, 6.01, 0.2)  # edges of the bins of speeds, metres a second
 TURN_EDGES = np.arange(-220, 221, 20.0)  # of turning speeds, degrees a second, positive to the left
 TENTHS = np.arange(1, 11)  # middles of the bins of channel values, in tenths of the channel's highest value
@@ -255,55 +254,14 @@ def _middles(edges: Array) -> list[float]:
     return np.round((edges[:-1] + edges[1:]) / 2, 3).tolist()
 
 
-def retarget_chart(material: ReportMaterial) -> Chart | None:
-    """A bar for each retargeted clip; None if no clip was retargeted.
+def clip_table(material: ReportMaterial) -> Table:
+    """A row for each clip: split, file, length, labels, difference from its file, and checksum.
 
-    Each bar stands for the joint or limb that differs most from the clip's file. Its height is that
-    difference in degrees.
+    Clips that were retargeted and differ most from their files come first.
     """
-    unmirrored = _without_mirrors([report for report in material.motion if report.get("retarget")])
-    # A bar is (joint or limb, degrees, clip).
-    bars = [(*most_different(report["retarget"]), report["clip"]) for report in unmirrored]
-    if not bars:
-        return None
-    bars.sort(key=lambda bar: -bar[1])
-    total, bars = len(bars), bars[:MOST_BARS]
-    joints, degrees, clips = zip(*bars, strict=True)
-    hover = "%{x}: %{text} differs by %{y:.1f} degrees<extra></extra>"
-    trace = bar_trace("", clips, degrees, "@muted", hover) | {"text": list(joints), "textposition": "none"}
-    layout = {
-        "showlegend": False,
-        "xaxis": {"type": "category", "showticklabels": len(bars) <= MOST_NAMED},
-        "yaxis": axis("difference, degrees", rangemode="tozero"),
-    }
-    caption = (
-        "These clips were retargeted to the skeleton of the data set. In each clip, one joint or limb "
-        "differs most from the file. The bar shows by how many degrees, on average over the clip. Clips with "
-        f"more than {MOST_DIFFERENCE:.0f} degrees are refused."
-    )
-    if total > len(bars):
-        caption += f" The chart shows the {len(bars)} of {total:,} clips that differ most."
-    title = "Difference between retargeted clips and their files"
-    return Chart("retarget", title, caption, [trace], layout, 220)
-
-
-def _without_mirrors(reports: Sequence[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
-    """The reports without those of mirrored clips whose original is among them."""
-    names = {report["clip"] for report in reports}
-    return [
-        report
-        for report in reports
-        if not (report["clip"].endswith("_mirror") and report["clip"].removesuffix("_mirror") in names)
-    ]
-
-
-def clip_table(material: ReportMaterial, clips: frozenset[str]) -> Table:
-    """A row for each of `clips`: split, file, length, labels and checksum."""
     columns = {
         "clip": Column("clip"),
-        "split": Column(
-            "split", lambda value: {split: label for split, label, _ in SPLITS}.get(value, value)
-        ),
+        "split": Column("split", lambda value: SPLIT_WORDS.get(value, value)),
         "source": Column("file"),
         "frames": Column.count("frames"),
         "source_fps": Column.number("source fps", 4),
@@ -314,14 +272,22 @@ def clip_table(material: ReportMaterial, clips: frozenset[str]) -> Table:
         "sha256": Column("SHA-256", lambda v: str(v)[:12], "hash"),
     }
     labels = {report["clip"]: report for report in material.labels}
-    records = [
-        {**labels.get(report["clip"], {}), **report, "split": material.split_of(report["clip"])}
-        for report in material.motion
-        if report["clip"] in clips
-    ]
+    shown, records = choose_clips(material, MOST_ROWS), []
+    for report in material.motion:
+        if report["clip"] not in shown:
+            continue
+        record = {**labels.get(report["clip"], {}), **report, "split": material.split_of(report["clip"])}
+        if report.get("retarget"):
+            record["joint"], record["degrees"] = most_different(report["retarget"])
+        records.append(record)
+    if any("degrees" in record for record in records):
+        columns["degrees"] = Column.number(
+            f"retargeting: largest difference, degrees (refused from {MOST_DIFFERENCE:.0f})"
+        )
+        columns["joint"] = Column("joint or limb that differs most")
+    records.sort(key=lambda record: -record.get("degrees", 0.0))
     total = len(material.motion)
-    which = f"{len(records)} of {total:,} clips (more would make the page slow)"
-    which = f"All {total} clips" if len(records) == total else which
+    which = f"All {total:,} clips" if len(records) == total else f"{len(records):,} of {total:,} clips"
     return Table.of(f"{material.name}-clips", columns, records, f"{which}, with checksums")
 
 
@@ -346,83 +312,3 @@ def remarks_table(material: ReportMaterial) -> Table | None:
     ]
     title = f"{len(messages):,} messages on doubts, warnings and repairs, by kind"
     return Table(f"{material.name}-remarks", columns, rows[:MOST_REMARKS], title)
-
-
-def label_chart(material: ReportMaterial, clips: frozenset[str]) -> Chart | None:
-    """The labels and channel values of each clip over time; a menu selects the clip. None without labels.
-
-    clips: names of the clips to show. Clips without label curves are left out, and mirrored clips if the clip
-    that they mirror is in the data set.
-    """
-    shown_name = shown_names(material.network["skeleton"])
-    options, layouts = {}, {}
-    for report in _without_mirrors(material.labels):
-        clip, curves = report["clip"], report.get("curves") or {}
-        if clip not in clips or not curves.get("seconds"):
-            continue
-        # Channel values, with their column: [start in seconds, end in seconds, share of the highest value].
-        spans: dict[str, list[tuple[float, float, float]]] = {}
-        for of_channel in material.channels:
-            for column, entry in of_channel["values"].items() if of_channel["clip"] == clip else ():
-                whole_clip = [[0, curves["seconds"][-1], entry["highest"]]]
-                spans[shown_name(column)] = [
-                    (a, b, most / of_channel.get("highest", 10.0))
-                    for a, b, most in entry.get("spells") or whole_clip
-                ]
-        options[clip] = _label_traces(curves, spans)
-        layouts[clip] = _label_layout(len(curves["contacts"]), len(spans))
-    caption = (
-        "The examples for training are made from the clips and these labels. Contacts: a bar marks the time "
-        "in which the heel or toe touches the ground. Phase: it should rise evenly from 0 to 1 in each gait "
-        "cycle. Gaits: their shares add up to 1. The darker a bar of a channel, the higher the value."
-    )
-    if not options:
-        return None
-    more: dict[str, Any] = {"choose": "Clip", "options": options, "option_layouts": layouts, "height": 420}
-    return Chart("clip-labels", "The labels of each clip over time", caption, **more)
-
-
-def _label_traces(
-    curves: Mapping[str, Any], spans: Mapping[str, Sequence[tuple[float, float, float]]]
-) -> list[Trace]:
-    """The traces of one clip. curves: of its label report. spans: channel column -> (from, to, share)."""
-    # The samples are at equal steps, so their times need not be stored.
-    times = {"x": None, "x0": 0, "dx": curves["seconds"][-1] / max(1, len(curves["seconds"]) - 1)}
-    traces = []
-    for name, contacts in curves["contacts"].items():
-        x = [time for a, b in contacts for time in (a, b, None)]
-        colour, words = "@accent" if name.startswith("left") else "@g2", name.replace("_", " ")
-        traces.append(line_trace(words, x, [words] * len(x), colour, width=9, showlegend=False))
-    for name, axis_name, colour in (("phase", "y2", "@ink"), ("speed", "y4", "@soft")):
-        curve = line_trace(name, [], curves[name], colour, width=1.4, yaxis=axis_name, showlegend=False)
-        traces.append(curve | times)
-    for name, shares in curves["gait"].items():
-        fill = f"@g{GAITS.index(name)}"
-        area = line_trace(name, (), shares, fill, width=0, yaxis="y3", stackgroup="gaits", fillcolor=fill)
-        traces.append(area | times)
-    for name, stretches in spans.items():
-        for a, b, share in stretches:
-            bar = line_trace(name, (a, b), (name, name), "@hurt-high", width=9, yaxis="y5", showlegend=False)
-            traces.append(bar | {"opacity": 0.15 + 0.85 * share})
-    return traces
-
-
-def _label_layout(contacts: int, columns: int) -> dict[str, Any]:
-    """The layout of the traces of one clip, from top to bottom. contacts, columns: numbers of bars."""
-    style = {"gridcolor": "@line", "zerolinecolor": "@line", "tickfont": {"size": 11.5, "color": "@soft"}}
-    bars = {"type": "category", "autorange": "reversed", "automargin": True}
-    rows: list[tuple[str, int, dict[str, Any]]] = [
-        ("yaxis", 18 * contacts, bars),
-        ("yaxis2", 60, {"title": {"text": "phase"}, "range": [0, 1]}),
-        ("yaxis3", 60, {"title": {"text": "gait"}, "range": [0, 1]}),
-        ("yaxis4", 60, {"title": {"text": "m/s"}, "rangemode": "tozero"}),
-        ("yaxis5", 18 * columns, bars),
-    ]
-    rows = [row for row in rows if row[1]]
-    total, top = sum(height + 16 for _, height, _ in rows), 1.0
-    layout: dict[str, Any] = {"height": total + 110, "hovermode": "x unified", "xaxis": axis("seconds")}
-    for name, height, more in rows:
-        bottom = top - height / total
-        layout[name] = {**style, **more, "domain": [max(0.0, bottom), top]}
-        top = bottom - 16 / total
-    return layout | {"xaxis": {**axis("seconds"), "anchor": "free", "position": 0}}

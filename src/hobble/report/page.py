@@ -28,7 +28,7 @@ from hobble.report.parts import (
     with_order,
 )
 from hobble.report.recorded_motion import ground_pictures
-from hobble.report.templates import chart_specs, measured_by, render_page
+from hobble.report.templates import drawn_by_script, measured_by, render_page
 
 # Degrees a second: slower turning is not counted, because the body sways that much in a straight walk.
 TURNING = 40.0
@@ -53,19 +53,19 @@ def render_report(
     `character.opening_walk`. A section without data is left out. Without `hero`, the characters at the top
     begin in the network's start frame.
     """
-    clips = data.choose_clips(material)
-    terrain = data.files_of_clips(material.terrain_files, clips)
+    terrain = data.files_of_clips(material.terrain_files, data.choose_clips(material))
     # Seconds of data at each speed, turning speed and channel value.
     row_files = data.sample_files(material.row_files)
     counted = data.seconds_of_data(row_files, material.splits, all_clips=len(material.row_files))
-    sections = _sections(material, counted, clips, terrain)
+    sections = _sections(material, counted, terrain)
     measured_sections = join_sections(measured_by(material, "section"))
     scenes, playable, compared = dict(scenes or {}), playable or {}, captured_and_predicted or {}
     grounds = ground_pictures(terrain, material.network["skeleton"])
+    opening = hero or opening_slider(playable, material.measurements.values())
     for_scripts = {
-        "charts": chart_specs([sections, measured_sections]),
+        **drawn_by_script([sections, measured_sections]),
         "bodies": _bodies(material),
-        "hero": hero or opening_slider(playable, material.measurements.values()),
+        "hero": opening,
         "scenes": scenes,
         "grounds": grounds,
         "name": material.name,
@@ -83,6 +83,7 @@ def render_report(
         titled=bool(material.title),
         eyebrow=f"Hobble report · configuration {material.name} · data set {material.dataset}",
         lead=lead_text(material),
+        shown_part=opening["part"],
         hurts=body_channel(playable) is not None,  # whether the reader can hurt parts of the body
         shown_channel=opening_channel(playable),
         measured_sections=measured_sections,
@@ -106,21 +107,19 @@ def _bodies(material: ReportMaterial) -> dict[str, Any]:
 
 
 def _sections(
-    material: ReportMaterial, counted: Mapping[str, Any], clips: frozenset[str], terrain: list[str]
+    material: ReportMaterial, counted: Mapping[str, Any], terrain: list[str]
 ) -> dict[str, dict[str, Any]]:
     """Section -> name in the template -> chart, table or list of charts; None if there is nothing to show.
 
-    counted: from `seconds_of_data`. clips: names of the clips that are shown one by one. terrain: files of
-    their terrain fits.
+    counted: from `seconds_of_data`. terrain: files of the terrain fits that are shown.
     """
     seconds, sizes = own.stage_charts(material)
     return {
         "training": {
             "curve": own.learning_curve(material),
-            "blocks": own.block_curves(material),
             "table": own.history_table(material),
         },
-        "terrain": own.terrain_section(terrain),
+        "terrain": {"table": own.fit_table(terrain)},
         "stages": {"seconds": seconds, "bytes": sizes, "table": own.stage_table(material)},
         "data": {
             "gaits": data.gait_chart(material),
@@ -128,10 +127,8 @@ def _sections(
             "turns": data.turn_chart(counted),
             "both": data.speed_turn_chart(counted),
             "channels": data.channel_charts(counted, shown_names(material.network["skeleton"])),
-            "retarget": data.retarget_chart(material),
-            "clips": data.clip_table(material, clips),
+            "clips": data.clip_table(material),
             "remarks": data.remarks_table(material),
-            "labels": data.label_chart(material, clips),
         },
     }
 

@@ -266,6 +266,7 @@ class Table:
     columns: Sequence[Column]
     rows: Sequence[Sequence[Any]] = field(repr=False)
     title: str = "Table of the values"
+    first: ClassVar[int] = 10  # rows that a page shows at first; its script adds the others
 
     @classmethod
     def of(
@@ -288,6 +289,10 @@ class Table:
             ]
             for row in self.rows
         ]
+
+    def spec(self) -> list[list[Any]]:
+        """The rows for the page's script: for each cell the shown text, or [whole value, shown text]."""
+        return [[shown if raw == shown else [raw, shown] for _, raw, shown in cells] for cells in self.cells]
 
 
 @dataclass(frozen=True)
@@ -441,7 +446,7 @@ class PageSection:
 
     title: the heading; only one of the joined sections needs it. order: a number; sections are sorted by it.
     nav: a shorter title for the list of contents; by default the title. long: whether printing may break the
-    section between pages.
+    section between pages. note: a line under the heading, which is read before the section is opened.
     """
 
     name: str
@@ -450,6 +455,7 @@ class PageSection:
     order: int = 50
     nav: str = ""
     long: bool = False
+    note: str = ""
 
 
 def join_sections(sections: Iterable[PageSection]) -> list[PageSection]:

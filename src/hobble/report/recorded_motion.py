@@ -8,8 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from hobble.channels import channel
-from hobble.channels.shown import ChannelDisplay, channel_display, channel_words
 from hobble.core import quat
 from hobble.core.array_parts import ArrayParts
 from hobble.core.files import load_npz, to_base64
@@ -23,7 +21,7 @@ from hobble.rows.captured import headings, root_path, rotate_by_yaw, unbroken_st
 from hobble.rows.clip_rows import ClipRows, compose_pairs, load_clip_rows
 from hobble.runtime.export import restore_bone_lengths
 
-FPS = 30  # frame rate of the motion in the page
+FPS = 20  # frame rate of the motion in the page
 UNIT = 0.01  # joint positions are stored as 16-bit integers in steps of this many cm
 # Roles of the joints that can touch the ground, in the order of the predicted contacts.
 FEET = ("left_heel", "left_toe", "right_heel", "right_toe")
@@ -41,25 +39,20 @@ DESCRIPTIONS = {
 }
 
 
-def packed_scenes(
-    path: str | Path, skeleton: Mapping[str, Any], channels: Mapping[str, Sequence[str]] | None = None
-) -> dict[str, Any]:
+def packed_scenes(path: str | Path, skeleton: Mapping[str, Any]) -> dict[str, Any]:
     """The scripted walks of the page; {} without a skeleton.
 
-    path: `runtime/scenarios.npz`, from `hobble.runtime.scenarios.generate_scenarios`. skeleton: the
-    network's, as a dict; empty if it has none. channels: channel (group of inputs of the network) -> labels
-    of its columns.
+    path: `runtime/scenarios.npz`, from `hobble.runtime.scenarios.generate_scenarios`. Walks in which a value
+    of a channel rises are left out: readers set it in Play. skeleton: the network's, as a dict; empty if it
+    has none.
 
-    The motion is stored at 30 Hz, for the joints that move the drawn body. Their positions are relative to
-    the root joint, as 16-bit integers in steps of 0.1 mm. Rotations have 16 bits, too.
+    The motion is stored at FPS, for the joints that move the drawn body. Their positions are relative to the
+    root joint, as 16-bit integers in steps of 0.1 mm. Rotations have 16 bits, too.
     """
     data = load_npz(path)
     if not skeleton:
         return {}
     figure = Skeleton.from_dict({"name": "", **skeleton})
-    displays = {
-        name: channel_display(name, figure, columns, columns) for name, columns in (channels or {}).items()
-    }
     bones = body_mesh(figure).bones.tolist()  # the joints that move the drawn body
     feet = [figure.role(role) if figure.roles.get(role) in figure.joints else -1 for role in FEET]
     frame_step = max(1, round(float(data["fps"]) / FPS))
@@ -67,23 +60,17 @@ def packed_scenes(
     for name in map(str, data["names"]):
         # Arrays of the walk, of every frame_step-th frame.
         motion = {key.removeprefix(f"{name}/"): v for key, v in data.items() if key.startswith(f"{name}/")}
-        swept_channel, column = map(str, motion.pop("swept"))
+        if any(map(str, motion.pop("swept"))):
+            continue
+        walk = {"name": title_of(name), "description": DESCRIPTIONS.get(name, "")}
         motion = {key: values[::frame_step] for key, values in motion.items()}
-        walk: dict[str, Any] = {"name": title_of(name), "description": DESCRIPTIONS.get(name, "")}
-        walk |= _packed_walk(motion, figure, bones)
-        if column in (channels or {}).get(swept_channel, ()):
-            index, display = list((channels or {})[swept_channel]).index(column), displays[swept_channel]
-            walk["swept"] = _packed_sweep(motion, channel(swept_channel).highest, index, column, display)
-            words = channel_words(swept_channel).sweep_description
-            walk["description"] = words.format(walk["swept"]["spoken"])
-        walks.append(walk)
+        walks.append({**walk, **_packed_walk(motion, figure, bones)})
     return {
         "fps": float(data["fps"]) / frame_step,
         "joints": len(bones),
         "unit": UNIT,
         "feet": [bones.index(j) for j in feet] if all(j in bones for j in feet) else [],
         "body": mesh_key(figure),
-        "regions": next((list(display.regions) for display in displays.values() if display.regions), []),
         "scenarios": walks,
     }
 
@@ -98,24 +85,6 @@ def _packed_walk(motion: Mapping[str, Array], figure: Skeleton, keep: list[int])
         "contacts": to_base64(contacts.astype(np.uint8)),
         # 0 to 255 stands for phase 0 to 1.
         "phase": to_base64(np.round(255 * (motion["phase"] % 1.0)).astype(np.uint8)),
-    }
-
-
-def _packed_sweep(
-    motion: Mapping[str, Array], highest: float, index: int, column: str, display: ChannelDisplay
-) -> dict[str, Any]:
-    """The value of a column that rises from 0 to `highest` during a walk. index: of the column."""
-    # The column's name for readers.
-    word = next((label for label, c in display.sliders.items() if c == column), display.spoken_names[index])
-    return {
-        "column": index,
-        "spoken": word,
-        "highest": highest,
-        "placed": bool(display.regions),  # whether the value belongs to a part of the body
-        # 0 to 250 stands for 0 to the highest value.
-        "values": to_base64(
-            np.clip(np.round(250 * (motion["swept_values"] / highest)), 0, 250).astype(np.uint8)
-        ),
     }
 
 
@@ -152,7 +121,7 @@ def title_of(name: str) -> str:
 
 
 FEWEST_CLIPS = 6  # if fewer clips are held out, training clips are added up to this number
-MOST_HELD_OUT = 16  # at most this many held-out clips are shown; each takes up to 230 kB of the page
+MOST_HELD_OUT = 6  # at most this many held-out clips are shown; each takes up to 150 kB of the page
 LONGEST = 12 * 60  # at most this many frames of a clip are shown: 12 seconds
 
 
@@ -252,7 +221,7 @@ def in_world(points: Array, root: Array, yaw: Array, ground: Array) -> Array:
 
 
 STEPS_PER_CM = 10  # lengths are stored as 16-bit integers, in steps of a millimetre
-MOST_VIEWS = 24  # the page has at most this many views
+MOST_VIEWS = 8  # the page has at most this many views
 # The arrays of a view: fields of `hobble.terrain.clip_fits.FitPicture`. In the file they are called
 # picture<number>_<field>.
 ARRAYS = ("cycle", "x", "z", "ground", "soles", "contacts", "pose")

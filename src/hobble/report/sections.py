@@ -2,24 +2,17 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from hobble.core.array_parts import ArrayParts
 from hobble.core.errors import InputError
-from hobble.core.quat import Array
 from hobble.report.gather import ReportMaterial
 from hobble.report.parts import (
     Chart,
-    ChartGroup,
     Column,
     Table,
-    Trace,
     axis,
     format_bytes,
     format_duration,
@@ -32,11 +25,6 @@ from hobble.report.parts import (
 # The network's output consists of blocks. The names of these blocks do not say that they belong to the path,
 # so the page uses other names.
 PATH_PARTS = {"position": "path position", "direction": "path direction"}
-MOST_CLIPS = 10  # at most this many clips have their ground profile drawn
-# A profile is the height of the ground under the root over time. It shows at most this many rows of its clip.
-# A row is a frame in a gait cycle.
-MOST_ROWS = 900
-FRAME_STEP = 3  # a profile has a point for every third frame
 
 
 def passes_axis(history: Mapping[str, Sequence[float | None]]) -> list[float]:
@@ -67,18 +55,35 @@ def published_curve(published: Mapping[str, Any], configuration: str) -> tuple[l
     return [before + (n + 1) / 10 for n in range(len(errors))], errors
 
 
+BLOCK_COLOURS = ("@g1", "@g2", "@g3", "@g4", "@g5", "@g0", "@predicted")
+
+
 def learning_curve(material: ReportMaterial) -> Chart:
-    """The training error and, if clips were held out, the held-out error, on a logarithmic scale."""
+    """The training error and, if clips were held out, the held-out error, on a logarithmic scale.
+
+    Thin lines: the held-out error of each block of the output, the one with the largest error first.
+    """
     history = material.history
     x = passes_axis(history)
     traces = [line_trace("training", x, history.get("train_mse", []), "@muted")]
     more = ". No clips were held out, so there is no held-out error."
     if any(v is not None for v in history.get("held_out_mse", ())):
-        traces.append(line_trace("held out", x, history["held_out_mse"], "@accent"))
+        traces.append(line_trace("held out", x, history["held_out_mse"], "@accent", width=3))
         more = (
             ", so it can be above the held-out error. If the held-out error still falls at the end, train "
-            "longer. If it rises again, the network overfits."
+            "longer. If it rises again, the network overfits. Thin lines: held-out error of each part of the "
+            "output, with its value at the end of training."
         )
+    last = {
+        name: next(v for v in history[name][::-1] if v is not None)
+        for name in material.blocks
+        if any(v is not None for v in history[name])
+    }
+    for i, name in enumerate(sorted(last, key=lambda name: last[name], reverse=True)):
+        words = part_in_words(name.removeprefix("held_out_").removesuffix("_mse"))
+        colour = BLOCK_COLOURS[i % len(BLOCK_COLOURS)]
+        label = f"{words}, {format_number(last[name])}"
+        traces.append(line_trace(label, x, history[name], colour, width=1.1))
     caption = (
         "Mean squared error of the standardised output, on a logarithmic scale. A network that always "
         f"predicts the mean has error 1. The training error is measured with dropout{more}"
@@ -89,43 +94,7 @@ def learning_curve(material: ReportMaterial) -> Chart:
         caption += " Dotted: the training error of Segerstedt (2021), on other data."
     errors = log_axis("mean squared error", [v for t in traces for v in t["y"]])
     layout = {"xaxis": axis("pass", rangemode="tozero"), "yaxis": errors}
-    return Chart("learning-curve", "Error over the passes", caption, traces, layout)
-
-
-def block_curves(material: ReportMaterial) -> ChartGroup | None:
-    """The held-out error of each block of the output, in small charts that share a scale.
-
-    The block with the largest error comes first. None if there is no held-out error.
-    """
-    x, history = passes_axis(material.history), material.history
-    whole = [v for v in history.get("held_out_mse", ()) if v is not None]
-    blocks = {
-        part_in_words(name.removeprefix("held_out_").removesuffix("_mse")): history[name]
-        for name in material.blocks
-        if any(v is not None for v in history[name])
-    }
-    if not blocks:
-        return None
-    last = {name: next(v for v in values[::-1] if v is not None) for name, values in blocks.items()}
-    every = [v for values in blocks.values() for v in values] + whole
-    powers = [math.log10(v) for v in every if v is not None and v > 0] or [0.0]
-    margin = 0.05 * (max(powers) - min(powers)) + 0.02
-    layout = {
-        "xaxis": axis("pass", rangemode="tozero"),
-        "yaxis": log_axis("", every) | {"range": [min(powers) - margin, max(powers) + margin]},
-        "showlegend": False,
-    }
-    grey = [line_trace("whole output", x, history["held_out_mse"], "@muted", width=1.2)] if whole else []
-    charts = []
-    for i, name in enumerate(sorted(blocks, key=lambda name: last[name], reverse=True)):
-        traces = [*grey, line_trace(name, x, blocks[name], "@accent")]
-        title = f"{name}, {format_number(last[name])}"
-        charts.append(Chart(f"block-{i}", title, "", traces, layout, height=190))
-    caption = (
-        "Each title gives the error at the end of training, and the largest comes first. The grey line is "
-        "the error of the whole output. All charts have the same logarithmic scale."
-    )
-    return ChartGroup("block-curves", "Held-out error of each part of the output", caption, charts)
+    return Chart("learning-curve", "Error over the passes", caption, traces, layout, 440)
 
 
 def part_in_words(name: str) -> str:
@@ -147,124 +116,36 @@ def history_table(material: ReportMaterial) -> Table:
     return Table(f"{material.name}-history", [column(name) for name in material.history], rows, title)
 
 
-@dataclass(frozen=True)
-class ShownFits:
-    """The terrain fits of one clip with C gait cycles and 10 fits of each cycle, the best first.
+def fit_table(paths: Iterable[str | Path]) -> Table | None:
+    """The errors of the terrain fits, with a row for each clip on uneven ground; None without any.
 
-    A fit is a ground that suits a cycle. foot_error: (C, 10, 2) mean and largest distance of a foot in
-    contact from it, cm. error: (C, 10) fitting error, cm². frame: (S,) frames of the profile, at 60 Hz.
-    profile: (S, K) height of the ground under the root in the K best fits of each frame, cm; all frames have
-    at least K fits. A clip on flat ground has only one fit.
+    paths: files `terrain/clips/<clip>.npz`. A fit is a ground that suits a gait cycle. C cycles of a clip
+    have K fits each, the best first; a clip on flat ground has only one. Raises InputError if an array is
+    missing.
     """
-
-    clip: str
-    foot_error: Array = field(repr=False)
-    error: Array = field(repr=False)
-    frame: Array = field(repr=False)
-    profile: Array = field(repr=False)
-
-
-def read_fits(path: str | Path) -> ShownFits:
-    """Read `terrain/clips/<clip>.npz`. Raises InputError if an array is missing or lengths disagree.
-
-    In the file, `fits` is the number of fits of each row, and `heights` (sum of fits, 36) has the heights of
-    the ground around the root for each of them.
-    """
-    try:
-        file = ArrayParts(path)
-        fits, frame = file.read_whole("fits"), file.read_rows("frame", 0, MOST_ROWS)
-        fewest = int(fits.min()) if len(fits) else 1
-        first = (np.cumsum(fits) - fits)[:MOST_ROWS:FRAME_STEP]  # row of each frame's first fit in `heights`
-        heights = file.read_rows("heights", 0, int(first[-1]) + fewest if len(fits) else 0)
-        # Columns: heights along the path on its left, on it, and on its right. The middle one is at the root.
-        present = heights.shape[1] // 3 + heights.shape[1] // 6
-        profile = heights[:, present][first[:, None] + np.arange(fewest)] if len(fits) else np.zeros((0, 1))
-        errors = file.read_whole("foot_error"), file.read_whole("error")
-        return ShownFits(Path(path).stem, *errors, frame[::FRAME_STEP], profile)
-    except (ValueError, IndexError) as error:
-        raise InputError(
-            path, f"not the terrain of a clip ({error})", fix="Delete the file; the workflow makes it again."
-        ) from error
-
-
-def terrain_section(paths: Iterable[str | Path]) -> dict[str, Any]:
-    """Charts and a table of the fits. Clips on flat ground are left out. paths: files of terrain fits."""
-    uneven = [fit for fit in map(read_fits, paths) if fit.profile.shape[1] > 1 and len(fit.profile)]
-    if not uneven:
-        return {"charts": [], "table": None}
-    return {"charts": [profile_chart(uneven), distance_chart(uneven)], "table": fit_table(uneven)}
-
-
-def profile_chart(fits_of_clips: list[ShownFits]) -> Chart:
-    """Height of the ground under the root over time, for each of the first MOST_CLIPS clips and each fit."""
-    caption = (
-        "Several grounds are fitted to each gait cycle, and the network is trained on all of them. The lines "
-        "are the heights of these grounds under the root. They agree where a foot is on the ground and "
-        "differ elsewhere. Each cycle has its own fits, so the lines may jump from one cycle to the next."
-    )
-    return Chart(
-        "terrain-profiles",
-        "The ground under the path",
-        caption,
-        layout={"xaxis": axis("seconds"), "yaxis": axis("height, cm")},
-        choose="Clip",
-        options={fit.clip: _profile_traces(fit) for fit in fits_of_clips[:MOST_CLIPS]},
-    )
-
-
-def _profile_traces(fit: ShownFits) -> list[Trace]:
-    """A line for each fit. Where one cycle does not follow the other, None interrupts the line."""
-    gaps, count = np.flatnonzero(np.diff(fit.frame) > FRAME_STEP) + 1, fit.profile.shape[1]
-    seconds = np.insert(np.round(fit.frame / 60, 2), gaps, 0).tolist()
-    traces = []
-    for k in range(count - 1, -1, -1):
-        heights = np.insert(np.round(fit.profile[:, k].astype(float), 1), gaps, np.nan).tolist()
-        points = [(t, h) if math.isfinite(h) else (None, None) for t, h in zip(seconds, heights, strict=True)]
-        colour, width = ("@accent", 2.2) if k == 0 else ("@muted", 1)
-        name = "best fit" if k == 0 else f"fits 2 to {count}"
-        more: dict[str, Any] = {"legendgroup": name, "showlegend": k in (0, 1), "width": width}
-        traces.append(line_trace(name, [t for t, _ in points], [h for _, h in points], colour, **more))
-    return traces
-
-
-def distance_chart(fits_of_clips: list[ShownFits]) -> Chart:
-    """Distance of feet in contact from the fitted ground, for each clip."""
-    style = {"type": "box", "orientation": "h", "boxpoints": False, "fillcolor": "@accent-wash"}
-    style["line"] = {"color": "@accent", "width": 1.4}
-    traces: list[Trace] = [
-        {"name": fit.clip, "x": np.round(fit.foot_error[:, :, 0].ravel(), 3).tolist(), **style}
-        for fit in fits_of_clips[::-1]
-    ]
-    layout = {
-        "xaxis": axis("cm", rangemode="tozero"),
-        "yaxis": {"type": "category", "automargin": True},
-        "showlegend": False,
-    }
-    caption = (
-        "The fitted ground was corrected to meet the feet. The chart shows the mean distance that remains "
-        "between the ground and a foot in contact. Each box covers the cycles and fits of a clip. A distance "
-        "of less than a centimetre is invisible."
-    )
-    height = max(260, 110 + 26 * len(fits_of_clips))
-    return Chart("terrain-feet", "Distance of the feet from the ground", caption, traces, layout, height)
-
-
-def fit_table(fits_of_clips: list[ShownFits]) -> Table:
-    """The errors and distances of the fits, with a row for each clip."""
     columns = [
         Column("clip"),
         Column.count("cycles"),
-        Column.number("mean fitting error of the best ground of each cycle, cm²"),
-        Column.number("mean fitting error of the worst ground used, cm²"),
         Column.number("mean distance of a foot, cm"),
         Column.number("largest distance, cm"),
+        Column.number("mean fitting error of the best ground of each cycle, cm²"),
+        Column.number("mean fitting error of the worst ground used, cm²"),
     ]
-    rows = []
-    for fit in fits_of_clips:
-        errors = fit.error[:, 0].mean(), fit.error[:, -1].mean()
-        distances = fit.foot_error[:, :, 0].mean(), fit.foot_error[:, :, 1].max()
-        rows.append([fit.clip, len(fit.error), *map(float, (*errors, *distances))])
-    return Table("terrain", columns, rows)
+    rows: list[list[Any]] = []
+    for path in paths:
+        try:
+            file = ArrayParts(path)
+            # (C, K, 2) mean and largest distance of a foot in contact, cm; (C, K) fitting error, cm².
+            feet, error = file.read_whole("foot_error"), file.read_whole("error")
+            if error.shape[1] > 1 and len(error):
+                distances = float(feet[:, :, 0].mean()), float(feet[:, :, 1].max())
+                errors = float(error[:, 0].mean()), float(error[:, -1].mean())
+                rows.append([Path(path).stem, len(error), *distances, *errors])
+        except (ValueError, IndexError) as problem:
+            fix = "Delete the file; the workflow makes it again."
+            raise InputError(path, f"not the terrain of a clip ({problem})", fix=fix) from problem
+    rows.sort(key=lambda row: -row[2])
+    return Table("terrain", columns, rows, "Distance of the feet from the fitted ground") if rows else None
 
 
 def stage_charts(material: ReportMaterial) -> list[Chart]:

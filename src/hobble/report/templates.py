@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import base64
+import hashlib
+import zlib
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -13,6 +16,7 @@ from hobble.report.gather import ReportMaterial
 from hobble.report.parts import (
     Chart,
     PageSection,
+    Table,
     embedded,
     format_bytes,
     format_duration,
@@ -21,6 +25,7 @@ from hobble.report.parts import (
 from hobble.report.provenance import git_commit, machine, versions
 
 FOLDER = Path(__file__).parent
+AT_ONCE = ("name", "hero", "bodies", "playable")  # what the figures need that walk before the page is read
 
 
 def load_template(name: str) -> Template:
@@ -43,32 +48,64 @@ def render_page(template: str, for_scripts: Mapping[str, Any], bundle: str, **va
     values: the template's other values.
 
     Texts from the user's files cannot become HTML: the template escapes every value, and the data for the
-    scripts is JSON without any "<".
+    scripts is JSON without any "<". Parts that are not needed at once are compressed. The browser runs only
+    scripts whose hash is in the page's policy.
     """
     return load_template(template).render(
-        embedded={name: embedded(part) for name, part in for_scripts.items()},
+        embedded={name: embedded(part) for name, part in for_scripts.items() if name in AT_ONCE},
+        compressed={name: compressed(part) for name, part in for_scripts.items() if name not in AT_ONCE},
         style=page_style(),
         bundle=mark_safe("the bundle", bundle),
+        policy=policy(bundle),
         provenance={"commit": git_commit(FOLDER), "machine": machine(), "versions": versions()},
         **values,
     )
 
 
-def chart_specs(shown: Any) -> dict[str, Any]:
-    """Chart name -> the chart's data for the page's script.
+def drawn_by_script(shown: Any) -> dict[str, dict[str, Any]]:
+    """The data of charts and long tables for the page's script: {"charts": name -> data, "tables": ...}.
 
-    shown: a chart, section or other part of a page, or any nesting of lists and mappings of them.
+    shown: sections and other parts of a page, in any nesting of lists and mappings. The page itself has the
+    first rows of a table.
     """
-    if isinstance(shown, Chart):
-        return {shown.name: shown.spec()}
+    found = list(_contents(shown))
+    return {
+        "charts": {one.name: one.spec() for one in found if isinstance(one, Chart)},
+        "tables": {
+            one.name: one.spec() for one in found if isinstance(one, Table) and len(one.rows) > one.first
+        },
+    }
+
+
+def _contents(shown: Any) -> Iterator[Chart | Table]:
+    """The charts and tables in any nesting of sections, lists and mappings."""
     if isinstance(shown, PageSection):
         shown = [part.content for part in shown.parts]
     if isinstance(shown, Mapping):
         shown = list(shown.values())
     shown = getattr(shown, "charts", shown)  # of a group or a pair of charts
-    if not isinstance(shown, list | tuple):
-        return {}
-    return {name: spec for item in shown for name, spec in chart_specs(item).items()}
+    if isinstance(shown, Chart | Table):
+        yield shown
+    elif isinstance(shown, list | tuple):
+        for item in shown:
+            yield from _contents(item)
+
+
+def compressed(value: Any) -> str:
+    """JSON, compressed (zlib) and in base64."""
+    return base64.b64encode(zlib.compress(embedded(value).encode(), 9)).decode()
+
+
+def policy(script: str) -> str:
+    """The page's Content-Security-Policy: it fetches nothing, and runs no other script than this one.
+
+    blob: is for plotly.js, which this script unpacks; wasm-unsafe-eval lets it compile WebAssembly.
+    """
+    digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
+    return (
+        f"default-src 'none'; script-src 'sha256-{digest}' blob: 'wasm-unsafe-eval'; "
+        "style-src 'unsafe-inline'; img-src data: blob:; media-src blob:; font-src data:"
+    )
 
 
 def page_style() -> Markup:

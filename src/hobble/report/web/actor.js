@@ -137,11 +137,12 @@ export const createActor = (view, spec, { place = [0, 0], tint = null, ghost = f
     }
   };
   // withPath: true draws the footprints, the past path and the predicted path on the ground; false only the footprints; null nothing.
-  actor.draw = (withPath = true) => {
+  // shift: [x, z] in cm from where the figure is to where it is drawn.
+  actor.draw = (withPath = true, shift = [0, 0]) => {
     const character = actor.character, { paint } = view, plainColour = tint ? paint[tint] : paint.body, channel = bodyChannel(spec);
     drawGround(withPath);
     if (view.inputs) drawInputs(view, character, spec);
-    figure.copyPose(rig);
+    figure.copyPose(rig, shift);
     figure.pose((columns) => {
       const share = channel ? Math.max(0, ...columns.map((l) => character.channelValues[channel.first + l])) * channel.scale / channel.highest : 0;
       return channelColour(paint, share, plainColour);

@@ -1,15 +1,27 @@
 // What all parts of the page share: its data, its colours, and how channel values are named.
 import { Color, SRGBColorSpace } from "three";
+import { bytes } from "../../models/layers.js";
 import { mix } from "./math.js";
 
+// Unpacks zlib data in base64. Returns their text.
+export const inflate = async (packed) => {
+  const stream = new Blob([bytes(packed)]).stream().pipeThrough(new DecompressionStream("deflate"));
+  return new Response(stream).text();
+};
+
 // The data of the page, by part. Each part is JSON in an element script#data-<part>. It is parsed when it is first used, so that the page
-// opens fast.
-const PARTS = ["name", "hero", "bodies", "playable", "charts", "scenes", "grounds", "compare"];
+// opens fast. Parts that are not needed at once are compressed; `unpackParts` has to run before they are used.
+const PARTS = ["name", "hero", "bodies", "playable", "charts", "tables", "scenes", "grounds", "compare"], texts = new Map();
+const elementOf = (part) => document.querySelector(`script#data-${part}`);
 export const material = Object.defineProperties({}, Object.fromEntries(PARTS.map((part) => {
   let parsed;
-  const get = () => (parsed ??= JSON.parse(document.querySelector(`script#data-${part}`)?.textContent ?? "null"));
+  const get = () => (parsed ??= JSON.parse(texts.get(part) ?? elementOf(part)?.textContent ?? "null"));
   return [part, { get, enumerable: true }];
 })));
+export const unpackParts = () => Promise.all(PARTS.map(async (part) => {
+  const element = elementOf(part);
+  if (element?.type === "application/zlib") texts.set(part, await inflate(element.textContent));
+}));
 
 // Functions to call when the colours change.
 export const onTheme = [];
@@ -56,6 +68,7 @@ export const palette = () => {
     dark, body: dark ? [176, 184, 192] : [214, 214, 210], low: rgb("hurt-low"), high: rgb("hurt-high"),
     line: rgb("faint"), ink: rgb("ink"), accent: rgb("accent"), predicted: rgb("predicted"), second: rgb("g3"),
     ground: rgb("ground"), sky: rgb("sky"), zenith: rgb("zenith"), ghost: dark ? [196, 226, 238] : [96, 130, 146],
+    healthy: dark ? [142, 170, 182] : [176, 198, 206],
   };
 };
 

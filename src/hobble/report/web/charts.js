@@ -1,20 +1,19 @@
 // Draws charts in the page's colours when they scroll into view, and again when the theme changes.
-import library from "plotly.js-cartesian-dist-min"; // as text, see bundle.py
-import { colour, material, onTheme } from "./base.js";
+import library from "plotly.js-cartesian-dist-min"; // as zlib data in base64, see bundle.py
+import { colour, inflate, material, onTheme } from "./base.js";
 import { openClip } from "./recorded.js";
 
-// Parsing and running plotly.js takes long, so it is done only when the first chart is drawn.
-const plotly = () => {
-  if (!globalThis.Plotly) {
-    const script = document.createElement("script");
-    script.textContent = library;
-    document.head.append(script);
-  }
-  return globalThis.Plotly;
-};
+// Unpacking and running plotly.js takes long, so it is done only before the first chart is drawn.
+let loading = null;
+const loadPlotly = () => (loading ??= inflate(library).then((text) => new Promise((done, failed) => {
+  const script = document.createElement("script");
+  script.src = URL.createObjectURL(new Blob([text], { type: "text/javascript" }));
+  Object.assign(script, { onload: done, onerror: failed });
+  document.head.append(script);
+})));
 
-// Draws every chart, for printing.
-export let drawAll = () => {};
+// Draws every chart that is not in a closed section, for printing.
+export let drawAll = async () => {};
 
 export const startCharts = () => {
   // The value with the colour of a token in place of each text "@token".
@@ -51,7 +50,8 @@ export const startCharts = () => {
   }, spec.layout));
   const chosenOptions = new Map(); // element of each drawn chart -> index of the option that the reader chose
 
-  const draw = (element) => {
+  const draw = async (element) => {
+    await loadPlotly();
     const spec = material.charts[element.dataset.chart];
     if (!spec) return;
     const narrow = element.clientWidth < 520;
@@ -65,11 +65,12 @@ export const startCharts = () => {
     const fullLayout = layout(chosen && chosen.layout ? merge(spec, { layout: chosen.layout }) : spec, narrow);
     const first = !chosenOptions.has(element);
     if (first) chosenOptions.set(element, 0);
-    plotly().react(element, traces, fullLayout, config);
+    globalThis.Plotly.react(element, traces, fullLayout, config);
     // A click on a point that stands for a clip opens the clip. Its name is the point's y, x or text.
     if (first) element.on("plotly_click", ({ points }) => [points[0].y, points[0].x, points[0].text].some(openClip));
   };
-  drawAll = () => document.querySelectorAll("[data-chart]").forEach(draw);
+  drawAll = () => Promise.all([...document.querySelectorAll("[data-chart]")].filter((each) => each.offsetParent).map(draw));
+  document.querySelectorAll("[data-height]").forEach((each) => { each.style.minHeight = `${each.dataset.height}px`; });
 
   document.querySelectorAll("[data-chooses]").forEach((select) => {
     select.addEventListener("change", () => {

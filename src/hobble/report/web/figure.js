@@ -1,6 +1,6 @@
 // The bodies that the page contains. Each is unpacked when it is first used.
 import {
-  Bone, BufferAttribute, BufferGeometry, Color, DetachedBindMode, Matrix4, MeshBasicMaterial,
+  Bone, BufferAttribute, BufferGeometry, Color, DetachedBindMode, Matrix4, MeshBasicMaterial, MeshLambertMaterial,
   MeshStandardMaterial, Quaternion, Skeleton, SkinnedMesh, Sphere, Vector3,
 } from "three";
 import { linear, material } from "./base.js";
@@ -21,8 +21,10 @@ export const bodyOf = (name) => {
 // The material of the surface: solid, or a ghost that is transparent except at its outline. tints: the colour of each bone. The colour of a
 // corner is the mean of the colours of its bones, with the weights of the skin. The attribute `shade` is 0 for a corner that the body hides
 // from the light and 1 for a free one.
-const createMaterial = (tints, ghost) => {
-  const material = new MeshStandardMaterial({ roughness: .78, metalness: 0, transparent: ghost, depthWrite: !ghost });
+// simple: whether the shading is that of matt paper, for a processor that draws without a graphics card.
+const createMaterial = (tints, ghost, simple) => {
+  const look = { transparent: ghost, depthWrite: !ghost };
+  const material = simple ? new MeshLambertMaterial(look) : new MeshStandardMaterial({ roughness: .78, metalness: 0, ...look });
   material.onBeforeCompile = (shader) => {
     shader.uniforms.tints = tints;
     shader.vertexShader = `attribute float shade; uniform vec3 tints[${tints.value.length}]; varying vec3 vTint; varying float vShade;
@@ -42,7 +44,7 @@ ${shader.fragmentShader}`
         #include <opaque_fragment>`);
     }
   };
-  material.customProgramCacheKey = () => `figure ${tints.value.length} ${ghost}`;
+  material.customProgramCacheKey = () => `figure ${tints.value.length} ${ghost} ${simple}`;
   return material;
 };
 
@@ -66,7 +68,7 @@ export const createFigure = (view, body, regions = [], { ghost = false } = {}) =
     const depthMesh = add(new MeshBasicMaterial({ colorWrite: false }));
     depthMesh.renderOrder = 1;
   }
-  const mesh = add(createMaterial(tints, ghost));
+  const mesh = add(createMaterial(tints, ghost, view.simple));
   mesh.renderOrder = ghost ? 2 : 0;
   mesh.castShadow = !ghost;
   mesh.receiveShadow = !ghost;
@@ -83,10 +85,11 @@ export const createFigure = (view, body, regions = [], { ghost = false } = {}) =
       linear(colour(regions[b] || []), tints.value[b]);
     }
   };
-  // Copies the places and rotations of the bones from arrays of all joints. They are drawn after the next `pose`.
-  figure.copyPose = ({ places, turns }) => {
+  // Copies the places and rotations of the bones from arrays of all joints. They are drawn after the next `pose`,
+  // moved by [x, z], cm.
+  figure.copyPose = ({ places, turns }, [x, z] = [0, 0]) => {
     keep.forEach((j, b) => {
-      for (let i = 0; i < 3; i++) figure.places[3 * b + i] = places[3 * j + i];
+      for (let i = 0; i < 3; i++) figure.places[3 * b + i] = places[3 * j + i] + [x, 0, z][i];
       for (let i = 0; i < 4; i++) figure.turns[4 * b + i] = turns[4 * j + i];
     });
   };

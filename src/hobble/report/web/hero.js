@@ -79,13 +79,29 @@ export const createDial = (host, { most = 10, value = 0, changed }) => {
   return dial;
 };
 
-// The top of the page. A character walks with a value above 0 in one column of a channel. Next to it walks a transparent character
-// with all values 0 and the same target.
+// The top of the page: a character walks in place with a value above 0 in one column of a channel. Beside it walks the same character with
+// all values 0 and the same target. Under each, a belt of lines goes back as fast as it walks.
 
-const GHOST_OFFSET = -84; // cm from the solid character to the transparent one; negative: to the right
-const MOST_AHEAD = 120; // cm: if the transparent character is further ahead or behind, it is moved back
-const FADE = 24; // frames in which the transparent character fades out before this move, and fades in after it
+const APART = 100; // cm between the two figures
+const LINES = 50; // cm between two lines of a belt
 const SPEED = 2.5; // target speed, cm per frame
+const TARGET = { velocity: [0, SPEED], facing: null, gait: "walk" };
+const metresPerSecond = (cmPerFrame) => `${(cmPerFrame * .6).toFixed(2)} m/s`;
+
+// Measures the steps of an actor, so that two can walk in step. progress: share of the present gait cycle, from one landing of the left foot
+// to the next. cycle: frames of the last whole cycle.
+const createStepCount = (actor) => {
+  const count = { progress: 0, cycle: 66 };
+  let since = 0, down = true;
+  count.add = () => {
+    const { contacts } = actor.character, now = contacts[0] > .5 || contacts[1] > .5;
+    since++;
+    if (now && !down && since > 20) { count.cycle = Math.min(140, since); since = 0; }
+    down = now;
+    count.progress = Math.min(1, since / count.cycle);
+  };
+  return count;
+};
 
 const createHero = (spec, opening) => {
   const section = find("hero"), canvas = find("hero-view"), line = find("hero-line"), button = find("hero-walk");
@@ -93,87 +109,81 @@ const createHero = (spec, opening) => {
   const values = new Map(), neutralValues = new Map(), flat = () => 0, hero = { frames: 0 };
   let resolveShown;
   hero.shown = new Promise((done) => { resolveShown = done; }); // resolved when the figure has moved, or, if it rests, has been drawn
-  // part: label of the slider that the dial sets. last: time of the last picture, ms, or null. due: how many frames have to run. shown: when the
-  // speeds were last shown, ms. fade: opacity of the transparent character. leaving: whether it fades out. camera: the point [x, z] to look
-  // at and the yaw of the path, or null.
+  // part: label of the slider that the dial sets. last: time of the last picture, ms, or null. due: how many frames have to run, of the first
+  // figure and of the second. shown: when the speeds were last shown, ms. placed: size of the canvas for which the camera was set.
   let part = labels.includes(opening.part) ? opening.part : labels[0];
-  let last = null, due = 0, shown = 0, fade = 1, leaving = false, camera = null, walks = !matchMedia("(prefers-reduced-motion: reduce)").matches;
+  let last = null, due = 0, dueBeside = 0, shown = 0, placed = "", walks = !matchMedia("(prefers-reduced-motion: reduce)").matches;
 
-  // The target direction of both characters, as yaw in radians. It turns slowly from side to side.
-  const heading = () => .5 * Math.sin(hero.frames / 700);
-  const target = () => ({ velocity: [SPEED * Math.sin(heading()), SPEED * Math.cos(heading())], facing: null, gait: "walk" });
-  const view = createView(canvas, { yaw: .62, pitch: .1, distance: 460, nearest: 240, furthest: 800 }, (now) => {
+  const view = createView(canvas, { yaw: .62, pitch: .1, distance: 520, nearest: 280, furthest: 900 }, (now) => {
     if (walks) advance(now);
     draw(now);
     if (!walks || hero.frames) resolveShown();
     if (walks) view.requestDraw();
   });
   view.onHidden = () => { last = null; };
-  const main = createActor(view, spec), ghost = channel ? createActor(view, spec, { place: [GHOST_OFFSET, 0], tint: "ghost", ghost: true }) : null;
-  // The vector [x, z] from the solid character to the place of the transparent one.
-  const aside = () => [GHOST_OFFSET * Math.cos(heading()), -GHOST_OFFSET * Math.sin(heading())];
+  const main = createActor(view, spec), beside = channel ? createActor(view, spec, { tint: "healthy" }) : null;
+  const figures = beside ? [[main, APART / 2], [beside, -APART / 2]] : [[main, 0]]; // each with its place, x in cm
+  const steps = figures.map(([actor]) => createStepCount(actor));
 
-  const step = () => {
+  hero.step = () => {
     hero.frames++;
-    main.frame(target(), values);
-    if (!ghost) return;
-    ghost.frame(target(), neutralValues);
-    const [sin, cos] = [Math.sin(heading()), Math.cos(heading())], [from, to] = [main.character.root, ghost.character.root];
-    const [dx, dz] = [to[0] - from[0], to[2] - from[2]], along = dx * sin + dz * cos, across = dx * cos - dz * sin;
-    if (!leaving && (Math.abs(along) > MOST_AHEAD || Math.abs(across - GHOST_OFFSET) > 70)) leaving = true;
-    fade = Math.min(1, Math.max(0, fade + (leaving ? -1 : 1) / FADE));
-    if (leaving && fade === 0) {
-      const [x, z] = aside();
-      ghost.character.follow(ghost.character, [from[0] + x - to[0], from[2] + z - to[2]]);
-      ghost.rig.take(ghost.character.posePosition, ghost.character.poseRotation);
-      leaving = false;
-    }
+    main.frame(TARGET, values);
+    steps[0].add();
+    if (!beside) return;
+    // The second figure is played a little faster or slower, so that both land at the same time.
+    const behind = steps[0].progress - steps[1].progress, late = behind - Math.round(behind);
+    dueBeside += Math.min(1.5, Math.max(.6, steps[1].cycle / steps[0].cycle + .5 * late));
+    for (; dueBeside >= 1; dueBeside--) { beside.frame(TARGET, neutralValues); steps[1].add(); }
   };
   const advance = (now) => {
-    due = Math.min(3, due + (last === null ? 1 : (now - last) * .06));
-    const passed = last === null ? 0 : now - last;
+    due = Math.min(4, due + (last === null ? 1 : (now - last) * .06));
     last = now;
-    for (; due >= 1; due--) step();
-    glide(1 - Math.exp(-passed / 350));
+    for (; due >= 1; due--) hero.step();
   };
-  // Moves the camera by a share of the way to its goal. It follows the root on the path, not the hips, because the hips move up and down.
-  const glide = (share) => {
-    const { root } = main.character, [x, z] = ghost ? aside().map((v) => v / 2) : [0, 0], goal = [root[0] + x, root[2] + z, heading()];
-    camera = camera ? camera.map((v, i) => v + share * (goal[i] - v)) : goal;
+  // Sets the camera so that the figures fill the part of the picture that no text covers.
+  const place = () => {
+    if (placed === `${view.W} ${view.H}`) return;
+    placed = `${view.W} ${view.H}`;
+    const text = section.querySelector(".hero-text").getBoundingClientRect(), box = canvas.getBoundingClientRect();
+    const covered = text.top < box.bottom - 8 ? Math.max(0, text.right - box.left) : 0, free = view.W - covered, { distance } = view.orbit;
+    const zoom = distance * Math.min(free / (beside ? 250 : 170), view.H / 205); // pixels: 250 cm side by side and 205 cm in height are shown
+    view.framing = { size: zoom / Math.min(view.H, 1.15 * view.W), aside: covered / 2 / view.W, up: .015 };
+  };
+  const drawBelt = ([{ character }, x]) => {
+    const gone = character.root[2] % LINES;
+    for (let z = -400 - gone; z < 400; z += LINES) view.marks.addStrip([x - 34, 0, z], [x + 34, 0, z], 2.2, view.paint.ink, .3 * (1 - Math.abs(z) / 400));
   };
   const draw = (now) => {
-    const wide = view.W > 900;
-    view.framing = wide ? { size: 2.05, aside: .17, up: -.015 } : { size: 1.72, aside: 0, up: -.03 };
-    const [x, z, turn] = camera, { yaw } = view.orbit;
-    view.orbit.yaw = yaw + turn;
-    view.aim([x, 84, z]);
-    view.orbit.yaw = yaw;
-    view.land.drawAround([x, 0, z]);
-    main.draw(false);
-    if (ghost) { ghost.draw(null); ghost.figure.show(fade > .01, fade); }
-    view.land.darkenUnder(main.figure.balls(view.balls));
+    place();
+    view.aim([0, 86, 0]);
+    view.land.drawAround([0, 0, 0]);
+    for (const figure of figures) {
+      const [actor, x] = figure, [rootX, , rootZ] = actor.character.root;
+      drawBelt(figure);
+      actor.draw(null, [x - rootX, -rootZ]);
+    }
+    view.land.darkenUnder(figures.flatMap(([{ figure }]) => figure.balls(view.balls / figures.length)));
     if (now - shown > 250) { shown = now; showPace(); }
   };
-  // The mean speed over the last 50 frames, m/s.
-  const pace = ({ character: c }) => {
-    const M = spec.window;
-    return Math.hypot(c.px[M] - c.px[M - 50], c.pz[M] - c.pz[M - 50]) * 60 / 50 / 100;
-  };
+  // The mean speed over the last 50 frames, cm a frame.
+  const pace = ({ character: c }) => Math.hypot(c.px[spec.window] - c.px[spec.window - 50], c.pz[spec.window] - c.pz[spec.window - 50]) / 50;
+  // Writes under each figure who it is and how fast it walks.
   const showPace = () => {
-    find("hero-pace").textContent = `${pace(main).toFixed(2)} m/s`;
-    if (ghost) find("hero-ghost").textContent = `${pace(ghost).toFixed(2)} m/s`;
+    if (beside) figures.forEach(([actor, x], i) => {
+      const name = find(`hero-name-${i}`), [left, top] = view.project([x, -9, 12]);
+      name.lastElementChild.textContent = metresPerSecond(pace(actor));
+      Object.assign(name.style, { left: `${left}px`, top: `${top}px` });
+    });
   };
 
   if (channel) {
     const [before, after] = channel.says.split("{}");
-    const words = { part: document.createElement("b"), much: document.createElement("b") };
+    const bold = (text) => Object.assign(document.createElement("b"), { textContent: text });
     const say = () => {
-      words.part.textContent = part;
-      words.much.textContent = `${dial.value} of 10`;
-      if (!channel.on) find("hero-on").textContent = part;
-      const beginning = "One neural network moves both figures at the same target speed, "; // the whole text is one sentence
-      if (dial.value) line.replaceChildren(`${beginning}and the input for the solid one says ${before}`, words.part, `${after}, `, words.much, ".");
-      else line.replaceChildren(`${beginning}and at 0 they walk alike.`);
+      const asked = `One network moves both. Both are asked to walk at ${metresPerSecond(SPEED)}`;
+      find("hero-name-0").firstElementChild.textContent = channel.on || part;
+      if (dial.value) line.replaceChildren(`${asked}; one is told ${before}`, bold(part), `${after}, `, bold(`${dial.value} of 10`), ", and goes as fast as that allows.");
+      else line.replaceChildren(`${asked}. At 0 they walk alike.`);
       chips.forEach((chip) => chip.setAttribute("aria-pressed", String(chip.textContent === part)));
     };
     const applyDial = () => {
@@ -206,17 +216,14 @@ const createHero = (spec, opening) => {
   showButton();
 
   // The page contains the states of both characters while they walk, because predicting their first steps here would take long.
-  const [walking, neutral] = opening.walked ?? [];
   view.compile();
-  main.start(flat);
-  ghost?.start(flat);
-  if (walking) main.character.follow(walking);
-  if (ghost && neutral) ghost.character.follow(neutral, [walking.root[0] - neutral.root[0] + GHOST_OFFSET, walking.root[2] - neutral.root[2]]);
-  for (const actor of [main, ghost]) actor?.rig.take(actor.character.posePosition, actor.character.poseRotation);
-  glide(1);
-  showPace();
+  figures.forEach(([actor], i) => {
+    actor.start(flat);
+    if (opening.walked?.[i]) actor.character.follow(opening.walked[i]);
+    actor.rig.take(actor.character.posePosition, actor.character.poseRotation);
+  });
   section.classList.add("ready");
-  return Object.assign(hero, { main, ghost, view, step });
+  return Object.assign(hero, { main, beside, view });
 };
 
 export let hero = null;

@@ -1,6 +1,6 @@
 // Starts the parts of the page. `Hobble` gives access to them from the browser's console and from the tests.
 import { bvhText, groundSamples, jointVelocities } from "./actor.js";
-import { colour, material } from "./base.js";
+import { colour, material, unpackParts } from "./base.js";
 import { drawAll, startCharts } from "./charts.js";
 import { createCharacter } from "./controller.js";
 import { createRig } from "./feet.js";
@@ -28,7 +28,8 @@ const startNext = () => {
 };
 const startOthers = async () => {
   // If the address is a link to Play, do not wait for the figures at the top.
-  if (hero && !location.hash.startsWith("#play")) await Promise.race([hero.shown, new Promise((done) => { setTimeout(done, 1000); })]);
+  if (hero && !location.hash) await Promise.race([hero.shown, new Promise((done) => { setTimeout(done, 1000); })]);
+  await unpackParts();
   setTimeout(startNext);
   atOnce.forEach((start) => start());
 };
@@ -36,5 +37,6 @@ const startOthers = async () => {
 // The figures at the top walk at once, while the browser still reads the rest of the page. Then the other parts start one after
 // another. Between two of them the browser has time to draw a picture.
 if (document.readyState === "loading") document.addEventListener("DOMContentLoaded", startOthers); else queueMicrotask(startOthers);
+if (document.getElementById("hero")) document.documentElement.dataset.part = "play";
 startHero();
 hero?.shown.then(() => performance.mark("figures-walk")); // for benchmarks/report.py

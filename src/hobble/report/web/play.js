@@ -1,6 +1,8 @@
 // Reads the state of Play from a link. Anybody can write a link, so every part is checked.
 import { bvhText, createActor } from "./actor.js";
 import { bodyChannel, find, material, save, valueKey } from "./base.js";
+import { startGallery } from "./gallery.js";
+import { glbFile } from "./glb.js";
 import { GROUNDS } from "./ground.js";
 import { createPanel } from "./panel.js";
 import { createChase, createView } from "./view.js";
@@ -136,7 +138,8 @@ const SPEED = { crouch: 2, walk: 2.5, jog: 7 }; // cm a frame
 export const createSteering = (stage, orbit) => {
   // pressed: codes of the keys that are down. stick: where the thumb is on the disc, -1 to 1. on: which buttons are on.
   const pressed = new Set(), stick = { x: 0, y: 0 }, on = { crouch: false, jog: false, strafe: false };
-  const steering = { on };
+  // byItself: until somebody steers, the character walks straight on, unless the visitor asked for less motion.
+  const steering = { on, byItself: !matchMedia("(prefers-reduced-motion: reduce)").matches };
 
   steering.toggle = (name, value = !on[name]) => {
     on[name] = value;
@@ -160,6 +163,8 @@ export const createSteering = (stage, orbit) => {
       orbit.yaw -= .04 * dead(pad.axes[2] || 0);
     }
     const size = Math.hypot(right, ahead);
+    if (size) steering.byItself = false;
+    if (steering.byItself) return { velocity: [0, SPEED[on.crouch ? "crouch" : fast ? "jog" : "walk"]], facing: null, gait: on.crouch ? "crouch" : fast ? "jog" : "walk" };
     if (size > 1) { right /= size; ahead /= size; }
     const gait = on.crouch ? "crouch" : fast ? "jog" : "walk", { yaw } = orbit;
     const forward = [-Math.sin(yaw), -Math.cos(yaw)], side = [-forward[1], forward[0]];
@@ -219,7 +224,7 @@ export const addRecorder = (button, canvas, name) => {
 
 // Play, the section in which the networks run. A report has one character; a comparison has two on the same ground.
 
-const START = { yaw: 3.9, pitch: .2, distance: 430 };
+const START = { yaw: .62, pitch: .16, distance: 430 }; // from the front, a little from the side
 const SIDE = 95; // cm between two figures
 
 const createPlay = (stage, playables) => {
@@ -233,15 +238,16 @@ const createPlay = (stage, playables) => {
   const view = createView(canvas, START, (now) => {
     move(now);
     const middle = [0, 1, 2].map((i) => player.actors.reduce((sum, { rig }) => sum + rig.places[i], 0) / player.actors.length);
-    const [vx, vz] = target ? target.velocity : [0, 0], walks = target && !target.facing && Math.hypot(vx, vz) > .5;
+    const [vx, vz] = target ? target.velocity : [0, 0], walks = target && !steering.byItself && !target.facing && Math.hypot(vx, vz) > .5;
     const lookAt = chase.follow(now, middle, walks ? [vx, vz] : null);
     view.aim([lookAt[0], lookAt[1] - 8, lookAt[2]]);
     view.land.drawAround(lookAt, currentGround(), ground.value);
     player.actors.forEach((actor) => actor.draw());
     view.land.darkenUnder(player.actors.flatMap(({ figure }) => figure.balls(view.balls / player.actors.length)));
-    if (now - shown > 100) { shown = now; panels.forEach((panel) => panel.update(view.milliseconds)); }
+    if (now - shown > 100 && find("play-details").open) { shown = now; panels.forEach((panel) => panel.update(view.milliseconds)); }
     view.requestDraw();
   });
+  view.framing = { size: 2.1, aside: 0, up: -.02 };
   const steering = createSteering(stage, view.orbit), chase = createChase(view.orbit, canvas);
   // Runs the frames that are due at time `now`.
   const move = (now) => {
@@ -333,6 +339,8 @@ const createPlay = (stage, playables) => {
   player.motion = (i = 0) => bvhText(player.actors[i].spec, player.actors[i].frames);
   find("play-bvh").addEventListener("click", () => player.actors.forEach((_, i) => (
     save(new Blob([player.motion(i)], { type: "text/plain" }), `${fileName(i)}.bvh`))));
+  find("play-glb").addEventListener("click", () => player.actors.forEach(({ spec, frames }, i) => (
+    save(new Blob([glbFile(spec, material.bodies[spec.body], frames)], { type: "model/gltf-binary" }), `${fileName(i)}.glb`))));
   find("play-picture").addEventListener("click", () => canvas.toBlob((blob) => save(blob, `${fileName(0)}.png`)));
   addRecorder(find("play-film"), canvas, () => fileName(0));
 
@@ -342,6 +350,10 @@ const createPlay = (stage, playables) => {
   ready = true;
   createActors();
   if (linked) find("play").scrollIntoView();
+  if (names.length === 1) startGallery(Object.values(playables)[0], (channel, values) => {
+    sliders.set(values.map(([column, value]) => [channel, column, value]), channel);
+    find("play-stage").scrollIntoView({ block: "center" });
+  });
   addEventListener("hashchange", () => { // somebody pasted a link into the open page
     if (!restore()) return;
     createActors();

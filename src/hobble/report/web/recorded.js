@@ -1,5 +1,5 @@
 // Motion that is stored in the page: the places and rotations of a figure's bones, frame by frame.
-import { channelColour, find, material } from "./base.js";
+import { find, material } from "./base.js";
 import { createFigure } from "./figure.js";
 import { bytes } from "../../models/layers.js";
 import { mix, mixTurn } from "./math.js";
@@ -130,7 +130,7 @@ export const startCaptured = () => {
   choose();
 };
 
-// Plays the scripted walks (scenarios), with footprints, readings and a time slider. In a sweep, a column of a channel rises during the walk.
+// Plays the scripted walks (scenarios), with footprints, readings and a time slider.
 // A scene, or `s`, is a scenario whose data are unpacked.
 
 export const startWalks = () => {
@@ -144,7 +144,7 @@ export const startWalks = () => {
       const stored = scenes.scenarios[index], unpackBytes = (text) => text && new Uint8Array(bytes(text));
       const scene = {
         ...stored, motion: createMotion(stored, boneCount, scenes.unit),
-        contacts: unpackBytes(stored.contacts), phase: unpackBytes(stored.phase), values: unpackBytes(stored.swept?.values),
+        contacts: unpackBytes(stored.contacts), phase: unpackBytes(stored.phase),
       };
       scene.focus = cameraTargets(scene);
       scene.prints = findFootprints(scene);
@@ -179,8 +179,6 @@ export const startWalks = () => {
     return out;
   };
   const onGround = ([x, , z]) => [x, 0, z];
-  // The value of the swept column as a share of its highest value. The page has it as an integer from 0 to 250.
-  const sweptShare = (s, frame) => (s.values ? s.values[frame] / 250 : 0);
 
   // Drawing
 
@@ -188,7 +186,7 @@ export const startWalks = () => {
     player.tick(now);
     drawScene(scene, player.time);
   });
-  const figure = createFigure(view, scenes.body, scenes.regions);
+  const figure = createFigure(view, scenes.body);
   // How near a point on the ground is to the focus: 1 at the focus, 0 from 8 m on. Marks further away are fainter.
   const nearness = ([x, , z], focus) => Math.max(0, 1 - Math.hypot(x - focus[0], z - focus[2]) / 800);
   const drawPath = (s, focus, frame) => {
@@ -209,7 +207,7 @@ export const startWalks = () => {
     view.land.drawAround(focus);
     if (trails) { drawPath(s, focus, at); drawPrints(s, focus, at); }
     s.motion.show(figure, at);
-    figure.pose((columns) => channelColour(view.paint, s.swept?.placed && columns.includes(s.swept.column) ? sweptShare(s, frame) : 0));
+    figure.pose(() => view.paint.body);
     view.land.darkenUnder(figure.balls(view.balls));
     showReadings(s, frame);
   };
@@ -224,7 +222,6 @@ export const startWalks = () => {
     if (s.phase) moment.push(`phase ${(s.phase[frame] / 255).toFixed(2)}`);
     const lines = [moment.join(" · ")];
     if (s.contacts) lines.push(FEET.filter((_, i) => s.contacts[frame] >> i & 1).join(", ") || "no foot on the ground");
-    if (sweptShare(s, frame) > 0) lines.push(`${s.swept.spoken}: ${(sweptShare(s, frame) * s.swept.highest).toFixed(s.swept.highest < 5 ? 2 : 1)} of ${s.swept.highest}`);
     const title = document.createElement("b");
     title.textContent = s.description || s.name;
     reading.replaceChildren(title, ...lines.flatMap((text) => [document.createElement("br"), text]));
@@ -238,7 +235,6 @@ export const startWalks = () => {
     scene = unpack(index);
     choice.selectedIndex = index;
     player.load(scene.frames);
-    find("legend").hidden = !(scene.values && scene.swept.placed);
   };
   const toggle = (event, on) => event.currentTarget.setAttribute("aria-pressed", String(on));
 

@@ -101,11 +101,20 @@ export const createChase = (orbit, canvas) => {
 export const views = [];
 
 // Levels of quality, best first. scale: pixels drawn for each CSS pixel, at most. shadow: size of the shadow map, or 0 for no shadows. balls: how
-// many round parts of bodies darken the ground.
-const LEVELS = [{ scale: 2, shadow: 768, balls: 24 }, { scale: 1, shadow: 512, balls: 16 }, { scale: .8, shadow: 0, balls: 12 }];
+// many round parts of bodies darken the ground. The levels from SOFTWARE on are for a processor that draws without a graphics card.
+const LEVELS = [
+  { scale: 2, shadow: 768, balls: 24 }, { scale: 1, shadow: 512, balls: 16 }, { scale: .8, shadow: 0, balls: 12 }, { scale: .6, shadow: 0, balls: 8 }, { scale: .42, shadow: 0, balls: 6 },
+];
+const SOFTWARE = 3;
 const SLOW = 50, PATIENCE = 24; // if more than PATIENCE pictures take longer than SLOW ms, the quality goes down a level
 const requested = new URLSearchParams(location.search).get("quality");
 let level = 0, slow = 0;
+
+// A WebGL context without smooth edges. software: whether the processor draws.
+const probe = (canvas) => {
+  const gl = canvas.getContext("webgl2", { antialias: false, alpha: true }), info = gl.getExtension("WEBGL_debug_renderer_info");
+  return { gl, software: /swiftshader|llvmpipe|software|basic render/i.test(info ? String(gl.getParameter(info.UNMASKED_RENDERER_WEBGL)) : "") };
+};
 
 let renderer = null;
 // The renderer that all views share; false without WebGL. firstCanvas: a canvas whose size the renderer's canvas gets when it is created.
@@ -113,15 +122,15 @@ const getRenderer = (firstCanvas) => {
   if (renderer === null) {
     try {
       const [width, height] = firstCanvas ? [firstCanvas.clientWidth, firstCanvas.clientHeight] : [300, 150];
-      const canvas = Object.assign(document.createElement("canvas"), { width, height });
-      renderer = new WebGLRenderer({ canvas, antialias: true, alpha: true, powerPreference: "high-performance" });
+      const create = () => Object.assign(document.createElement("canvas"), { width, height }), canvas = create(), { gl, software } = probe(canvas);
+      const low = requested !== "high" && (software || requested === "low");
+      // Smooth edges take a processor several times as long, so it keeps the context without them.
+      renderer = new WebGLRenderer(low ? { canvas, context: gl } : { canvas: create(), antialias: true, alpha: true, powerPreference: "high-performance" });
+      if (!low) gl.getExtension("WEBGL_lose_context")?.loseContext();
+      else level = SOFTWARE;
       renderer.shadowMap.enabled = true;
       renderer.shadowMap.type = VSMShadowMap;
       renderer.setScissorTest(true);
-      const gl = renderer.getContext(), info = gl.getExtension("WEBGL_debug_renderer_info");
-      const card = info ? String(gl.getParameter(info.UNMASKED_RENDERER_WEBGL)) : "";
-      // Without a graphics card the processor draws, so start with the lowest quality.
-      if (requested !== "high" && (requested === "low" || /swiftshader|llvmpipe|software|basic render/i.test(card))) level = LEVELS.length - 1;
     } catch { renderer = false; } // no WebGL: a message is drawn in place of the picture
   }
   return renderer;
@@ -165,8 +174,8 @@ const createLights = (scene) => {
 };
 
 // home: where the camera starts, see createOrbit. draw(now, view): sets up the scene for a picture at time `now`, ms. It is called after
-// `view.requestDraw()`, if the canvas is on the screen.
-export const createView = (canvas, home, draw) => {
+// `view.requestDraw()`, if the canvas is on the screen. marks: the most quads on the ground.
+export const createView = (canvas, home, draw, { marks = 4000 } = {}) => {
   const context = canvas.getContext("2d"), scene = new Scene(), camera = new PerspectiveCamera(30, 1, 10, 6000);
   const lights = createLights(scene);
   // seen: whether the canvas is on the screen. waiting: whether a picture was requested.
@@ -174,9 +183,10 @@ export const createView = (canvas, home, draw) => {
   let scale = 1, seen = false, waiting = false, drawnAt = 0, drawnFor = -1;
   // framing: size of the body in the picture, and its shift as a share of the picture's width (aside) and height (up).
   const view = { scene, W: 0, H: 0, paint: {}, milliseconds: 0, framing: { size: 1.75, aside: 0, up: 0 }, balls: 12, inputs: false, onHidden: () => {} };
+  view.simple = Boolean(getRenderer(canvas)) && level >= SOFTWARE;
   view.land = createLand(scene);
-  view.marks = createMarks(scene);
-  view.marksInFront = createMarks(scene, { most: 400, over: true });
+  view.marks = createMarks(scene, { most: marks });
+  view.marksInFront = createMarks(scene, { most: marks / 10, over: true });
 
   const paint = (now) => {
     if (drawnFor < 0) return; // the browser has not laid out the canvas yet
