@@ -14,7 +14,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hobble.core import quat
 from hobble.core.clip import Clip
 from hobble.core.errors import InputError
 from hobble.core.skeleton import Skeleton, rest_positions
@@ -154,11 +153,9 @@ def _no_motion_problem(clip: Clip) -> Problem | None:
     moved = np.ptp(clip.positions, axis=0).max()
     if len(clip) >= FEWEST_FRAMES and moved > NO_MOTION:
         return None
-    seen = (
-        f"{len(clip)} frames of {clip.fps:g} a second" if moved > NO_MOTION else "one pose, held all the time"
-    )
-    if moved <= NO_MOTION and np.abs(quat.positive(clip.rotations[0, 1:]) - quat.IDENTITY).max() < 1e-3:
-        seen = "the rest pose alone (all rotations are zero)"
+    seen = "one pose, held all the time, such as a T-pose or the zero pose"
+    if moved > NO_MOTION:
+        seen = f"{len(clip)} frames of {clip.fps:g} a second"
     return Problem(f"there is no motion in it, only {seen}", "Export the clip with its motion.")
 
 
