@@ -152,7 +152,7 @@ ADDED_CHANGES: dict[str, dict[str, float]] = {
         "push": 0.15,
         "lift": 0.7,
         "lift_sound": 0.3,
-        "push_sound": 0.45,
+        "push_sound": 0.62,
         "strike": 1.0,
         "side": 2.5,
         "toe_out": 18.0,

@@ -71,8 +71,9 @@ def _chain(skeleton: Skeleton, joint: int, above: int) -> list[int]:
 
 
 HIGHEST_SEVERITY = 10.0
-# strength = (severity / 10) ** STRENGTH_POWER: .48 at 3, .66 at 5, .81 at 7. So an injury of 3 already shows.
-STRENGTH_POWER = 0.6
+# strength = (severity / 10) ** STRENGTH_POWER: .55 at 3, .71 at 5, .84 at 7. So an injury of 3 already shows.
+# At 3 a network shows about .7 of what its training clips show.
+STRENGTH_POWER = 0.5
 # A person guards an injury with the whole body. GUARD_CHANGES grow with guarding ** GUARD_POWER.
 GUARD_POWER = 1.8
 GUARDED_PARTS = ("pelvis", "hip", "thigh", "shank", "foot", "back")
