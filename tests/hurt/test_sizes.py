@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 from hurt_gait import effects, measures
 
+from hobble.channels.guarding import guarding_of_clip
 from hobble.core.skeleton import other_side
-from hobble.gait.cycles import CURVES, measure_cycles
+from hobble.gait.cycles import CURVES, measure_clip, measure_cycles
+from hobble.gait.profile import profile_of_walk
 from hobble.hurt.hurt_clip import hurt_clip
 
 LEG = {
@@ -126,3 +128,29 @@ def test_links_of_one_leg_can_be_told_apart(made, hurting) -> None:
     assert foot["knee"] > max(thigh["knee"], shank["knee"]) + 0.05
     assert hip["stance"] < foot["stance"] - 0.05
     assert shank["lean"] > thigh["lean"] > foot["lean"]
+
+
+@pytest.mark.parametrize("part", ["hip", "thigh", "shank", "foot"])
+def test_the_sound_side_does_less_and_the_body_guards(made, hurting, part) -> None:
+    """People: knee .62 to .90 of its range, ankle .65 to .90. Trunk 21 to 30 degrees forward if
+    they act pain, and 0 to 5 if they have long lived with it.
+    """
+    clip, labels, flat = made("straight")
+    healthy = profile_of_walk(measure_clip(clip))
+    severity = hurting(len(clip), {LEG[part]: 10.0})
+    lean = {}
+    for guarding in (0.0, 0.6, 1.0):
+        hurt = hurt_clip(clip, labels, severity, flat=flat, guarding=guarding).clip
+        limp = profile_of_walk(measure_clip(hurt))
+        assert limp["range knee_flexion_L"] <= 1.0 * healthy["range knee_flexion_L"]
+        assert limp["range ankle_height_L"] <= 0.9 * healthy["range ankle_height_L"]
+        assert limp["range pelvis_turn_left"] <= healthy["range pelvis_turn_left"] + 1.0
+        lean[guarding] = limp["mean trunk_forward"]
+    assert lean[0.0] < 10 <= lean[1.0] <= 30
+    assert lean[0.0] < lean[0.6] < lean[1.0] - 3
+
+
+def test_a_clip_and_its_mirror_guard_alike_and_clips_spread_over_0_to_1() -> None:
+    values = np.sort([guarding_of_clip(f"walk_hurt{n}") for n in range(200)])
+    assert guarding_of_clip("walk_hurt1_mirror") == guarding_of_clip("walk_hurt1")
+    assert np.abs(values - np.linspace(0, 1, 200)).max() < 0.12
