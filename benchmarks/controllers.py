@@ -21,6 +21,7 @@ from stability import random_targets, stability
 
 from hobble.core.processors import processor_name
 from hobble.database.chunks import Manifest
+from hobble.measures.responsivity import Options as Laps
 from hobble.measures.responsivity_run import measure_responsivity
 from hobble.measures.rollouts_run import measure_roll_outs
 from hobble.models.load import load_network
@@ -84,9 +85,8 @@ def main() -> None:
         kept = 1e-6 * number * network.stored_numbers(network.resolve_mode(None))
         print(f"{name}: {size:.1f} MB file, {kept:.1f} MB in memory as {network.default_storage}", flush=True)
         if options.laps:
-            lap = measure_responsivity(
-                network, configuration="", runtime=Runtime(), laps=options.laps, lap_seconds=400, modes=()
-            )
+            laps = Laps(laps=options.laps, modes=())
+            lap = measure_responsivity(network, laps, configuration="", runtime=Runtime())
             print(
                 f"{name}: {lap['waypoints_reached']} of {lap['waypoints']} waypoints, at most "
                 f"{lap['path_overshoot_cm']:.0f} cm off the path, a lap {lap['mean_lap_seconds']} s, slide "

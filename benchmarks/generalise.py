@@ -28,6 +28,7 @@ import torch
 import yaml
 
 from hobble.database.reader import Database
+from hobble.measures.responsivity import Options as Laps
 from hobble.measures.responsivity_run import measure_responsivity
 from hobble.measures.rollouts_run import measure_roll_outs
 from hobble.models.load import load_network
@@ -61,7 +62,7 @@ def measure_recipe(
         rolled = measure_roll_outs(weights, files, clips, "benchmark", lengths=LENGTHS)
         character = load_network(weights)
     lap = measure_responsivity(
-        character, configuration="", runtime=Runtime(), laps=1, lap_seconds=400, modes=(), track=track
+        character, Laps(laps=1, modes=()), configuration="", runtime=Runtime(), track=track
     )
     whole = HeldOutErrors(database, torch.device("cpu"), 0).errors_on_every_row(state.network)[0]
     strayed = " ".join(f"{entry['held_out']['position_error_cm']:5.2f}" for entry in rolled["lengths"])

@@ -20,6 +20,7 @@ from stability import stability
 from hobble.core.processors import processor_name
 from hobble.database.reader import Database
 from hobble.measures.accuracy_run import measure_accuracy
+from hobble.measures.responsivity import Options as Laps
 from hobble.measures.responsivity_run import measure_responsivity
 from hobble.measures.rollouts_run import measure_roll_outs
 from hobble.models.load import load_network
@@ -50,9 +51,7 @@ def values(folder: Path, files: dict[str, Path], splits: dict[str, str], minutes
         out[f"{split}: one step, cm"] = steps[split]["position_error_cm"]
         for row in rolled["lengths"]:
             out[f"{split}: {row['length']} frames, cm"] = row[split]["position_error_cm"]
-    lap = measure_responsivity(
-        network, configuration="", runtime=Runtime(), laps=1, lap_seconds=400, modes=()
-    )
+    lap = measure_responsivity(network, Laps(laps=1, modes=()), configuration="", runtime=Runtime())
     out["waypoints"] = f"{lap['waypoints_reached']} of {lap['waypoints']}"
     out["off the path, cm"] = lap["path_overshoot_cm"]
     found = stability(network, minutes)
