@@ -208,7 +208,7 @@ def training(folder: Path, memory_mb: int, rounds: int) -> None:
     from hobble.models.pfnn import PfnnOptions
     from hobble.training.batches import HostRows
     from hobble.training.checkpoint import new_state, step_for, use_threads
-    from hobble.training.optimiser import update_for
+    from hobble.training.optimiser import Update
     from hobble.training.options import Training
 
     use_threads(int(os.environ.get("OMP_NUM_THREADS", "2")))
@@ -216,7 +216,7 @@ def training(folder: Path, memory_mb: int, rounds: int) -> None:
     disk, memory = (Database.open(folder / "db", mb) for mb in (memory_mb, 1 << 20))
     state = new_state(disk, PfnnOptions(), options)
     device = state.network.flat.device
-    update = update_for(step_for(state.network, options), state.adam, options.batch)
+    update = Update(step_for(state.network, options, state.half), state.adam)
     rows = disk.block_rows(options.batch)
     stretch = WINDOWS * disk.chunks_per_window("train", rows) * disk.manifest.chunks["train"][0].rows
     stretch = min(stretch, disk.section_sample_count("train", 0, 10))

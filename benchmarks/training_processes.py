@@ -26,7 +26,7 @@ import torch
 from training import fresh
 
 from hobble.training.checkpoint import step_for, use_threads
-from hobble.training.optimiser import Adam, update_for
+from hobble.training.optimiser import Adam, Update
 from hobble.training.options import Training
 from hobble.training.processes import ALONE, Processes, join_processes
 
@@ -42,9 +42,9 @@ def measure_step(processes: Processes, sizes: tuple[int, ...], batch: int) -> tu
     """Seconds of a step, and of the sum in it."""
     network = fresh(sizes)
     adam = Adam(network, 1e-4, 0.9, 0.999, 0.01)
-    step = step_for(network, Training(batch=batch))
+    step = step_for(network, Training(batch=batch), False)
     step.seed(1)
-    update = update_for(step, adam, batch, processes)
+    update = Update(step, adam, batch, processes)
     own = len(processes.own_places(batch))
     x, y, p = torch.randn(own, sizes[0]), torch.randn(own, sizes[-1]), torch.rand(own)
     sent = torch.zeros(len(network.flat) + 1)

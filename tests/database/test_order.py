@@ -15,7 +15,8 @@ def test_sections_cut_the_layers_into_near_equal_parts(rows, visits, sections):
     seen = np.zeros((visits, rows), int)
     sizes = []
     for section in range(sections):
-        parts = list(order.layer_parts(rows, visits, section, sections))
+        size = rows * visits * (section + 1) // sections - rows * visits * section // sections
+        parts = list(order.layer_parts(rows, visits, section, sections, range(size)))
         sizes.append(sum(stop - start for _, start, stop in parts))
         for layer, start, stop in parts:
             assert 0 <= start < stop <= rows

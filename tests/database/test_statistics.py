@@ -15,12 +15,9 @@ from hobble.database.statistics import (
     UNSEEN,
     Moments,
     clip_moments,
-    share_in_groups,
     statistics_of_moments,
-    x_groups,
 )
 from hobble.rows.clip_rows import ClipRows, pair_batches
-from hobble.rows.layout import RowLayout
 
 
 def written_out(rows: ClipRows) -> tuple[np.ndarray, np.ndarray]:
@@ -58,14 +55,6 @@ def test_moments_of_parts_add_up_to_those_of_the_whole(cuts, seed):
     np.testing.assert_allclose(total.squares, whole.squares, rtol=1e-6, atol=1e-9)
 
 
-def test_a_long_clip_in_batches_gives_the_same_moments(rows_of, monkeypatch):
-    rows = rows_of(rows=60, fits=None)
-    whole = clip_moments(rows, rows.layout)
-    monkeypatch.setattr("hobble.database.statistics.BATCH", 7)
-    for a, b in zip(clip_moments(rows, rows.layout), whole, strict=True):
-        np.testing.assert_allclose(a.squares, b.squares, rtol=1e-9)
-
-
 def test_deviations_are_shared_in_the_groups_of_the_original_and_weighted(rows_of, layout):
     rows = rows_of(rows=300, fits=10)
     x, y = clip_moments(rows, rows.layout)
@@ -86,12 +75,6 @@ def test_deviations_are_shared_in_the_groups_of_the_original_and_weighted(rows_o
     assert all(v.dtype == np.float32 for v in (s.x_mean, s.x_std, s.y_mean, s.y_std))
 
 
-def test_groups_cover_every_column_of_x_once_but_the_channels():
-    layout = RowLayout(31, channels=(("injury", 30),))
-    columns = np.concatenate([np.arange(layout.x_size)[g] for g in x_groups(layout)])
-    np.testing.assert_array_equal(np.sort(columns), np.arange(342))
-
-
 def test_nothing_is_ever_divided_by_zero(rows_of, layout):
     still = rows_of(rows=20, fits=1)
     for values in (still.x, still.y, still.heights, still.mean, still.channels["injury"]):
@@ -104,20 +87,7 @@ def test_nothing_is_ever_divided_by_zero(rows_of, layout):
     assert (s.x_std[layout.x_terrain] == np.float32(SILENCING_STD)).all()
 
 
-def test_a_gait_without_rows_has_the_deviation_of_its_group(layout):
-    std = np.ones(layout.x_size)
-    std[layout.x_gait] = np.repeat([0.6, 0.6, 0, 0, 0, 0], layout.samples)
-    np.testing.assert_allclose(share_in_groups(std, x_groups(layout), SILENCING_STD)[layout.x_gait], 0.2)
-
-
 def test_severities_share_one_deviation_and_unused_ones_are_scaled_to_0():
     out = channel("injury").divisors(np.array([3.0, 0.0, 4.0]))
     np.testing.assert_allclose(out, [5.0, SILENCING_STD, 5.0])
     np.testing.assert_allclose(channel("injury").divisors(np.array([0.01, 0.0])), [1.0, SILENCING_STD])
-
-
-def test_without_the_channel_severities_change_no_statistics(rows_of, layout):
-    healthy = RowLayout(layout.joints)
-    moments = clip_moments(rows_of(rows=30), healthy)
-    s = statistics_of_moments(healthy, *moments, 0.1, [])
-    assert s.x_mean.shape == s.x_std.shape == (healthy.x_size,)

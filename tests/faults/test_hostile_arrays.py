@@ -15,10 +15,11 @@ import pytest
 
 from hobble.config.load_configuration import Catalogue
 from hobble.core.clip import load_clip
+from hobble.core.declared import ArrayOf
 from hobble.core.errors import InputError
 from hobble.core.files import load_npz, read_json
 from hobble.core.untrusted import read_yaml
-from hobble.models.load import load_network, read_numbers
+from hobble.models.load import load_network, read_arrays
 from hobble.motion.skeleton_file import load_skeleton
 from hobble.terrain.heightmaps import heightmaps, read_heights
 from hobble.terrain.options import HeightmapOptions
@@ -81,7 +82,8 @@ def test_arrays_of_one_byte_numbers_are_limited_in_memory(tmp_path: Path) -> Non
     assert path.stat().st_size < MB
     refused(lambda: read_heights(path), "a.npz: 81000000 heights, more than 67108864")
     arrays = {"Xmean": np.zeros(9), "W0": np.zeros((1, side, side), np.int8)}
-    refused(lambda: read_numbers("a.npz", arrays, "W0", 3), "W0 holds 81000000 numbers")
+    declared = {"W0": ArrayOf((1, side, side), "fiu")}
+    refused(lambda: read_arrays("a.npz", arrays, declared), "81000000 numbers; 1 to 67108864 are allowed")
 
 
 def test_a_layer_of_the_release_that_is_too_large_is_refused(tmp_path: Path) -> None:

@@ -7,8 +7,7 @@ import pytest
 
 from hobble.measures.sample import Sample, Stratum, captured_motion
 from hobble.measures.walks import acceleration, in_root_coordinates
-from hobble.rows.captured import captured_stretches
-from hobble.rows.clip_rows import ClipRows, Excerpt, save_clip_rows
+from hobble.rows.clip_rows import ClipRows, Excerpt, captured_stretches, save_clip_rows
 from hobble.rows.layout import GAITS, RowLayout
 
 LAYOUT = RowLayout(3, channels=(("injury", 2),))

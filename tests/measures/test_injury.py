@@ -35,7 +35,7 @@ from hobble.measures.walks import (
     settling_seconds,
     spearman,
 )
-from hobble.rows.captured import Captured
+from hobble.rows.clip_rows import Captured
 from hobble.runtime.options import Runtime
 
 RUNTIME = Runtime(steering=1.0)

@@ -26,7 +26,7 @@ from hobble.measures.manners_run import (
 )
 from hobble.models.network import Network
 from hobble.report.parts import Paragraph
-from hobble.rows.captured import Captured
+from hobble.rows.clip_rows import Captured
 from hobble.runtime.options import Runtime
 
 FRAMES = 300

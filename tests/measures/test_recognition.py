@@ -21,7 +21,7 @@ from hobble.measures.recognition_run import (
     walking_windows,
 )
 from hobble.measures.walks import gait_features
-from hobble.rows.captured import Captured
+from hobble.rows.clip_rows import Captured
 from hobble.runtime.options import Runtime
 
 RUNTIME = Runtime(steering=1.0)

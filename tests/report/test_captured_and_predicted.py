@@ -10,7 +10,7 @@ import pytest
 from hobble.core.skeleton import Skeleton
 from hobble.figure.mesh import body_mesh
 from hobble.report.recorded_motion import UNIT, in_world
-from hobble.rows.captured import headings, root_path
+from hobble.rows.clip_rows import headings, root_path
 
 
 def positions(clip: dict[str, Any], table: str, joints: int) -> np.ndarray:

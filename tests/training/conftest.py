@@ -16,6 +16,8 @@ from hobble.database.write import write_database
 from hobble.models.pfnn import PfnnOptions
 from hobble.rows.clip_rows import ClipRows
 from hobble.rows.layout import RowLayout
+from hobble.training.augment import Augmentation, RollOut
+from hobble.training.batches import SampleBatch
 from hobble.training.optimiser import Update
 from hobble.training.options import Training
 
@@ -88,6 +90,15 @@ class Recipe(Training):
 @pytest.fixture
 def training() -> Recipe:
     return Recipe(passes=2, sections=3, learning_rate=1e-3, memory_mb=64, device="cpu")
+
+
+def change(
+    augmentation: Augmentation, x: torch.Tensor, p: Any = None, clip: Any = None, y: Any = None
+) -> None:
+    """Let an augmentation change a batch of inputs x, and take note of it."""
+    augmentation.change(SampleBatch(x, y, p, clip, np.empty(0), len(x)))
+    if not isinstance(augmentation, RollOut):  # which the tests tell its errors
+        augmentation.after(x)
 
 
 @pytest.fixture

@@ -16,7 +16,7 @@ from hobble.database.reader import Database
 from hobble.database.write import write_database
 from hobble.training import train
 from hobble.training.batches import HeldOutErrors
-from hobble.training.checkpoint import State, recipe_hash
+from hobble.training.checkpoint import State
 from hobble.training.run import run
 
 from .conftest import clip_rows
@@ -65,14 +65,6 @@ def test_training_ends_after_that_many_sections_without_a_lower_error(
     assert go("stopped").sections_done == len(whole), "without patience it goes on"
 
 
-def test_sections_are_counted_since_the_lowest_error(go: Callable[..., State]) -> None:
-    state = go()
-    errors = held_out(state)
-    assert state.sections_since_best == len(errors) - 1 - errors.index(min(errors))
-    state.history.clear()
-    assert state.sections_since_best == 0
-
-
 def written(folder: Path, small_database: Path, network: Settings, training: Settings, keep: str) -> Any:
     paths = {name: folder / f"{keep}-{name}.npz" for name in ("weights", "checkpoint")}
     run(
@@ -112,14 +104,6 @@ def test_the_best_weights_are_written_and_training_resumes_from_the_last(
     state.network.flat.copy_(state.best)
     held = HeldOutErrors(data, torch.device("cpu"), 0).errors(state.network)
     assert held[0] == pytest.approx(meta[0]["held_out_mse"], rel=1e-5)
-
-
-def test_keep_and_patience_do_not_change_the_recipe_hash(
-    data: Database, network: Settings, training: Settings
-) -> None:
-    plain = recipe_hash(network, training, data, None)
-    assert recipe_hash(network, training | {"keep": "best", "patience": 4}, data, None) == plain
-    assert recipe_hash(network, training | {"seed": 5}, data, None) != plain
 
 
 @pytest.mark.parametrize("changes", [{"keep": "best"}, {"patience": 3}])

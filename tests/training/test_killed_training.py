@@ -17,9 +17,7 @@ import torch
 from hobble.core.files import load_npz, save_npz
 from hobble.database.reader import Database
 from hobble.training import checkpoint
-from hobble.training import run as run_module
 from hobble.training.checkpoint import State, pack
-from hobble.training.run import run
 from hobble.training.train import train
 
 Settings = dict[str, Any]
@@ -117,32 +115,3 @@ def _numbers(state: State) -> dict[str, bytes]:
     arrays = pack(state)
     arrays["history"][:, 3] = 0
     return {name: array.tobytes() for name, array in arrays.items() if name != "seconds"}
-
-
-@pytest.mark.parametrize("last", ["write_weights", "write_history", "save_npz"])
-def test_a_training_killed_while_writing_its_results_ends_with_the_same_bits(
-    small_database: Path,
-    network: Settings,
-    training: Settings,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    last: str,
-) -> None:
-    """Snakemake removes the files of the killed job, and the same command makes them again."""
-
-    def go(folder: Path) -> dict[str, np.ndarray]:
-        files = {name: folder / name for name in ("weights", "history", "checkpoint")}
-        settings: Settings = {"network": network, "training": training, "start": None, "code": None}
-        run(small_database, configuration="c", checkpoints=folder / "c", threads=1, **settings, **files)
-        return load_npz(files["weights"]) | load_npz(files["checkpoint"])
-
-    def dying(*_: Any, **__: Any) -> None:
-        raise SystemExit
-
-    with monkeypatch.context() as patch:
-        patch.setattr(run_module, last, dying)
-        with pytest.raises(SystemExit):
-            go(tmp_path / "killed")
-    killed, whole = go(tmp_path / "killed"), go(tmp_path / "whole")
-    for name in set(whole) - {"history", "seconds"}:
-        assert np.array_equal(killed[name], whole[name]), name

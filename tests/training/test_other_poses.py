@@ -10,8 +10,10 @@ import pytest
 import torch
 
 from hobble.database.reader import Database
-from hobble.training.augment import BEYOND, NEAR, REMEMBERED_ROWS, OtherPoses
+from hobble.training.augment import BEYOND, NEAR, OtherPoses
 from hobble.training.train import train
+
+from .conftest import change
 
 CPU = torch.device("cpu")
 ROWS = 200
@@ -38,13 +40,13 @@ def of_pose(data: Database) -> list[int]:
 
 
 def test_a_share_of_the_rows_moves_evenly_towards_the_pose_before(data: Database) -> None:
-    others, columns = OtherPoses(data, 0.4, ROWS, CPU), of_pose(data)
+    others, columns = OtherPoses(data, 0.4, range(ROWS), CPU), of_pose(data)
     others.begin_section()
     first, p = batch(data, 0.0, 0.51)
-    others.mix(first, p)
+    change(others, first, p)
     assert torch.equal(first, batch(data, 0.0, 0.51)[0]), "no place has another pose yet"
     x, p = batch(data, 1.0, 0.52)
-    others.mix(x, p)
+    change(others, x, p)
     part = 1 - x[:, columns[0]].numpy()
     assert torch.equal(x[:, columns], x[:, columns[:1]].expand(-1, len(columns)))
     rest = [column for column in range(data.layout.x_size) if column not in columns]
@@ -53,7 +55,7 @@ def test_a_share_of_the_rows_moves_evenly_towards_the_pose_before(data: Database
     moved = np.sort(part[part != 0])
     np.testing.assert_allclose(moved, np.linspace(-BEYOND, 1, len(moved)), atol=0.03)
     again, p = batch(data, 2.0, 0.52)
-    others.mix(again, p)
+    change(others, again, p)
     assert again[:, columns].min() == pytest.approx(1.0, abs=0.05), (
         "towards the row's own pose, not the moved"
     )
@@ -66,45 +68,22 @@ def test_a_share_of_the_rows_moves_evenly_towards_the_pose_before(data: Database
 def test_no_pose_of_another_phase_or_gait_or_of_the_same_values(
     data: Database, phase: float, jog: float, hurt: float
 ) -> None:
-    others = OtherPoses(data, 1.0, ROWS, CPU)
+    others = OtherPoses(data, 1.0, range(ROWS), CPU)
     others.begin_section()
-    others.mix(*batch(data, 0.0, 0.52))
+    change(others, *batch(data, 0.0, 0.52))
     x, p = batch(data, 1.0, phase, jog, hurt=hurt)
-    others.mix(x, p)
+    change(others, x, p)
     assert torch.equal(x, batch(data, 1.0, phase, jog, hurt=hurt)[0])
 
 
 def test_the_nearest_phase_is_taken_also_over_the_end_of_the_cycle(data: Database) -> None:
-    others = OtherPoses(data, 1.0, ROWS, CPU)
+    others = OtherPoses(data, 1.0, range(ROWS), CPU)
     others.begin_section()
     for pose, phase in ((10.0, 0.04), (20.0, 0.99), (30.0, 0.96)):
-        others.mix(*batch(data, pose, phase))
+        change(others, *batch(data, pose, phase))
     x, p = batch(data, 0.0, 0.01)
-    others.mix(x, p)
+    change(others, x, p)
     assert float(x[:, of_pose(data)].max()) == pytest.approx(20.0, rel=0.02)
-
-
-def test_only_recent_rows_are_mixed_in(data: Database) -> None:
-    others = OtherPoses(data, 1.0, ROWS, CPU)
-    others.begin_section()
-    others.mix(*batch(data, 10.0, 0.5))
-    for _ in range(REMEMBERED_ROWS):
-        others.mix(*batch(data, 0.0, 0.5, hurt=1.0))
-    x, p = batch(data, 0.0, 0.5, hurt=2.0)
-    others.mix(x, p)
-    assert not x[:, of_pose(data)].any()
-
-
-def test_mixed_poses_do_not_depend_on_earlier_sections(data: Database) -> None:
-    others = OtherPoses(data, 1.0, ROWS, CPU)
-    for _ in range(2):
-        others.begin_section()
-        x, p = batch(data, 1.0, 0.2)
-        others.mix(x, p)
-        assert torch.equal(x, batch(data, 1.0, 0.2)[0])
-        second, p = batch(data, 2.0, 0.2, rows=50)
-        others.mix(second, p)
-        assert not torch.equal(second, batch(data, 2.0, 0.2, rows=50)[0])
 
 
 def test_training_mixes_poses_only_if_configured(

@@ -24,7 +24,7 @@ def block(data: Database) -> tuple[np.ndarray, np.ndarray]:
 
 
 def test_only_the_error_of_the_phase_gets_the_weight(data: Database) -> None:
-    (x, y), (weighted_x, weighted_y) = block(data), block(data.with_phase_weight(8.0))
+    (x, y), (weighted_x, weighted_y) = block(data), block(Database.open(data.path, 64, 8.0))
     at = data.layout.y_phase_change.start
     assert np.array_equal(weighted_x, x)
     np.testing.assert_allclose(weighted_y[:, at], 8 * y[:, at], rtol=1e-4, atol=1e-5)
@@ -43,7 +43,7 @@ class Means:
 
 def test_held_out_errors_do_not_depend_on_the_weight(data: Database) -> None:
     errors = HeldOutErrors(data, CPU, 0).errors_on_every_row(Means(data))
-    assert HeldOutErrors(data.with_phase_weight(8.0), CPU, 0).errors_on_every_row(
+    assert HeldOutErrors(Database.open(data.path, 64, 8.0), CPU, 0).errors_on_every_row(
         Means(data)
     ) == pytest.approx(errors, rel=1e-4)
 

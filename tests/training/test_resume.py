@@ -220,11 +220,3 @@ def test_the_recipe_hash_has_all_that_determines_a_training(
         recipe_hash(network, training | {"sections": 4}, data, "code"),
     ]
     assert len({name, *others}) == 5
-
-
-def test_passes_are_in_the_recipe_hash_if_the_schedule_uses_them(
-    data: Database, network: Settings, training: Settings
-) -> None:
-    cosine = training | {"schedule": "cosine"}
-    names = [recipe_hash(network, cosine | {"passes": passes}, data, "code") for passes in (3, 4)]
-    assert names[0] != names[1]

@@ -12,13 +12,13 @@ import torch
 
 from hobble.database.reader import Database
 from hobble.measures.rollouts_run import RollOutInputs
-from hobble.models.step import AutogradStep, FusedStep
 from hobble.training.augment import RollOut
 from hobble.training.batches import HostRows
 from hobble.training.optimiser import Update
 from hobble.training.train import train
 from tests.measures.whole_roll_outs import roll_out
-from tests.models.definition import fresh
+
+from .conftest import change
 
 CPU = torch.device("cpu")
 FRAMES, STARTS = 5, 9
@@ -57,14 +57,14 @@ def test_poses_carry_the_same_errors_as_a_roll_out(data: Database) -> None:
     given, predictor = straight(data), Mixer(data)
     starts = np.arange(STARTS)
     made, _ = roll_out(predictor, given, starts, FRAMES)  # type: ignore[arg-type]
-    carried = RollOut(data, 2 * STARTS, STARTS, CPU)
+    carried = RollOut(data, 2 * STARTS, range(STARTS), CPU)
     carried.begin_section()
     whole = slice(FRAMES, None)  # places whose roll-out does not end meanwhile
     pose = slice(layout.x_joint_position.start, layout.x_joint_velocity.stop)
     for age in range(FRAMES):
         at = starts + age
         added = torch.zeros(STARTS, layout.x_size)
-        carried.add(added)
+        change(carried, added)
         off = added.numpy() * s.x_std
         if age:
             truth = given.y[at - 1][:, layout.y_joint_position]
@@ -74,21 +74,21 @@ def test_poses_carry_the_same_errors_as_a_roll_out(data: Database) -> None:
         off[:, pose] = 0
         assert np.all(off == 0)
         error = predictor.predict(given.x[at] + added.numpy() * s.x_std, None) - given.y[at]
-        carried.remember(torch.from_numpy(error / s.y_std).float())
+        carried.after(torch.from_numpy(error / s.y_std).float())
 
 
 def test_each_place_restarts_after_its_frames(data: Database) -> None:
     """A fifth of the places restarts at every batch. With one frame, only recorded poses are used."""
     frames, rows = 5, 10
     for length in (frames, 1):
-        carried = RollOut(data, length, rows, CPU)
+        carried = RollOut(data, frames, range(rows), CPU)
         carried.begin_section()
         zero = []
         for _ in range(3 * frames):
             x = torch.zeros(rows, data.layout.x_size)
-            carried.add(x)
+            change(carried, x)
             zero.append((torch.count_nonzero(x, dim=1) == 0).numpy())
-            carried.remember(torch.ones(rows, data.layout.y_size))
+            carried.after(torch.ones(rows, data.layout.y_size))
         if length == 1:
             assert np.all(zero)
             continue
@@ -96,19 +96,6 @@ def test_each_place_restarts_after_its_frames(data: Database) -> None:
         counts = np.sum(zero[frames:], axis=1)
         assert set(counts) == {rows // frames}
         assert set(np.sum(zero[frames : 2 * frames], axis=0)) == {1}
-
-
-def test_roll_outs_do_not_depend_on_earlier_sections_or_short_batches(data: Database) -> None:
-    carried = RollOut(data, 4, 6, CPU)
-    carried.begin_section()
-    carried.remember(torch.ones(6, data.layout.y_size))
-    x = torch.zeros(2, data.layout.x_size)
-    carried.add(x)
-    assert torch.count_nonzero(x) > 0
-    carried.begin_section()
-    x = torch.zeros(6, data.layout.x_size)
-    carried.add(x)
-    assert torch.count_nonzero(x) == 0
 
 
 def test_training_uses_the_roll_outs(
@@ -132,27 +119,15 @@ def test_training_uses_the_roll_outs(
     plain = Update.__call__
     monkeypatch.setattr(Update, "__call__", noted)
     train(data, network=network, training=settings, checkpoints=tmp_path)
-    carried = RollOut(data, 4, 300, CPU)
+    carried = RollOut(data, 4, range(300), CPU)
     number = 0
     for section in range(2):
         carried.begin_section()
         for batch in HostRows(data, CPU).batches(0, section, 2, settings.seed, 300):
             x = batch.x.clone()
-            carried.add(x)
+            change(carried, x)
             assert torch.equal(x, given[number])
             assert torch.equal(x, batch.x) == (number % 4 == 0)
-            carried.remember(errors[number])
+            carried.after(errors[number])
             number += 1
     assert number == len(given) == 8
-
-
-@pytest.mark.parametrize("kind", [AutogradStep, FusedStep])
-def test_the_training_step_keeps_its_errors_for_the_roll_out(kind: type[AutogradStep]) -> None:
-    network = fresh((6, 5, 4))
-    generator = torch.Generator().manual_seed(1)
-    x, y = (torch.randn(7, n, generator=generator) for n in (6, 4))
-    p = torch.rand(7, generator=generator)
-    step = kind(network, 0.0)
-    loss = step(x, y, p, step.masks(7))
-    assert torch.allclose(step.error, network(x, p) - y, atol=1e-5)
-    assert float(loss) == pytest.approx(float(step.error.square().mean()), rel=1e-6)

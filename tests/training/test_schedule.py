@@ -30,19 +30,6 @@ def test_a_cosine_falls_from_one_to_nothing() -> None:
     assert np.mean(shares) == pytest.approx(0.5)
 
 
-def test_a_cosine_of_half_a_pass_ends_after_half_a_pass() -> None:
-    recipe = Training(schedule="cosine", passes=0.5, sections=4)
-    shares = [recipe.learning_rate_share(passes) for passes in (0, 0.25, 0.5)]
-    assert shares == pytest.approx([1, 0.5, 0])
-    assert recipe.all_sections == 2
-
-
-def test_a_constant_rate_rises_and_stays() -> None:
-    recipe = Training(warm_up=2.0, passes=10)
-    shares = [recipe.learning_rate_share(passes) for passes in (0, 0.5, 1, 2, 5, 10)]
-    assert shares == [0, 0.25, 0.5, 1, 1, 1]
-
-
 def test_each_batch_has_the_rate_of_its_place(
     data: Database, network: Settings, training: Settings, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -18,8 +18,6 @@ from hobble.models.model import Options, Trainable
 from hobble.models.pfnn import PfnnOptions
 from hobble.models.plain import PlainOptions
 from hobble.rows.layout import mirror_of_x, mirror_of_y
-from hobble.training.checkpoint import new_state
-from hobble.training.optimiser import Symmetry
 from hobble.training.train import train
 from training.conftest import SPLITS, Recipe, clip_rows, figure
 
@@ -70,30 +68,6 @@ def test_a_network_trained_so_mirrors_its_output(
     kept = train(data, network=network, training=recipe | {"symmetric": True}, checkpoints=tmp_path)
     assert apart(kept.network, data) < 1e-5
     assert apart(free.network, data) > 1e-2
-
-
-@pytest.mark.parametrize("network", NETWORKS, ids=str)
-def test_new_weights_are_symmetric_and_as_large_as_before(
-    data: Database, network: Options, training: Recipe
-) -> None:
-    made = new_state(data, network, training).network
-    spread = [float(layer[:, :, :-1].std()) for layer in made.layers]
-    Symmetry(made, data).make_new_network_symmetric()
-    assert apart(made, data) < 1e-5
-    assert [float(layer[:, :, :-1].std()) for layer in made.layers] == pytest.approx(spread, rel=0.05)
-
-
-@pytest.mark.parametrize("network", NETWORKS, ids=str)
-def test_a_symmetric_network_stays_as_it_is(data: Database, network: Options, training: Recipe) -> None:
-    made = new_state(data, network, training).network
-    symmetry = Symmetry(made, data)
-    made.flat.normal_(0, 0.1, generator=torch.Generator().manual_seed(2))
-    before = made.flat.clone()
-    symmetry.enforce()
-    once = made.flat.clone()
-    symmetry.enforce()
-    assert float((once - before).abs().max()) > 0.05
-    torch.testing.assert_close(made.flat, once, atol=1e-7, rtol=0)
 
 
 def test_a_training_that_goes_on_ends_with_the_same_bytes(

@@ -18,7 +18,7 @@ from hobble.rows.clip_rows import ClipRows
 from hobble.training import augment
 from hobble.training.augment import CANDIDATES, VersionPoses
 from hobble.training.train import train
-from training.conftest import clip_rows
+from training.conftest import change, clip_rows
 
 CPU = torch.device("cpu")
 SOURCES = {"walk_hurt1": "walk", "walk_mirror_hurt1": "walk_mirror"}
@@ -72,14 +72,10 @@ def mixed(data: Database, share: float = 1.0, places: slice = slice(None)) -> tu
     block = block_of(data)
     x = torch.from_numpy(block.x.copy())[places]
     first = places.start or 0
-    versions = VersionPoses(data, share, len(x), CPU, first)
+    versions = VersionPoses(data, share, range(first, first + len(x)), CPU)
     versions.begin_section()
-    versions.mix(x, torch.from_numpy(block.p)[places], block.clip[places])
+    change(versions, x, torch.from_numpy(block.p)[places], block.clip[places])
     return block, x.numpy()
-
-
-def test_the_database_knows_the_source_of_each_hurt_version(healthy_and_hurt: Database) -> None:
-    assert healthy_and_hurt.sources == {"walk_hurt1": "walk"}
 
 
 def test_poses_of_a_clip_and_its_version_move_evenly_to_both_sides(healthy_and_hurt: Database) -> None:
@@ -99,7 +95,6 @@ def test_only_the_pose_moves_and_only_in_a_share_of_the_rows(healthy_and_hurt: D
     of_family = np.array(healthy_and_hurt.clips)[block.clip] != "jog"
     changed = (x != block.x).any(axis=1)
     assert changed[of_family].mean() == pytest.approx(0.25, abs=0.03)
-    assert np.array_equal(mixed(healthy_and_hurt, 0.0)[1], block.x)
 
 
 def test_a_row_gets_the_pose_of_its_own_phase(tmp_path: Path) -> None:
@@ -144,34 +139,16 @@ def test_the_ground_of_a_pose_is_subtracted(tmp_path: Path) -> None:
     np.testing.assert_allclose(moved, block.x, atol=1e-4)
 
 
-def test_a_mirror_belongs_to_the_mirror_of_its_source(tmp_path: Path) -> None:
-    clips = {name: rows_of(name, pose) for name, pose in (("walk", 1.0), ("walk_mirror", 13.0))}
-    clips |= {name: rows_of(name, 3.0) for name in SOURCES}
-    data = database(tmp_path / "database", clips)
-    block, moved = mixed(data)
-    found, names = poses(data, moved)[:, 0], np.array(data.clips)[block.clip]
-    assert 4.8 < found[names == "walk_hurt1"].max() <= 5.001
-    assert 12.5 < found[names == "walk_mirror_hurt1"].max() <= 13.001
-
-
-def test_two_processes_get_what_one_gets(healthy_and_hurt: Database) -> None:
-    half = len(block_of(healthy_and_hurt).p) // 2
-    whole = mixed(healthy_and_hurt)[1]
-    parts = [mixed(healthy_and_hurt, places=part)[1] for part in (slice(0, half), slice(half, None))]
-    np.testing.assert_array_equal(whole, np.concatenate(parts))
-
-
 def test_a_full_table_keeps_fewer_rows(healthy_and_hurt: Database, monkeypatch: pytest.MonkeyPatch) -> None:
-    every = VersionPoses(healthy_and_hurt, 1.0, 10, CPU).key
+    every = VersionPoses(healthy_and_hurt, 1.0, range(10), CPU).key
     monkeypatch.setattr(augment, "TABLE_BYTES", augment.TABLE_BYTES // 10_000)
-    some = VersionPoses(healthy_and_hurt, 1.0, 10, CPU).key
+    some = VersionPoses(healthy_and_hurt, 1.0, range(10), CPU).key
     assert 2 * CANDIDATES < len(some) < len(every)
     assert set(some.tolist()) <= set(every.tolist())
 
 
-def test_a_database_without_versions_changes_nothing(data: Database) -> None:
-    block, moved = mixed(data)
-    assert np.array_equal(block.x, moved)
+def test_a_database_without_versions_has_no_such_augmentation(data: Database, training: Any) -> None:
+    assert augment.augmentations(data, training | {"version_poses": 0.5}, range(32), CPU) == []
 
 
 def test_training_moves_poses_only_if_asked(

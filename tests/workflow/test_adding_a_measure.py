@@ -66,7 +66,7 @@ def compared_section(compared):
     return PageSection("hips", [SectionPart(0, Paragraph("Hips of all."))], order=15)
 '''
 RUN = """from hobble.measures.measure import MeasureInputs, Outcome
-from hobble.rows.captured import captured_stretches
+from hobble.rows.clip_rows import captured_stretches
 from hobble.rows.clip_rows import load_clip_rows
 
 

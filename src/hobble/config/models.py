@@ -19,6 +19,7 @@ from hobble.core.section import (
     RelativePath,
     Section,
 )
+from hobble.core.skeleton import SkeletonData
 from hobble.database.options import DatabaseOptions
 from hobble.hurt.options import Hurt
 from hobble.labels.options import LabelOptions
@@ -198,43 +199,10 @@ def configuration_of(kind: str) -> type[Configuration]:
     return create_model("Configuration", __base__=Configuration, network=(options, options()))
 
 
-class JointEntry(Section):
-    """A joint of a skeleton. parent: None for the root. offset: from the parent, in the rest pose, cm."""
-
-    parent: str | None
-    offset: tuple[float, float, float]
-
-
-class SkeletonFile(Section):
+class SkeletonFile(SkeletonData):
     """A skeleton file. `hobble.core.skeleton.Skeleton` explains all keys but `maps`."""
 
-    joints: dict[str, JointEntry]
-    roles: dict[str, str]
-    end_sites: dict[str, tuple[float, float, float]] = Field(default_factory=dict)
-    links: tuple[tuple[str, str], ...] = ()
-    unseen: tuple[str, ...] = ()
     maps: dict[Name, dict[str, str]] = Field(
         {},
         description="for retargeting: name of another skeleton -> {joint of this one: joint of the other}",
     )
-
-    @model_validator(mode="after")
-    def _joints_are_consistent(self) -> SkeletonFile:
-        known: set[str] = set()  # names of the joints listed so far
-        for name, joint in self.joints.items():
-            if joint.parent is None and known:
-                raise ValueError(f"joint {name}: only the first joint may have no parent")
-            if joint.parent is not None and joint.parent not in known:
-                raise ValueError(f"joint {name}: its parent {joint.parent!r} must be listed before it")
-            known.add(name)
-        joint_names: dict[str, Any] = {  # key of the file -> names of joints in its value
-            "roles": self.roles.values(),
-            "end_sites": self.end_sites,
-            "links": [joint for link in self.links for joint in link],
-            "unseen": self.unseen,
-        }
-        for key, names in joint_names.items():
-            for name in names:
-                if name not in known:
-                    raise ValueError(f"{key}: there is no joint {name!r}")
-        return self

@@ -20,24 +20,25 @@ from hobble.core.untrusted import printable
 Declared = TypeVar("Declared")
 
 
-class Numbers(NamedTuple):
-    """An array of finite numbers.
+class ArrayOf(NamedTuple):
+    """An array.
 
     shape: the length of each axis, or a letter for a length that all arrays of the file with this letter
-    share. kinds: the codes of NumPy's allowed types: f floats, i and u integers, b truth values. low, high:
-    smallest and largest number that is allowed.
+    share. kinds: the codes of NumPy's allowed types: f floats, i and u integers, b truth values, U text. low,
+    high: smallest and largest number that is allowed. finite: whether all numbers must be finite.
     """
 
     shape: tuple[int | str, ...]
     kinds: str = "f"
     low: float = -math.inf
     high: float = math.inf
+    finite: bool = True
 
 
 def check_arrays(
     path: str | Path,
     arrays: Mapping[str, np.ndarray],
-    declared: Mapping[str, Numbers],
+    declared: Mapping[str, ArrayOf],
     lengths: Mapping[str, int] | None = None,
     fix: str | None = None,
 ) -> dict[str, int]:
@@ -46,32 +47,31 @@ def check_arrays(
     path, fix: for the message. lengths: those of letters that are known before. Returns those of all letters.
     """
     known: dict[Any, int] = dict(lengths or {})
-    for name, numbers in declared.items():
+    for name, wanted in declared.items():
         if name not in arrays:
-            raise InputError(path, f"no {name}", fix=fix)
+            raise InputError(path, f"has no {name}", fix=fix)
         array = np.asarray(arrays[name])
-        if array.ndim == len(numbers.shape):
-            for axis, length in zip(numbers.shape, array.shape, strict=True):
+        if array.ndim == len(wanted.shape):
+            for axis, length in zip(wanted.shape, array.shape, strict=True):
                 known.setdefault(axis, length)
-        expected = tuple(axis if isinstance(axis, int) else known.get(axis, axis) for axis in numbers.shape)
-        if array.shape != expected or array.dtype.kind not in numbers.kinds:
-            wanted = f"({', '.join(map(str, expected))}) numbers of kind {numbers.kinds}"
-            raise InputError(
-                path, f"{name} has shape {array.shape} and type {array.dtype}, expected {wanted}", fix=fix
-            )
-        _check_range(path, name, array, numbers, fix)
+        expected = tuple(axis if isinstance(axis, int) else known.get(axis, axis) for axis in wanted.shape)
+        if array.shape != expected or array.dtype.kind not in wanted.kinds:
+            problem = f"{name} has shape {array.shape} and type {array.dtype}, expected "
+            problem += f"({', '.join(map(str, expected))}) of kind {wanted.kinds}"
+            raise InputError(path, problem, fix=fix)
+        _check_range(path, name, array, wanted, fix)
     return known
 
 
-def _check_range(path: str | Path, name: str, array: np.ndarray, numbers: Numbers, fix: str | None) -> None:
-    if not array.size:
+def _check_range(path: str | Path, name: str, array: np.ndarray, wanted: ArrayOf, fix: str | None) -> None:
+    if not array.size or array.dtype.kind == "U":
         return
     low, high = float(array.min()), float(array.max())  # NaN if there is one
-    if not (math.isfinite(low) and math.isfinite(high)):
+    if wanted.finite and not (math.isfinite(low) and math.isfinite(high)):
         raise InputError(path, f"{name} holds numbers that are not finite", fix=fix)
-    if low < numbers.low or high > numbers.high:
-        wrong, limit = (low, numbers.low) if low < numbers.low else (high, numbers.high)
-        side = "below" if low < numbers.low else "above"
+    if low < wanted.low or high > wanted.high:
+        wrong, limit = (low, wanted.low) if low < wanted.low else (high, wanted.high)
+        side = "below" if low < wanted.low else "above"
         raise InputError(path, f"{name} holds {wrong:.3g}, {side} the limit of {limit:g}", fix=fix)
 
 

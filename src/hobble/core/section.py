@@ -46,6 +46,16 @@ Gait = Literal["stand", "walk", "jog", "crouch", "jump", "bump"]
 PhaseMode = Literal["constant", "linear", "cubic"]
 
 
+def _check_printable(text: str) -> str:
+    if not text.isprintable():
+        raise ValueError("must not hold control characters")
+    return text
+
+
+# The name of a joint or of a column.
+ShortName = Annotated[str, Field(min_length=1, max_length=200), AfterValidator(_check_printable)]
+
+
 class Section(BaseModel):
     """A part of a YAML file. An unknown key is an error."""
 

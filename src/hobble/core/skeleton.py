@@ -5,13 +5,15 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Annotated, Any, Self
 
 import numpy as np
+from pydantic import Field, model_validator
 
 from hobble.core import quat
 from hobble.core.errors import HobbleError
 from hobble.core.quat import Array
+from hobble.core.section import Section, ShortName
 
 SIDE_WORDS = (("Left", "Right"), ("left", "right"), ("LEFT", "RIGHT"))
 # The letter of the side: alone, as in L_Leg, leg.r and Bip01 L Leg, or at the start of a name, as in LLeg and
@@ -33,6 +35,49 @@ def other_side(name: str) -> str:
         if right in name:
             return name.replace(right, left)
     return SIDE_LETTER.sub(lambda match: match[0].translate(OTHER_LETTER), name, count=1)
+
+
+# A coordinate of a joint from its parent, cm.
+Coordinate = Annotated[float, Field(ge=-1e5, le=1e5, allow_inf_nan=False)]
+Offset = tuple[Coordinate, Coordinate, Coordinate]
+
+
+class JointEntry(Section):
+    """A joint of a skeleton. parent: None for the root. offset: from the parent, in the rest pose, cm."""
+
+    parent: str | None
+    offset: Offset
+
+
+class SkeletonData(Section):
+    """A skeleton as plain data. `Skeleton` explains the keys."""
+
+    joints: Annotated[dict[ShortName, JointEntry], Field(min_length=1)]
+    roles: dict[str, str]
+    end_sites: dict[str, Offset] = Field(default_factory=dict)
+    links: tuple[tuple[str, str], ...] = ()
+    unseen: tuple[str, ...] = ()
+
+    @model_validator(mode="after")
+    def _joints_are_consistent(self) -> Self:
+        known: set[str] = set()  # names of the joints listed so far
+        for name, joint in self.joints.items():
+            if joint.parent is None and known:
+                raise ValueError(f"joint {name}: only the first joint may have no parent")
+            if joint.parent is not None and joint.parent not in known:
+                raise ValueError(f"joint {name}: its parent {joint.parent!r} must be listed before it")
+            known.add(name)
+        joint_names: dict[str, Any] = {  # key of the file -> names of joints in its value
+            "roles": self.roles.values(),
+            "end_sites": self.end_sites,
+            "links": [joint for link in self.links for joint in link],
+            "unseen": self.unseen,
+        }
+        for key, names in joint_names.items():
+            for name in names:
+                if name not in known:
+                    raise ValueError(f"{key}: there is no joint {name!r}")
+        return self
 
 
 @dataclass(frozen=True)

@@ -8,15 +8,21 @@ import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Any, TypedDict
+from typing import Annotated, Any, Literal
 
 import numpy as np
+from pydantic import Field
 
+from hobble.core.declared import read_declared
 from hobble.core.errors import HobbleError, InputError
 from hobble.core.files import read_json, write_json
 from hobble.core.quat import Array
+from hobble.core.section import Positive, PositiveFloat
+from hobble.core.skeleton import SkeletonData
+from hobble.core.untrusted import printable
 from hobble.rows.layout import RowLayout, column_count_without_terrain, fit_column_count
 
+Precision = Literal["float32", "float16", "bfloat16"]
 # Name of a precision -> NumPy's type of the stored numbers.
 STORED: dict[str, np.dtype[Any]] = {
     "float32": np.dtype("<f4"),
@@ -75,15 +81,11 @@ class Chunk:
     terrain fits (ground heights that suit a row) and of its bytes. crc32: its checksum.
     """
 
-    file: str
-    rows: int
-    fits: int
-    bytes: int
-    crc32: int
-
-    def to_dict(self) -> dict[str, Any]:
-        """Plain data for the manifest."""
-        return asdict(self)
+    file: Annotated[str, Field(pattern=r"^(train|held_out)/[0-9]+\.safetensors$")]
+    rows: Positive
+    fits: Positive
+    bytes: Annotated[int, Field(gt=0, le=1 << 40)]
+    crc32: Annotated[int, Field(ge=0, lt=1 << 32)]
 
 
 def write_chunk(folder: Path, file: str, arrays: Mapping[str, np.ndarray]) -> Chunk:
@@ -179,6 +181,17 @@ SPLITS = ("train", "held_out")
 
 
 @dataclass(frozen=True)
+class ClipEntry:
+    """What each entry of `Manifest.clips` has; a hurt version also has a `source`."""
+
+    clip: str
+    split: Literal["train", "held_out"]
+    rows: Annotated[int, Field(ge=0)]
+    pairs: Annotated[int, Field(ge=0)]
+    source: str = ""
+
+
+@dataclass(frozen=True)
 class Manifest:
     """What a database contains.
 
@@ -194,12 +207,12 @@ class Manifest:
     times. bytes: size of all chunks. limits: channel -> speed limits (`hobble.channels.speed_limits`).
     """
 
-    folder: str
+    folder: Annotated[str, Field(pattern=r"^rows-[0-9a-f]+$")]
     layout: RowLayout
     skeleton: Mapping[str, Any]
-    visits: int
-    dtype: str
-    joint_weight: float
+    visits: Positive
+    dtype: Precision
+    joint_weight: PositiveFloat
     clips: list[dict[str, Any]]
     chunks: Mapping[str, list[Chunk]]
     original_bytes: int
@@ -216,7 +229,7 @@ class Manifest:
         values["layout"] = self.layout.to_dict()
         # The skeleton is stored as text, because write_json sorts keys, but joints have to keep their order.
         values["skeleton"] = json.dumps(self.skeleton)
-        values["chunks"] = {split: [c.to_dict() for c in chunks] for split, chunks in self.chunks.items()}
+        values["chunks"] = {split: [asdict(c) for c in chunks] for split, chunks in self.chunks.items()}
         write_json(path / FILE, values)
 
     @classmethod
@@ -227,17 +240,22 @@ class Manifest:
             raise InputError(
                 path, f"not a complete database: it has no {FILE}, so its build did not finish", fix=HINT
             )
-        values = read_json(file)
+        values = read_declared(file, "the manifest", dict, read_json(file), HINT)
+        if (values.pop("format", ""), values.pop("version", 0)) != ("hobble database", VERSION):
+            raise InputError(file, f"not a database of format version {VERSION}", fix=HINT)
         try:
-            if values.pop("format") != "hobble database" or values.pop("version") != VERSION:
-                raise InputError(file, f"not a database of format version {VERSION}", fix=HINT)
             values["layout"] = RowLayout.from_dict(values["layout"])
-            values["skeleton"] = json.loads(values["skeleton"])
-            chunks = values["chunks"]
-            values["chunks"] = {split: [Chunk(**chunk) for chunk in chunks[split]] for split in SPLITS}
-            return cls(**values)
+            skeleton = json.loads(values["skeleton"])
+            keys = {key: value for key, value in skeleton.items() if key != "name"}
         except (KeyError, TypeError, ValueError, AttributeError) as error:
-            raise InputError(file, f"not a database's manifest ({error})", fix=HINT) from error
+            raise InputError(file, printable(f"not a database's manifest ({error})"), fix=HINT) from error
+        read_declared(file, "skeleton", SkeletonData, keys, HINT)
+        manifest = read_declared(file, "the manifest", cls, {**values, "skeleton": skeleton}, HINT)
+        read_declared(file, "clips", list[ClipEntry], manifest.clips, HINT)
+        read = {split: sum(c["rows"] for c in manifest.clips if c["split"] == split) for split in SPLITS}
+        if read != {split: manifest.row_count(split) for split in manifest.chunks}:
+            raise InputError(file, "its clips have other rows than its chunks", fix=HINT)
+        return manifest
 
 
 # Size of a database, and of the same data in the layout of Holden et al. (2017).
@@ -251,31 +269,16 @@ RELEASED_FRAMES = 465_990
 RELEASED_FLAT = 0.479
 
 
-class Sizes(TypedDict):
-    """Sizes of a database. A terrain fit of a frame is a set of ground heights that suit its motion.
+def database_sizes(manifest: Manifest) -> dict[str, Any]:
+    """The sizes of a database. A terrain fit of a frame is a set of ground heights that suit its motion.
 
-    joints: number of joints. dtype: type of the numbers on disk. frames: number of frames in both splits
-    together. pairs: number of pairs of a frame and a terrain fit that one pass over the data uses. It counts
-    the single fit of a frame on flat ground as often as the pass uses it. bytes: size of all chunks.
+    Keys. joints: number of joints. dtype: type of the numbers on disk. frames: number of frames in both
+    splits together. pairs: number of pairs of a frame and a terrain fit that one pass over the data uses. It
+    counts the single fit of a frame on flat ground as often as the pass uses it. bytes: size of all chunks.
     original_bytes: size of all pairs as rows of X, Y and P in float32. share: bytes / original_bytes.
     bytes_a_frame: bytes / frames, with the terrain fits. released_frames: number of frames of the released
     clips. released_bytes: their estimated size with the columns and number type of this database.
     """
-
-    joints: int
-    dtype: str
-    frames: int
-    pairs: int
-    bytes: int
-    original_bytes: int
-    share: float
-    bytes_a_frame: float
-    released_frames: int
-    released_bytes: int
-
-
-def database_sizes(manifest: Manifest) -> Sizes:
-    """The sizes of a database."""
     frames = sum(manifest.row_count(split) for split in manifest.chunks)
     layout, number_bytes = manifest.layout, STORED[manifest.dtype].itemsize
     frame_bytes = number_bytes * (column_count_without_terrain(layout) + layout.y_size) + INDEX_BYTES

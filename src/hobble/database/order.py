@@ -15,7 +15,6 @@ into sections of nearly equal length. With `visits` sections, each section is a 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -25,26 +24,17 @@ import numpy as np
 CHUNKS, ROWS, FITS = 1, 2, 3
 
 
-def random_generator(seed: int, *purpose: int) -> np.random.Generator:
-    """A new random generator, whose numbers depend only on the arguments.
-
-    seed: the seed in the configuration. purpose: CHUNKS, ROWS or FITS, then numbers of pass, layer etc.
-    """
-    return np.random.default_rng([seed, *purpose])
-
-
 def layer_parts(
-    rows: int, visits: int, section: int, sections: int, part: tuple[int, int] | None = None
+    rows: int, visits: int, section: int, sections: int, part: range
 ) -> Iterator[tuple[int, int, int]]:
     """Yield the parts of layers of which a section consists, as (layer, first place, last place + 1).
 
     rows: number of rows in a layer. visits: number of layers. section: number of the section, from 0.
-    sections: number of all sections. part: (start, stop), the visits of the section to yield; None: all.
+    sections: number of all sections. part: the numbers of those visits of the section to yield.
     """
     total = rows * visits
-    start, stop = total * section // sections, total * (section + 1) // sections
-    if part is not None:
-        start, stop = start + part[0], min(stop, start + part[1])
+    first = total * section // sections
+    start, stop = first + part.start, first + part.stop
     while start < stop:
         layer = start // rows
         end = min(stop, (layer + 1) * rows)
@@ -60,7 +50,7 @@ def chunk_groups(chunks: int, window: int, seed: int, pass_index: int, layer: in
     many as the group before, up to `window`. The first groups are small, so that the first rows of a layer
     are ready soon. They are well mixed even so, because all rows were permuted when they were written.
     """
-    order = random_generator(seed, CHUNKS, pass_index, layer).permutation(chunks)
+    order = np.random.default_rng([seed, CHUNKS, pass_index, layer]).permutation(chunks)
     groups, start, size = [], 0, 1
     while start < chunks:
         groups.append(order[start : start + size])
@@ -70,7 +60,7 @@ def chunk_groups(chunks: int, window: int, seed: int, pass_index: int, layer: in
 
 def row_order(rows: int, seed: int, pass_index: int, layer: int, group: int) -> np.ndarray:
     """(rows,) a random order of the rows of a group of chunks. rows: number of rows. group: its number."""
-    return random_generator(seed, ROWS, pass_index, layer, group).permutation(rows)
+    return np.random.default_rng([seed, ROWS, pass_index, layer, group]).permutation(rows)
 
 
 def pick_fits(
@@ -83,7 +73,7 @@ def pick_fits(
     if np.all(count <= 1):
         return np.zeros(len(count), np.int64)
     # (R, visits) random numbers. Sorting those of a row gives the permutation of its fits in this pass.
-    draws = random_generator(seed, FITS, pass_index, chunk).random((len(count), visits))
+    draws = np.random.default_rng([seed, FITS, pass_index, chunk]).random((len(count), visits))
     place = layer % np.maximum(count, 1)
     picked = np.zeros(len(count), np.int64)
     for fits in np.unique(count[count > 1]):
@@ -125,89 +115,30 @@ def rows_and_fits(
     return chosen, first[chosen] + np.concatenate(picked)[chosen]
 
 
-# How training processes share the samples of a section: which samples each process reads for each batch.
+# How training processes share the samples of a section.
 #
 # A section is a part of a pass over the data. Its samples have a fixed order, which is cut into consecutive
 # stretches. A batch takes samples from every stretch, about as many from each. With one stretch, a batch is a
-# run of consecutive samples. Each process fills certain places of a batch, the same in all batches, and reads
-# only the stretches whose samples go to these places. So the content of a batch depends on the number of
-# stretches, but not on the number of processes.
+# run of consecutive samples. Each process reads certain stretches whole, which fill its places in every
+# batch. So the content of a batch depends on the number of stretches, but not on the number of processes.
 
 
-@dataclass(frozen=True)
-class SampleRange:
-    """A stretch: samples `start` to `stop` - 1 of a section, and which of them this process reads.
+def stretches_of_section(total: int, batch: int, count: int) -> list[tuple[range, int]]:
+    """The `count` stretches of a section: the numbers of their samples, and how many of them a batch takes.
 
-    share: number of samples that each batch takes from the stretch. low, high: of these samples, numbered
-    from 0, this process reads low to high - 1. Other processes read the others.
+    total: number of samples of the section. batch: samples of a batch. The last batch may be shorter.
     """
-
-    start: int
-    stop: int
-    share: int
-    low: int
-    high: int
-
-    @property
-    def rows(self) -> int:
-        """Number of samples of the stretch that this process reads."""
-        full, rest = divmod(self.stop - self.start, self.share)
-        return full * (self.high - self.low) + max(0, min(rest, self.high) - self.low)
-
-    def own_samples(self, first: int, count: int) -> np.ndarray | slice:
-        """Which of `count` consecutive samples this process reads: a mask (count,), or slice(None) for all.
-
-        first: number of the first of these samples in the stretch, from 0.
-        """
-        if self.high - self.low == self.share:
-            return slice(None)
-        place = (first + np.arange(count)) % self.share
-        return (place >= self.low) & (place < self.high)
+    full, rest = divmod(total, batch)  # full batches, and samples of a shorter last batch
+    edges = [
+        batch * number // count for number in range(count + 1)
+    ]  # places of a batch where stretches begin
+    starts = [full * edge + min(rest, edge) for edge in edges]
+    return [
+        (range(*ends), places)
+        for ends, places in zip(pairwise(starts), (b - a for a, b in pairwise(edges)), strict=True)
+    ]
 
 
-@dataclass(frozen=True)
-class SectionSharing:
-    """A section of `total` samples in batches of `batch` samples, as one process sees it.
-
-    stretches: number of stretches, at most `batch`. own: the places in a batch, from 0, that this process
-    fills.
-    """
-
-    total: int
-    batch: int
-    stretches: int
-    own: range
-
-    @classmethod
-    def for_process(
-        cls, total: int, batch: int, stretches: int = 1, rank: int = 0, processes: int = 1
-    ) -> SectionSharing:
-        """A section as process `rank` (from 0) of `processes` processes sees it.
-
-        The numbers of samples that the processes read of a batch differ by at most one.
-        """
-        return cls(total, batch, stretches, own_places(batch, rank, processes))
-
-    def batch_sizes(self) -> Iterator[tuple[int, int]]:
-        """For each batch: (number of its samples, number of those that this process reads)."""
-        for start in range(0, self.total, self.batch):
-            size = min(self.batch, self.total - start)
-            yield size, max(0, min(size, self.own.stop) - self.own.start)
-
-    def own_stretches(self) -> list[SampleRange]:
-        """The stretches that fill this process's places, in the order of the places."""
-        full, rest = divmod(self.total, self.batch)  # full batches, and samples of a shorter last batch
-        # Stretch s fills places edges[s] to edges[s + 1] - 1 of each batch.
-        edges = [self.batch * s // self.stretches for s in range(self.stretches + 1)]
-        ranges = []
-        for first, end in pairwise(edges):
-            low, high = (min(max(place, first), end) - first for place in (self.own.start, self.own.stop))
-            if low < high:
-                start, stop = (full * edge + min(rest, edge) for edge in (first, end))
-                ranges.append(SampleRange(start, stop, end - first, low, high))
-        return ranges
-
-
-def own_places(batch: int, rank: int, processes: int) -> range:
-    """The places in a batch that process `rank` of `processes` fills."""
-    return range(batch * rank // processes, batch * (rank + 1) // processes)
+def own_part(count: int, rank: int, processes: int) -> range:
+    """Which of `count` stretches, or places of a batch, belong to process `rank` of `processes`."""
+    return range(count * rank // processes, count * (rank + 1) // processes)

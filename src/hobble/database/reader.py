@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from itertools import chain, cycle
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
@@ -19,7 +19,6 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 
 from hobble.core.errors import HobbleError
-from hobble.core.files import load_npz
 from hobble.core.quat import Array
 from hobble.database import order
 from hobble.database.chunks import (
@@ -30,8 +29,7 @@ from hobble.database.chunks import (
     to_floats,
     to_stored_type,
 )
-from hobble.database.order import SampleRange
-from hobble.database.statistics import Statistics
+from hobble.database.statistics import Statistics, read_statistics
 from hobble.rows.layout import RowLayout, column_count_without_terrain, compose, fit_column_count
 
 Buffers = Mapping[str, np.ndarray]
@@ -105,14 +103,16 @@ class Block(NamedTuple):
 class UncomposedRows(NamedTuple):
     """n standardised rows, float32, with all their terrain fits. Rows and fits are not yet composed.
 
-    x: (n, X without terrain). y: (n, Y). p: (n,) phase. fits: (m, columns) the fits, row after row: ground
-    heights, then the lift in cm. The lift says how far the fit's mean height is above the average of these
-    means over all fits of the row. first_fit: (n,) index of each row's first fit in `fits`.
+    x: (n, X without terrain). y: (n, Y). p: (n,) phase. clip: (n,) index into `Database.clips`. fits: (m,
+    columns) the fits, row after row: ground heights, then the lift in cm. The lift says how far the fit's
+    mean height is above the average of these means over all fits of the row. first_fit: (n,) index of each
+    row's first fit in `fits`.
     """
 
     x: Array
     y: Array
     p: Array
+    clip: np.ndarray
     fits: Array
     first_fit: np.ndarray
 
@@ -135,33 +135,22 @@ class Database:
     _phase_factor: float = 1.0  # of the stored standardised change of phase
 
     @classmethod
-    def open(cls, path: str | Path, memory_mb: int = 512) -> Database:
+    def open(cls, path: str | Path, memory_mb: int = 512, phase_weight: float = 1.0) -> Database:
         """Open the database folder `path`.
 
         memory_mb: MiB of memory for rows, for each section that is being read. A database that fits is read
-        once. The chunks of a larger one are read again for every layer. Raises InputError if the database is
-        not complete.
+        once. The chunks of a larger one are read again for every layer. phase_weight: factor of the
+        standardised change of phase. Its squared error then counts `phase_weight`^2 times in a mean over the
+        columns of Y. Raises InputError if the database is not complete.
         """
         path = Path(path)
         manifest = Manifest.load(path)
-        statistics = Statistics(**load_npz(path / manifest.folder / STATISTICS))
-        return cls(path, manifest, statistics, memory_mb)
-
-    def with_phase_weight(self, weight: float) -> Database:
-        """The same database, with the standardised change of phase (a column of Y) multiplied by `weight`.
-
-        The squared error of this column then counts `weight`^2 times in a mean over the columns of Y.
-        """
-        if weight == 1.0:
-            return self
-        column, y_std = self.layout.y_phase_change, self.statistics.y_std.copy()
-        y_std[column] /= weight
-        factor = self._phase_factor * float(self.statistics.y_std[column][0]) / float(y_std[column][0])
-        statistics = replace(self.statistics, y_std=y_std)
-        weight *= self.phase_weight
-        return Database(
-            self.path, self.manifest, statistics, self.memory_mb, phase_weight=weight, _phase_factor=factor
-        )
+        statistics = read_statistics(path / manifest.folder / STATISTICS, manifest.layout)
+        column = manifest.layout.y_phase_change
+        stored = float(statistics.y_std[column][0])
+        statistics.y_std[column] /= phase_weight
+        factor = stored / float(statistics.y_std[column][0])
+        return cls(path, manifest, statistics, memory_mb, phase_weight=phase_weight, _phase_factor=factor)
 
     @property
     def layout(self) -> RowLayout:
@@ -207,7 +196,7 @@ class Database:
         sections: int,
         seed: int,
         block_rows: int = BLOCK_ROWS,
-        stretch: SampleRange | None = None,
+        part: range | None = None,
         window: int | None = None,
     ) -> Iterator[Block]:
         """One section of one pass, shuffled, as blocks of `block_rows` rows. The last block may be shorter.
@@ -217,25 +206,23 @@ class Database:
         memory. They do not depend on what was read before. A thread makes the next block.
 
         pass_index, section: number of the pass and of the section, from 0. seed: of the random order.
-        stretch: the part of the section to read; None: all of it. window: number of chunks in memory at a
-        time; None: as the method `window` says. Raises InputError, which names the file, if a chunk is
-        damaged.
+        part: the numbers of the samples of the section to read; None: all of it. window: number of chunks in
+        memory at a time; None: as `chunks_per_window` says. Raises InputError, which names the file, if a
+        chunk is damaged.
         """
         if not 0 <= section < sections:
             raise HobbleError(f"there is no section {section}: a pass of {sections} has 0 to {sections - 1}")
         if self.row_count(split) == 0:
             return iter(())
-        total = self.section_sample_count(split, section, sections)
-        stretch = stretch or SampleRange(0, total, total, 0, total)
-        cut = stretch.start, stretch.stop
-        spans = order.layer_parts(self.row_count(split), self.manifest.visits, section, sections, cut)
+        part = range(self.section_sample_count(split, section, sections)) if part is None else part
+        spans = order.layer_parts(self.row_count(split), self.manifest.visits, section, sections, part)
         window = window or self.chunks_per_window(split, block_rows)
         buffers = self._two_buffer_sets(split, window)
         picked = chain.from_iterable(
             self._pick_rows(split, (seed, pass_index, layer), start, stop, window, buffers)
             for layer, start, stop in spans
         )
-        return read_ahead(self._compose_blocks(_own_samples(picked, stretch), stretch.rows, block_rows))
+        return read_ahead(self._compose_blocks(picked, len(part), block_rows))
 
     def each_row(self, split: str) -> Iterator[UncomposedRows]:
         """Each row of a split once, with its fits, in the order of the chunks, BLOCK_ROWS at a time."""
@@ -253,7 +240,7 @@ class Database:
                 first, count = loaded.first_fit[part], loaded.count[part]
                 fits = to_floats(loaded.fits[first[0] : first[-1] + count[-1]]).astype(np.float32)
                 x, y = (to_floats(table[part]).astype(np.float32) for table in (loaded.x, loaded.y))
-                yield UncomposedRows(x, y, loaded.phase[part], fits, first - first[0])
+                yield UncomposedRows(x, y, loaded.phase[part], loaded.clip[part], fits, first - first[0])
 
     def _pick_rows(
         self,
@@ -398,15 +385,6 @@ class Database:
         x = np.empty((rows, self.layout.x_size), np.float32)
         y = np.empty((rows, self.layout.y_size), np.float32)
         return Block(x, y, np.empty(rows, np.float32), np.empty(rows, np.int32), np.empty(rows, np.int32))
-
-
-def _own_samples(picked: Iterator[PickedRows], stretch: SampleRange) -> Iterator[PickedRows]:
-    """Only those of the picked rows that this process reads. picked: all rows of the stretch, in order."""
-    done = 0
-    for window, rows, fits in picked:
-        own = stretch.own_samples(done, len(rows))
-        done += len(rows)
-        yield window, rows[own], fits[own]
 
 
 def read_ahead(items: Iterator[Item]) -> Iterator[Item]:

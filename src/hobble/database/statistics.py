@@ -7,17 +7,22 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from hobble.channels import channel
 from hobble.channels.channel import CONSTANT_BELOW, SILENCING_STD
+from hobble.core.declared import ArrayOf, check_arrays
+from hobble.core.files import load_npz
 from hobble.core.quat import Array
 from hobble.rows.clip_rows import ClipRows
 from hobble.rows.layout import TERRAIN, RowLayout, blocks_without_terrain, body_layout, lower_joints
 
 UNSEEN = 1e-10  # input weight of a joint that the network shall not see, as in Holden et al. (2017)
+LEAST_STD = 1e-30  # of a column in a file of statistics; rows are divided by it
+REMAKE = "Delete the folder of the database. The next run makes it again."
 BATCH = 2048  # rows of a clip are converted to float64 so many at a time, to use little memory
 
 
@@ -85,6 +90,16 @@ class Statistics:
     x_std: Array = field(repr=False)
     y_mean: Array = field(repr=False)
     y_std: Array = field(repr=False)
+
+
+def read_statistics(path: Path, layout: RowLayout) -> Statistics:
+    """Read the file of a database's statistics. Raises InputError if it does not fit the layout."""
+    arrays = load_npz(path)
+    sizes = {"x": layout.x_size, "y": layout.y_size}
+    shapes = {f"{block}_mean": ArrayOf((size,)) for block, size in sizes.items()}
+    shapes |= {f"{block}_std": ArrayOf((size,), low=LEAST_STD) for block, size in sizes.items()}
+    check_arrays(path, arrays, shapes, fix=REMAKE)
+    return Statistics(**{name: arrays[name] for name in shapes})
 
 
 def clip_moments(rows: ClipRows, layout: RowLayout) -> tuple[Moments, Moments]:

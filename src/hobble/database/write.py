@@ -35,6 +35,7 @@ from hobble.database.chunks import (
     STORED,
     Chunk,
     Manifest,
+    Precision,
     to_stored_type,
     write_chunk,
 )
@@ -405,7 +406,7 @@ def write_database(
     sources: Mapping[str, str] | None = None,
     every: int = 1,
     joint_weight: float,
-    dtype: str = "float32",
+    dtype: Precision = "float32",
     seed: int = 1,
     chunk_bytes: int = CHUNK_BYTES,
 ) -> Manifest:

@@ -30,7 +30,7 @@ from hobble.measures.motion_quality import (
 from hobble.measures.sample import HURT_VERSION, ClipPart, clip_parts
 from hobble.models.load import load_network
 from hobble.models.network import Network
-from hobble.rows.captured import captured_stretches, headings, rotate_by_yaw
+from hobble.rows.clip_rows import captured_stretches, headings, rotate_by_yaw
 from hobble.runtime.animation import ProceduralAnimation
 from hobble.runtime.options import Runtime
 

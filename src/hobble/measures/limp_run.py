@@ -39,8 +39,7 @@ from hobble.measures.sample import HURT_VERSION, ClipPart, clip_parts, sample_to
 from hobble.measures.walks import FPS, channel_values, mean_of_known, share_of_true, spearman
 from hobble.models.load import load_network
 from hobble.models.network import Network
-from hobble.rows.captured import captured_stretches, rotate_by_yaw
-from hobble.rows.clip_rows import ClipRows
+from hobble.rows.clip_rows import ClipRows, captured_stretches, rotate_by_yaw
 from hobble.runtime.animation import ProceduralAnimation
 from hobble.runtime.options import Runtime
 

@@ -29,7 +29,7 @@ from hobble.measures.walks import (
 )
 from hobble.models.load import load_network
 from hobble.models.network import Network
-from hobble.rows.captured import Captured
+from hobble.rows.clip_rows import Captured
 from hobble.rows.layout import GAITS
 from hobble.runtime.options import Runtime
 

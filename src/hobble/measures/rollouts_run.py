@@ -27,8 +27,7 @@ from hobble.measures.measure import SPLITS, MeasureInputs, Outcome, Row
 from hobble.measures.sample import ClipPart, LoadedPart, Sample, clip_parts, sample_to_measure, with_sample
 from hobble.models.load import load_network
 from hobble.models.network import Network, Predictor
-from hobble.rows.captured import rotate_by_yaw, unbroken_stretches
-from hobble.rows.clip_rows import ClipRows, Excerpt, compose_pairs
+from hobble.rows.clip_rows import ClipRows, Excerpt, compose_pairs, rotate_by_yaw, unbroken_stretches
 from hobble.rows.layout import GAITS, RowLayout
 from hobble.runtime.rule import joint_place, movement_share, phase_change
 

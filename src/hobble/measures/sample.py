@@ -28,12 +28,13 @@ import numpy as np
 
 from hobble.core.files import Json
 from hobble.measures.measure import MeasureInputs, SampleOptions
-from hobble.rows.captured import Captured, captured_stretches
 from hobble.rows.clip_rows import (
+    Captured,
     ClipRows,
     Excerpt,
     ExcerptKind,
     RowsSummary,
+    captured_stretches,
     load_clip_rows,
     load_excerpt,
     load_summary,

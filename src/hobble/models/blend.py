@@ -22,7 +22,7 @@ from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 from hobble.models.forward import forward
 from hobble.models.load import read_layers
-from hobble.models.model import Blend, LayerMirror, TrainedOptions, TrainingStep
+from hobble.models.model import LayerMirror, Trainable, TrainedOptions, TrainingStep
 from hobble.models.network import Export, pack_layer, standardise_inputs
 from hobble.models.onnx_file import Graph, Node, OnnxNetwork, add_layers, write_checked
 from hobble.rows.layout import ColumnMirror, RowLayout
@@ -179,7 +179,7 @@ class BlendedNetwork(OnnxNetwork):
 
 
 @dataclass(frozen=True)
-class TrainableBlend(Blend):
+class TrainableBlend(Trainable):
     """A blended stack in training. Its first layers are those of the gate, if it has one.
 
     units: units of each layer, the columns of X first. sets: K.
@@ -190,8 +190,16 @@ class TrainableBlend(Blend):
     units: tuple[int, ...]
     sets: int
 
+    @abstractmethod
+    def shares(self, gate: list[Tensor], x: Tensor, p: Tensor, masks: list[Tensor] | None) -> Tensor:
+        """(B, K): the share of each set, for x (B, X) at phases p (B,).
+
+        gate: the layers of the gate. masks: their dropout masks, None without dropout. If there is a gate,
+        PyTorch has to be able to differentiate the shares.
+        """
+
     def extended(self, x: Tensor, p: Tensor) -> Tensor:
-        """As in `Blend`."""
+        """The inputs of the first layer, (B, X + extra inputs), for x (B, X) at phases p (B,)."""
         return x
 
     @property
@@ -208,7 +216,7 @@ class TrainableBlend(Blend):
 
     @property
     def gate_layers(self) -> int:
-        """As in `Blend`."""
+        """The number of layers of the gate. They come first in `layers`."""
         return max(len(self.gate_units) - 1, 0)
 
     @property

@@ -87,20 +87,24 @@ class BuiltOptions(Options):
 
 
 class FinishedNetwork(Protocol):
-    """The result of training or building, ready to be written to a file."""
+    """The result of training or building, ready to be written to a file.
 
-    @property
-    def kind(self) -> str:
-        """Name of its kind, and of the kind's folder in hobble.models."""
+    kind: name of its kind, and of the kind's folder in hobble.models.
+    """
 
+    kind: ClassVar[str]
+
+    @abstractmethod
     def arrays(self) -> dict[str, np.ndarray]:
         """The arrays of its file; `Network.read` builds the network from them."""
 
     @property
+    @abstractmethod
     def file_metadata(self) -> dict[str, Any]:
         """Its entries in the file's metadata, as data for JSON. One is `network`, its formula in one line."""
 
     @property
+    @abstractmethod
     def description(self) -> str:
         """Its size in a few words. A training resumes only from a checkpoint with the same words."""
 
@@ -147,7 +151,7 @@ class LayerMirror(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Trainable(ABC):
+class Trainable(FinishedNetwork, ABC):
     """A network in training; a `FinishedNetwork` at any time. Its parameters are in one buffer, layer by
     layer.
 
@@ -186,20 +190,6 @@ class Trainable(ABC):
         products to bfloat16.
         """
 
-    @abstractmethod
-    def arrays(self) -> dict[str, np.ndarray]:
-        """As in `FinishedNetwork`."""
-
-    @property
-    @abstractmethod
-    def file_metadata(self) -> dict[str, Any]:
-        """As in `FinishedNetwork`."""
-
-    @property
-    @abstractmethod
-    def description(self) -> str:
-        """As in `FinishedNetwork`."""
-
     def mirrors(self, inputs: ColumnMirror, outputs: ColumnMirror) -> list[LayerMirror]:
         """How each layer changes if standardised X and Y are mirrored.
 
@@ -234,24 +224,3 @@ class Trainable(ABC):
             bound = (6.0 / (inputs * outputs)) ** 0.5
             layer[:, :, :-1] = layer.new_tensor(generator.uniform(-bound, bound, (outputs, sets, inputs)))
         return self
-
-
-class Blend(Trainable):
-    """What the training steps of blended stacks need of the network (`hobble.models.step`)."""
-
-    @property
-    @abstractmethod
-    def gate_layers(self) -> int:
-        """The number of layers of the gate. They come first in `layers`."""
-
-    @abstractmethod
-    def shares(self, gate: list[Tensor], x: Tensor, p: Tensor, masks: list[Tensor] | None) -> Tensor:
-        """(B, K): the share of each set, for x (B, X) at phases p (B,).
-
-        gate: the layers of the gate. masks: their dropout masks, None without dropout. If there is a gate,
-        PyTorch has to be able to differentiate the shares.
-        """
-
-    @abstractmethod
-    def extended(self, x: Tensor, p: Tensor) -> Tensor:
-        """The inputs of the first layer, (B, X + extra inputs), for x (B, X) at phases p (B,)."""

@@ -15,6 +15,7 @@ changes only the speed.
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -98,7 +99,34 @@ class Stack:
         _run(self.weights, self.numbers, self.plan, shares, z, out)
 
 
-class BlendPredictor:
+class StandardisingPredictor(ABC):
+    """What the predictors of all kinds share. A class of them has `evaluate`; see `Predictor`."""
+
+    def __init__(self, network: Network) -> None:
+        self.network = network
+        self._x_mean, self._x_inverse = (
+            np.ascontiguousarray(a, np.float32) for a in (network.x_mean, inverse_or_0(network.x_std))
+        )
+
+    def standardise(self, x: Array, z: Array) -> None:
+        """As in `Predictor`."""
+        standardise_columns(x, self._x_mean, self._x_inverse, z)
+
+    @abstractmethod
+    def evaluate(self, z: Array, phase: Array, out: Array, *memory: Any) -> None:
+        """As in `Predictor`."""
+
+    def predict(self, x: Array, phase: Array, out: Array | None = None, *memory: Any, **named: Any) -> Array:
+        """As in `Predictor`."""
+        z = np.empty_like(x)
+        self.standardise(x, z)
+        if out is None:
+            out = np.empty((len(x), len(self.network.y_mean)), np.float32)
+        self.evaluate(z, phase, out, *memory, **named)
+        return out
+
+
+class BlendPredictor(StandardisingPredictor):
     """A `Predictor` of a blended stack.
 
     weights, biases: of its layers. shares: finds their shares. extended: `BlendedNetwork.extended`. storage:
@@ -114,28 +142,13 @@ class BlendPredictor:
         extended: Callable[[Array, Array], Array],
         storage: str,
     ) -> None:
-        self.network, self._shares, self._extended = network, shares, extended
+        super().__init__(network)
+        self._shares, self._extended = shares, extended
         self._stack = Stack(weights, biases, storage, network.y_mean, network.y_std)
-        self._x_mean, self._x_inverse = (
-            np.ascontiguousarray(a, np.float32) for a in (network.x_mean, inverse_or_0(network.x_std))
-        )
 
-    def standardise(self, x: Array, z: Array) -> None:
-        """As in `Predictor`."""
-        standardise_columns(x, self._x_mean, self._x_inverse, z)
-
-    def evaluate(self, z: Array, phase: Array, out: Array) -> None:
+    def evaluate(self, z: Array, phase: Array, out: Array, *memory: Any) -> None:
         """As in `Predictor`."""
         self._stack.run(self._shares(z, phase), self._extended(z, phase), out)
-
-    def predict(self, x: Array, phase: Array, out: Array | None = None) -> Array:
-        """As in `Predictor`."""
-        z = np.empty_like(x)
-        self.standardise(x, z)
-        if out is None:
-            out = np.empty((len(x), len(self.network.y_mean)), np.float32)
-        self.evaluate(z, phase, out)
-        return out
 
 
 @njit(fastmath=True)

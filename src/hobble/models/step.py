@@ -14,7 +14,7 @@ x, but it would take several times the memory traffic.
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numba
 import numpy as np
@@ -23,7 +23,10 @@ from torch import Tensor
 from torch.nn.functional import elu
 
 from hobble.core.compiled import njit
-from hobble.models.model import ALL_ROWS, Blend
+from hobble.models.model import ALL_ROWS
+
+if TYPE_CHECKING:
+    from hobble.models.blend import TrainableBlend
 
 # oneDNN's product of float32 matrices has 512-bit kernels for all processors. PyTorch's default, MKL, has
 # them only for Intel's. For products with fewer multiplications and additions than this, calling it takes
@@ -44,7 +47,7 @@ def product(a: Tensor, b: Tensor) -> Tensor:
 
 
 def evaluate(
-    network: Blend,
+    network: TrainableBlend,
     layers: list[Tensor],
     x: Tensor,
     p: Tensor,
@@ -77,7 +80,7 @@ class AutogradStep:
     round the factors of the products to bfloat16. Sums and everything else stay float32.
     """
 
-    def __init__(self, network: Blend, dropout: float, half: bool = False) -> None:
+    def __init__(self, network: TrainableBlend, dropout: float, half: bool = False) -> None:
         self.network, self.keep, self.half = network, 1.0 - dropout, half
         self.generator = torch.Generator(network.flat.device)
         self.gradients: list[Tensor] = []

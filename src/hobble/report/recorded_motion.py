@@ -17,8 +17,15 @@ from hobble.figure.gltf import fitted_rotations
 from hobble.figure.mesh import body_mesh, mesh_key
 from hobble.figure.pack import packed_turns
 from hobble.models.network import Network
-from hobble.rows.captured import headings, root_path, rotate_by_yaw, unbroken_stretches
-from hobble.rows.clip_rows import ClipRows, compose_pairs, load_clip_rows
+from hobble.rows.clip_rows import (
+    ClipRows,
+    compose_pairs,
+    headings,
+    load_clip_rows,
+    root_path,
+    rotate_by_yaw,
+    unbroken_stretches,
+)
 from hobble.runtime.export import restore_bone_lengths
 
 FPS = 20  # frame rate of the motion in the page

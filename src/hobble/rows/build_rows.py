@@ -14,6 +14,7 @@ import numpy as np
 
 from hobble.channels import channel
 from hobble.core.clip import Clip
+from hobble.core.declared import ArrayOf, check_arrays
 from hobble.core.errors import InputError
 from hobble.core.quat import Array
 from hobble.motion.root import (
@@ -25,7 +26,7 @@ from hobble.motion.root import (
     vectors_to_root,
 )
 from hobble.rows.clip_rows import ClipRows
-from hobble.rows.layout import RowLayout
+from hobble.rows.layout import CONTACTS, GAITS, RowLayout
 
 Arrays = Mapping[str, np.ndarray]
 
@@ -207,16 +208,14 @@ def _check(
     frame: np.ndarray,
 ) -> None:
     """Raise InputError if the arguments of `build_clip_rows` do not match. frame: (R,) frames of the rows."""
-    lengths = {"labels": len(labels["phase"])}
-    lengths |= {f"values of {channel_name}": len(values) for channel_name, values in channels.items()}
-    for what, length in lengths.items():
-        if length != len(clip):
-            raise InputError(name, f"{what} have {length} frames, the clip has {len(clip)}", fix=MAKE_AGAIN)
-    for channel_name, values in channels.items():
-        columns = len(channel(channel_name).columns(clip.skeleton))
-        if values.shape[1] != columns:
-            problem = f"{channel_name} has {values.shape[1]} columns where the skeleton needs {columns}"
-            raise InputError(name, problem, fix=MAKE_AGAIN)
+    widths = {each: len(channel(each).columns(clip.skeleton)) for each in channels}
+    declared = {
+        "phase": ArrayOf(("frames of the clip",), low=0, high=1),
+        "gait": ArrayOf(("frames of the clip", len(GAITS)), low=-1e-3, high=1.001),
+        "contacts": ArrayOf(("frames of the clip", len(CONTACTS)), "biuf", 0, 1),
+        **{each: ArrayOf(("frames of the clip", width)) for each, width in widths.items()},
+    }
+    check_arrays(name, {**labels, **channels}, declared, {"frames of the clip": len(clip)}, MAKE_AGAIN)
     if not np.array_equal(terrain["frame"], frame):
         raise InputError(
             name, "its terrain was fitted to other cycles than its labels have now", fix=MAKE_AGAIN

@@ -12,18 +12,31 @@ from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, field, replace
 from itertools import pairwise
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Annotated, Any, Literal, NamedTuple
 
 import numpy as np
+from pydantic import Field
 
 from hobble.core.array_parts import ArrayParts
+from hobble.core.declared import ArrayOf, check_arrays, read_declared
 from hobble.core.errors import InputError
 from hobble.core.files import load_npz, read_json, save_npz, write_json
 from hobble.core.quat import Array
-from hobble.rows.layout import GAITS, RowLayout, body_column_count, body_layout, compose, frame_inputs
+from hobble.core.section import Finite
+from hobble.core.untrusted import printable
+from hobble.rows.layout import (
+    GAITS,
+    RowLayout,
+    body_column_count,
+    body_layout,
+    compose,
+    frame_inputs,
+    lower_joints,
+)
 
 CHANNEL_PREFIX = "channel_"  # in a file, the name of each channel's array begins with it
 DELETE_IT = "Delete it; the next run makes it again."
+MOST_ROWS = 1 << 28  # of a clip
 
 
 @dataclass(frozen=True)
@@ -87,34 +100,24 @@ class ClipRows:
 
         where: file or clip that the message names.
         """
-        layout, rows, fits = self.layout, len(self.p), int(np.sum(self.fits))
-        expected = {
-            "x": (rows, body_column_count(layout)),
-            "y": (rows, layout.y_size),
-            "frame": (rows,),
-            "cycle": (rows,),
-            "fits": (rows,),
-            "heights": (fits, 3 * layout.samples),
-            "mean": (fits,),
-        }
+        layout = self.layout
         if set(self.channels) != set(dict(layout.channels)):
             raise InputError(where, "its channels are not those that its layout names", fix=DELETE_IT)
-        tables = {name: getattr(self, name) for name in expected} | dict(self.channels)
-        expected |= {name: (rows, columns) for name, columns in layout.channels}
-        for name, shape in expected.items():
-            if tables[name].shape != shape:
-                raise InputError(where, f"{name} has shape {tables[name].shape}, not {shape}", fix=DELETE_IT)
-        if rows and np.min(self.fits) < 1:
-            frame = int(self.frame[np.argmin(self.fits)])
-            raise InputError(where, "a row has no terrain fit", frame=frame, fix=DELETE_IT)
-        for name in ("x", "y", "p", *self.channels):
-            finite = np.isfinite(self.p if name == "p" else tables[name])
-            bad = ~(finite if finite.ndim == 1 else finite.all(axis=1))
+        widths = {"x": body_column_count(layout), "y": layout.y_size, **dict(layout.channels)}
+        by_row = {name: ArrayOf(("rows", width), finite=False) for name, width in widths.items()}
+        by_row["p"] = ArrayOf(("rows",), low=0, high=1, finite=False)
+        counts = {
+            name: ArrayOf(("rows",), "iu", low) for name, low in (("frame", 0), ("cycle", 0), ("fits", 1))
+        }
+        tables = {**vars(self), **self.channels}
+        check_arrays(where, tables, by_row | counts, fix=DELETE_IT)
+        for name in by_row:
+            bad = ~np.isfinite(tables[name]).all(axis=tuple(range(1, tables[name].ndim)))
             if bad.any():
                 frame = int(self.frame[np.argmax(bad)])
                 raise InputError(where, f"{name} has a value that is not finite", frame=frame, fix=DELETE_IT)
-        if not (np.isfinite(self.heights).all() and np.isfinite(self.mean).all()):
-            raise InputError(where, "terrain heights are not finite", fix=DELETE_IT)
+        grounds = {"heights": ArrayOf(("fits", 3 * layout.samples)), "mean": ArrayOf(("fits",))}
+        check_arrays(where, tables, grounds, {"fits": int(np.sum(self.fits))}, DELETE_IT)
 
 
 class Pairs(NamedTuple):
@@ -195,8 +198,8 @@ def read_outline(source: ClipRows | str | Path) -> Outline:
     try:
         layout = RowLayout.from_dict(json.loads(str(data["layout"])))
         return Outline(layout, json.loads(str(data["skeleton"])), data["fits"], int(data["visits"]))
-    except (TypeError, ValueError) as error:
-        raise InputError(source, f"not a file of rows ({error})", fix=DELETE_IT) from error
+    except (AttributeError, KeyError, TypeError, ValueError) as error:
+        raise InputError(source, printable(f"not a file of rows ({error})"), fix=DELETE_IT) from error
 
 
 def load_clip_rows(path: str | Path, part: tuple[int, int] | None = None) -> ClipRows:
@@ -214,8 +217,8 @@ def load_clip_rows(path: str | Path, part: tuple[int, int] | None = None) -> Cli
         channel_keys = [key for key in data if key.startswith(CHANNEL_PREFIX)]
         data["channels"] = {key.removeprefix(CHANNEL_PREFIX): data.pop(key) for key in channel_keys}
         rows = ClipRows(**data)
-    except (KeyError, TypeError, ValueError) as error:
-        raise InputError(path, f"not a file of rows ({error})", fix=DELETE_IT) from error
+    except (AttributeError, KeyError, TypeError, ValueError) as error:
+        raise InputError(path, printable(f"not a file of rows ({error})"), fix=DELETE_IT) from error
     rows.check(path)
     return rows
 
@@ -277,8 +280,8 @@ class ExcerptKind:
     the channels that have a value other than 0 in some row.
     """
 
-    gait: str
-    speed: float
+    gait: Literal[GAITS]  # type: ignore[valid-type]
+    speed: Finite
     channels: tuple[str, ...]
 
 
@@ -339,7 +342,7 @@ class RowsSummary:
     """
 
     clip: str
-    rows: int
+    rows: Annotated[int, Field(ge=0, le=MOST_ROWS)]
     kinds: tuple[ExcerptKind, ...] = field(repr=False)
 
     @property
@@ -363,18 +366,121 @@ def save_summary(path: str | Path, summary: RowsSummary) -> None:
 
 def load_summary(path: str | Path) -> RowsSummary:
     """Read what `save_summary` wrote. Raises InputError if the file holds something else."""
-    values: Mapping[str, Any] = read_json(Path(path))
-    try:
-        kinds = tuple(
-            ExcerptKind(**{**kind, "channels": tuple(kind["channels"])}) for kind in values["kinds"]
-        )
-        summary = RowsSummary(str(values["clip"]), int(values["rows"]), kinds)
-        summary.excerpts  # noqa: B018 - raises ValueError if there is not one kind for each excerpt
-    except (KeyError, TypeError, ValueError) as error:
-        raise InputError(path, f"not the summary of a clip ({error})", fix=DELETE_IT) from error
+    summary = read_declared(path, "the summary", RowsSummary, read_json(Path(path)), DELETE_IT)
+    if len(summary.kinds) != len(cut_into_excerpts(summary.clip, summary.rows)):
+        raise InputError(path, "the summary has not one kind for each excerpt", fix=DELETE_IT)
     return summary
 
 
 def shuffle_key(name: str) -> bytes:
     """A key for sorting names. The order looks random, but a new name does not change that of the others."""
     return hashlib.sha256(name.encode()).digest()
+
+
+# Captured motion for the measurements: stretches of consecutive frames of a clip, in root coordinates.
+
+
+@dataclass(frozen=True)
+class Captured:
+    """F consecutive frames of a clip.
+
+    clip: its name. local: (F, J, 3) joint positions in root coordinates, heights above the ground, cm.
+    contacts: (F, 4) 1 for contact with the ground, else 0, of left heel, left toe, right heel, right toe.
+    phase: (F,) from 0 to 1. channels: name -> values (F, columns). gait: (F, 6) share of each of the GAITS.
+    velocity: (F, 2) of the root in root coordinates, cm per frame. root: (F, 3) position of the root on the
+    ground, cm. The first is the origin. acceleration: (F,) the largest of any joint, cm per frame squared, 0
+    in the first frame. rows: (F,) index of each frame's row among the rows of the clip.
+    """
+
+    clip: str
+    local: Array = field(repr=False)
+    contacts: Array = field(repr=False)
+    phase: Array = field(repr=False)
+    channels: Mapping[str, Array] = field(repr=False)
+    gait: Array = field(repr=False)
+    velocity: Array = field(repr=False)
+    root: Array = field(repr=False)
+    acceleration: Array = field(repr=False)
+    rows: np.ndarray = field(repr=False)
+
+    def __len__(self) -> int:
+        return len(self.phase)
+
+
+def unbroken_stretches(frame: np.ndarray) -> list[np.ndarray]:
+    """For each stretch of consecutive frames, the indices of its rows. frame: (R,) frame of each row.
+
+    A frame on the border of two gait cycles has two rows, one in each cycle. Only the first of them is taken.
+
+    >>> [stretch.tolist() for stretch in unbroken_stretches(np.array([3, 4, 7, 8, 8, 9]))]
+    [[0, 1], [2, 3, 5]]
+    """
+    if not len(frame):
+        return []
+    _, first = np.unique(frame, return_index=True)
+    return np.split(first, np.flatnonzero(np.diff(frame[first]) != 1) + 1)
+
+
+def captured_stretches(rows: ClipRows) -> Iterator[Captured]:
+    """Each stretch of consecutive frames in a clip's rows.
+
+    A row has several terrain fits (ground heights that suit the motion). Joint heights are measured from the
+    mean ground height of its first fit.
+    """
+    layout = rows.layout
+    for chosen in unbroken_stretches(rows.frame):  # indices of rows
+        y = rows.y[chosen].astype(float)
+        lower_joints(y, layout.y_joint_position, rows.mean[rows.first_fit[chosen]][:, None])
+        local = y[:, layout.y_joint_position].reshape(len(chosen), -1, 3)
+        turn, velocity = y[:, layout.y_turn][:, 0], y[:, layout.y_root_velocity]
+        gait = rows.x[chosen][:, layout.x_gait].reshape(len(chosen), len(GAITS), layout.samples)
+        yield Captured(
+            rows.clip,
+            local,
+            y[:, layout.y_contacts],
+            rows.p[chosen].astype(float),
+            {name: values[chosen].astype(float) for name, values in rows.channels.items()},
+            gait[:, :, layout.samples // 2].astype(float),
+            velocity,
+            root_path(velocity, turn),
+            _accelerations(y[:, layout.y_joint_velocity].reshape(local.shape), turn),
+            chosen,
+        )
+
+
+def headings(turn: Array) -> Array:
+    """(F,) yaw of a root in radians. It starts at 0.
+
+    turn: (F,) column `y_turn` of Y, radians a frame: by how much the world turns, seen from the root. The
+    root itself turns by the negative.
+    """
+    return np.concatenate([[0.0], -np.cumsum(turn)[:-1]])
+
+
+def root_path(velocity: Array, turn: Array) -> Array:
+    """(F, 3) positions of a root, cm. The path starts at the origin, and its height is 0.
+
+    velocity: (F, 2) of the root in root coordinates, cm per frame. turn: (F,) as for `headings`.
+    """
+    world_velocity = rotate_by_yaw(velocity, headings(turn))
+    out = np.zeros((len(turn), 3))
+    out[1:, ::2] = np.cumsum(world_velocity, axis=0)[:-1]
+    return out
+
+
+def rotate_by_yaw(vectors: Array, yaw: Array) -> Array:
+    """Rotate horizontal vectors x, z (..., 2) from root coordinates to the world. yaw: (...) of the root."""
+    sin, cos = np.sin(yaw), np.cos(yaw)
+    x, z = vectors[..., 0], vectors[..., 1]
+    return np.stack([x * cos + z * sin, z * cos - x * sin], axis=-1)
+
+
+def _accelerations(velocity: Array, turn: Array) -> Array:
+    """(F,) largest change of any joint's velocity since the frame before, cm per frame squared.
+
+    velocity: (F, J, 3) in the root coordinates of each frame. turn: (F,) as for `headings`.
+    """
+    before = velocity[:-1].copy()  # becomes each frame's velocity in the root coordinates of the next frame
+    before[..., ::2] = rotate_by_yaw(velocity[:-1, :, ::2], turn[:-1, None])
+    change = np.linalg.norm(velocity[1:] - before, axis=-1)
+    return np.concatenate([[0.0], change.max(axis=1)]) if len(velocity) else np.zeros(0)

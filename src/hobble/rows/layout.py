@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -19,9 +20,27 @@ from hobble.core.skeleton import Skeleton
 
 GAITS = ("stand", "walk", "jog", "crouch", "jump", "bump")
 CONTACTS = ("left_heel", "left_toe", "right_heel", "right_toe")
+MOST_COLUMNS = 1 << 16  # of X or Y
 SIDES = ("left", "centre", "right")  # where X has ground heights: left of the path, on it, right of it
 # The blocks of X that every network has, in the order of Holden et al. (2017).
 BODY = ("position", "direction", "gait", "joint_position", "joint_velocity", "terrain")
+
+
+class _Block:
+    """A block of columns: the attribute `x_gait` of a layout is its slice "gait" of X."""
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self.table, self.name = f"_{name[0]}_blocks", name[2:]
+
+    def __get__(self, layout: RowLayout, owner: type | None = None) -> slice:
+        found: slice = getattr(layout, self.table)[self.name]
+        return found
+
+
+def _side_by_side(sizes: Mapping[str, int]) -> dict[str, slice]:
+    """Name -> columns of blocks of these sizes, one after another."""
+    ends = np.cumsum([0, *sizes.values()]).tolist()
+    return {name: slice(*columns) for name, columns in zip(sizes, pairwise(ends), strict=True)}
 
 
 @dataclass(frozen=True)
@@ -55,15 +74,23 @@ class RowLayout:
     def from_dict(cls, data: Mapping[str, Any]) -> RowLayout:
         """The layout from the data of `to_dict`.
 
-        In old files, the number of a channel's columns is under one of its `old_keys` instead.
+        In old files, the number of a channel's columns is under one of its `old_keys` instead. Raises
+        KeyError, TypeError or ValueError if the data describe no layout.
         """
         numbers = {key: data[key] for key in ("joints", "window", "step") if key in data}
         channels = dict(data.get("channels", {}))
         for key in set(data) - {"joints", "window", "step", "channels", "order"}:
             if data[key]:
                 channels[channel_of_old_key(key)] = data[key]
-        pairs = tuple((str(name), int(columns)) for name, columns in channels.items())
-        return cls(**numbers, channels=pairs, order=tuple(data.get("order", ())))
+        for least, values in ((1, numbers), (0, channels)):
+            for key, value in values.items():
+                if type(value) is not int or not least <= value <= MOST_COLUMNS:
+                    raise ValueError(
+                        f"{key} is {value!r:.40}, not a whole number from {least} to {MOST_COLUMNS}"
+                    )
+        if numbers.get("window", 0) % numbers.get("step", 1):
+            raise ValueError(f"window {numbers['window']} is not a multiple of step {numbers['step']}")
+        return cls(**numbers, channels=tuple(channels.items()), order=tuple(data.get("order", ())))
 
     def to_dict(self) -> dict[str, Any]:
         """The layout as data that JSON can hold, for `from_dict`."""
@@ -108,44 +135,21 @@ class RowLayout:
             )
         )
         sizes |= dict(self.channels)
-        blocks, start = {}, 0
-        for name in self.order or sizes:
-            blocks[name] = slice(start, start + sizes[name])
-            start += sizes[name]
-        return blocks
+        return _side_by_side({name: sizes[name] for name in self.order or sizes})
 
-    @property
-    def x_position(self) -> slice:
-        """Trajectory positions, x then z, in the root coordinates of the row's frame, cm."""
-        return self._x_blocks["position"]
-
-    @property
-    def x_direction(self) -> slice:
-        """Trajectory facing directions, x then z, in the root coordinates of the row's frame."""
-        return self._x_blocks["direction"]
-
-    @property
-    def x_gait(self) -> slice:
-        """Gait shares: all trajectory samples of the first of GAITS, then of the second, and so on."""
-        return self._x_blocks["gait"]
-
-    @property
-    def x_joint_position(self) -> slice:
-        """Joint positions of the previous frame in its root coordinates, cm, y above the mean ground."""
-        return self._x_blocks["joint_position"]
-
-    @property
-    def x_joint_velocity(self) -> slice:
-        """Joint velocities of the previous frame in its root coordinates, cm a frame."""
-        return self._x_blocks["joint_velocity"]
-
-    @property
-    def x_terrain(self) -> slice:
-        """Ground heights at the trajectory samples, cm above the mean height on the path.
-
-        All samples left (+x) of the path come first, then those on it, then those right of it.
-        """
-        return self._x_blocks["terrain"]
+    # Trajectory positions, x then z, in the root coordinates of the row's frame, cm.
+    x_position = _Block()
+    # Trajectory facing directions, x then z, in the root coordinates of the row's frame.
+    x_direction = _Block()
+    # Gait shares: all trajectory samples of the first of GAITS, then of the second, and so on.
+    x_gait = _Block()
+    # Joint positions of the previous frame in its root coordinates, cm, y above the mean ground.
+    x_joint_position = _Block()
+    # Joint velocities of the previous frame in its root coordinates, cm a frame.
+    x_joint_velocity = _Block()
+    # Ground heights at the trajectory samples, cm above the mean height on the path. All samples left (+x) of
+    # the path come first, then those on it, then those right of it.
+    x_terrain = _Block()
 
     def x_channel(self, name: str) -> slice:
         """The columns of a channel. Raises KeyError if there is no such channel."""
@@ -156,50 +160,33 @@ class RowLayout:
         """Number of columns of X."""
         return max(block.stop for block in self._x_blocks.values())
 
-    @property
-    def y_root_velocity(self) -> slice:
-        """Root velocity, x and z in root coordinates, cm a frame."""
-        return slice(0, 2)
+    # Root velocity, x and z in root coordinates, cm a frame.
+    y_root_velocity = _Block()
+    # Yaw velocity, radians a frame, with the sign of `hobble.motion.root.RootFrames.turn`.
+    y_turn = _Block()
+    # Change of phase, cycles a frame.
+    y_phase_change = _Block()
+    # Whether each of CONTACTS touches the ground: 0 or 1.
+    y_contacts = _Block()
+    # Future trajectory positions, x then z, in the root coordinates of the next frame, cm.
+    y_position = _Block()
+    # Future facing directions, x then z, in the root coordinates of the next frame.
+    y_direction = _Block()
+    # Joint positions of this frame in its root coordinates, cm, y above the mean ground.
+    y_joint_position = _Block()
+    # Joint velocities of this frame in its root coordinates, cm a frame.
+    y_joint_velocity = _Block()
+    # Joint rotations of this frame in its root coordinates: axis times half the angle, radians.
+    y_joint_rotation = _Block()
 
-    @property
-    def y_turn(self) -> slice:
-        """Yaw velocity, radians a frame, with the sign of `hobble.motion.root.RootFrames.turn`."""
-        return slice(2, 3)
-
-    @property
-    def y_phase_change(self) -> slice:
-        """Change of phase, cycles a frame."""
-        return slice(3, 4)
-
-    @property
-    def y_contacts(self) -> slice:
-        """Whether each of CONTACTS touches the ground: 0 or 1."""
-        return slice(4, 8)
-
-    @property
-    def y_position(self) -> slice:
-        """Future trajectory positions, x then z, in the root coordinates of the next frame, cm."""
-        return slice(8, 8 + 2 * self.future)
-
-    @property
-    def y_direction(self) -> slice:
-        """Future facing directions, x then z, in the root coordinates of the next frame."""
-        return slice(8 + 2 * self.future, 8 + 4 * self.future)
-
-    @property
-    def y_joint_position(self) -> slice:
-        """Joint positions of this frame in its root coordinates, cm, y above the mean ground."""
-        return slice(self.y_direction.stop, self.y_direction.stop + 3 * self.joints)
-
-    @property
-    def y_joint_velocity(self) -> slice:
-        """Joint velocities of this frame in its root coordinates, cm a frame."""
-        return slice(self.y_joint_position.stop, self.y_joint_position.stop + 3 * self.joints)
-
-    @property
-    def y_joint_rotation(self) -> slice:
-        """Joint rotations of this frame in its root coordinates: axis times half the angle, radians."""
-        return slice(self.y_joint_velocity.stop, self.y_joint_velocity.stop + 3 * self.joints)
+    @cached_property
+    def _y_blocks(self) -> dict[str, slice]:
+        """Name -> columns of each block of Y, in column order."""
+        trajectory, joints = 2 * self.future, 3 * self.joints
+        sizes = {"root_velocity": 2, "turn": 1, "phase_change": 1, "contacts": len(CONTACTS)}
+        sizes |= {"position": trajectory, "direction": trajectory}
+        sizes |= {"joint_position": joints, "joint_velocity": joints, "joint_rotation": joints}
+        return _side_by_side(sizes)
 
     @property
     def y_size(self) -> int:
@@ -208,11 +195,8 @@ class RowLayout:
 
     def blocks(self, prefix: str) -> dict[str, slice]:
         """All blocks of X ("x") or Y ("y") by name, in column order: {"position": slice(0, 24), ...}."""
-        if prefix == "x":
-            return {name: block for name, block in self._x_blocks.items() if block.stop > block.start}
-        # `vars` lists the properties in the order of their definition, which is the column order of Y.
-        names = [n for n in vars(type(self)) if n.startswith("y_") and n != "y_size"]
-        return {name[2:]: getattr(self, name) for name in names}
+        blocks = self._x_blocks if prefix == "x" else self._y_blocks
+        return {name: block for name, block in blocks.items() if block.stop > block.start}
 
 
 # Composes rows of X from the body's columns, the channels, and the ground heights of one terrain fit.

@@ -1,58 +1,91 @@
-"""Changes the batches of a training: other paces, other poses, and errors of the network itself."""
+"""Changes the batches of a training: other paces, other poses, and errors of the network itself.
+
+Each way to change them is an `Augmentation`. `augmentations` makes those that a training asks for.
+"""
 
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 
 import numpy as np
 import torch
 from torch import Tensor
 
 from hobble.core.quat import Array
-from hobble.database.chunks import to_floats
-from hobble.database.reader import ChunkWindow, Database, empty_buffers
+from hobble.database.reader import Database
 from hobble.rows.layout import GAITS, blocks_without_terrain, lower_joints
 from hobble.runtime.rule import joint_place
+from hobble.training.batches import TRAIN, SampleBatch
+from hobble.training.options import Training
 
-# The number of a row is the fractional part of place * STEP_OF_PLACE + batch * STEP_OF_BATCH, with the row's
-# place in the batch and the number of the batch. As the steps are irrational, these fractional parts are
-# spread evenly over 0..1.
+# A number from 0 to 1 for each row is the fractional part of place * step of place + batch * step of batch,
+# with the row's place in the batch and the number of the batch. As the steps are irrational, these numbers
+# are spread evenly over rows and batches.
 STEP_OF_PLACE, STEP_OF_BATCH = (math.sqrt(5) - 1) / 2, math.sqrt(2) - 1
 
 
-class EvenSpread:
-    """Gives each row of a batch a number from 0 to 1. The numbers are spread evenly over rows and batches.
+class Augmentation(ABC):
+    """A change to every batch of a training.
 
-    A number depends only on the row's place in the whole batch and on how many batches came before.
+    It depends only on the rows, their places in the whole batch, and the batches before in the same section.
+    So several processes change the rows just as one process would.
 
-    batch: largest number of this process's rows in a batch. first: the place of its first row in the whole
-    batch.
+    places: the places in the whole batch that this process's rows fill. batches: number of batches so far in
+    the section.
     """
 
-    def __init__(self, batch: int, device: torch.device, first: int = 0) -> None:
-        places = first + torch.arange(batch, device=device).double()
-        self.place_terms = torch.remainder(places * STEP_OF_PLACE, 1.0)
+    def __init__(self, places: range, device: torch.device) -> None:
+        self.places, self.batches = places, 0
+        self._places = places.start + torch.arange(len(places), device=device).double()
 
-    def numbers(self, rows: int, batches: int) -> Tensor:
-        """(rows,) float64 from 0 to 1, for the first `rows` rows of this process.
+    def begin_section(self) -> None:
+        """Forget all batches, so that a section does not depend on the previous one."""
+        self.batches = 0
 
-        batches: number of batches before this one.
-        """
-        return torch.remainder(self.place_terms[:rows] + batches * STEP_OF_BATCH, 1.0)
+    @abstractmethod
+    def change(self, batch: SampleBatch) -> None:
+        """Change a batch of standardised rows, which has at least one, in place."""
+
+    def after(self, error: Tensor) -> None:
+        """Call this after each batch. error: (B, Y) prediction minus Y, standardised."""
+        self.batches += 1
+
+    def spread(self, rows: int, place: float = STEP_OF_PLACE, batch: float = STEP_OF_BATCH) -> Tensor:
+        """(rows,) float64 numbers from 0 to 1, spread evenly over rows and batches by these steps."""
+        return torch.remainder(torch.remainder(self._places[:rows] * place, 1.0) + self.batches * batch, 1.0)
+
+
+def augmentations(
+    database: Database, training: Training, places: range, device: torch.device
+) -> list[Augmentation]:
+    """The augmentations that the section `training` asks for, in the order in which they change a batch."""
+    found: list[Augmentation] = []
+    if training.other_paces > 1:
+        found.append(OtherPaces(database, training.other_paces, places, device))
+    if training.other_poses and database.layout.channels:
+        found.append(OtherPoses(database, training.other_poses, places, device))
+    if training.version_poses and database.sources:
+        found.append(VersionPoses(database, training.version_poses, places, device))
+    if training.rollout > 1:
+        found.append(RollOut(database, training.rollout, places, device))
+    return found
 
 
 # Plays rows at other paces along smooth paths, so that neither speed nor path shows who walks.
 
 
 RISE = 0.5  # largest change of the pace from the middle of the window to its end, as a share of the pace
-# Each row gets three numbers: for the pace, for its change, and for how smooth the path becomes. Each number
-# is the fractional part of place * step of place + batch * step of batch, with the row's place in the batch
-# and the number of the batch. As the steps are irrational, the numbers are spread evenly over 0..1.
-STEPS_OF_PLACE = (math.sqrt(3) - 1, math.sqrt(7) - 2, math.sqrt(11) - 3)
-STEPS_OF_BATCH = (math.sqrt(13) - 3, math.sqrt(17) - 4, math.sqrt(19) - 4)
+# The steps of place and of batch of a row's three numbers: for the pace, for its change, and for how smooth
+# the path becomes.
+STEPS = (
+    (math.sqrt(3) - 1, math.sqrt(13) - 3),
+    (math.sqrt(7) - 2, math.sqrt(17) - 4),
+    (math.sqrt(11) - 3, math.sqrt(19) - 4),
+)
 
 
-class OtherPaces:
+class OtherPaces(Augmentation):
     """Plays each row's motion slower or faster, and moves its path towards a smooth one. X and Y both change.
 
     If the clips have few people, each at one speed, the speed in the input shows who walks. So does the sway
@@ -67,13 +100,11 @@ class OtherPaces:
     path moves towards the nearest parabola, by 0 to 1 times the way. log(r), a and this factor are spread
     evenly over the places of a batch and over batches.
 
-    factor: largest r; 1 changes nothing, not even the path. batch: largest number of this process's rows in a
-    batch. first: the place of its first row in the whole batch.
+    factor: largest r, above 1.
     """
 
-    def __init__(
-        self, database: Database, factor: float, batch: int, device: torch.device, first: int = 0
-    ) -> None:
+    def __init__(self, database: Database, factor: float, places: range, device: torch.device) -> None:
+        super().__init__(places, device)
         layout, statistics = database.layout, database.statistics
         self.layout, self.log_factor = layout, math.log(factor)
         self.x_std, self.x_mean, self.y_std, self.y_mean = (
@@ -91,22 +122,13 @@ class OtherPaces:
             )
             for powers in ((1, 2), (0, 1, 2))
         )
-        places = first + torch.arange(batch, device=device).double()
-        self.place_terms = torch.stack([places * step for step in STEPS_OF_PLACE])
-        self.batch_steps = torch.tensor(STEPS_OF_BATCH, device=device, dtype=torch.float64)[:, None]
-        self.batches = 0
 
-    def begin_section(self) -> None:
-        """Count batches from 0 again, so that a section does not depend on the previous one."""
-        self.batches = 0
-
-    def play(self, x: Tensor, y: Tensor) -> None:
-        """Change standardised inputs x (B, X) and outputs y (B, Y) in place."""
-        if not self.log_factor or not len(x):
-            return
-        even = torch.remainder(self.place_terms[:, : len(x)] + self.batches * self.batch_steps, 1.0)
-        self.batches += 1
-        even_pace, even_rise, smoothness = even.to(x.dtype)[:, :, None]
+    def change(self, batch: SampleBatch) -> None:
+        """As in `Augmentation`."""
+        x, y = batch.x, batch.y
+        even_pace, even_rise, smoothness = (
+            self.spread(len(x), *steps).to(x.dtype)[:, None] for steps in STEPS
+        )
         # r and a of the class's docstring.
         pace, rise = torch.exp((2 * even_pace - 1) * self.log_factor), (2 * even_rise - 1) * RISE / 2
         channels = [x[:, columns] for columns in self.channel_columns]
@@ -200,7 +222,7 @@ BEYOND = 0.5  # a pose may also move away from the other pose, by up to this sha
 OTHER_VALUE = 1e-3  # standardised channel values that differ by more than this count as different
 
 
-class OtherPoses:
+class OtherPoses(Augmentation):
     """Moves the pose in some rows of X towards the pose of a row with other channel values. Y is unchanged.
 
     If a channel is constant in a clip, such as a mood, all poses of the clip show the channel's value, too.
@@ -216,15 +238,13 @@ class OtherPoses:
     captured one, and the network learns the way back. Without such poses a character that leaned forward
     leaned more and more.
 
-    share: share of the rows that are moved; 0 changes nothing. batch: largest number of this process's rows
-    in a batch. first: the place of its first row in the whole batch.
+    share: share of the rows that are moved.
     """
 
-    def __init__(
-        self, database: Database, share: float, batch: int, device: torch.device, first: int = 0
-    ) -> None:
+    def __init__(self, database: Database, share: float, places: range, device: torch.device) -> None:
+        super().__init__(places, device)
         layout, middle = database.layout, database.layout.samples // 2
-        self.share = share if batch and layout.channels else 0.0
+        self.share = share
         blocks = (layout.x_joint_position, layout.x_joint_velocity)
         # Columns of X: those of the pose, the share of each gait in the present frame, and the channels.
         self.pose_columns = torch.cat([torch.arange(b.start, b.stop) for b in blocks]).to(device)
@@ -233,30 +253,23 @@ class OtherPoses:
         self.gait_columns = torch.tensor(present, device=device)
         std = torch.from_numpy(database.statistics.x_std).to(device, torch.float32)
         self.gait_std = std[self.gait_columns]
-        columns = [torch.arange(0)] + [
-            torch.arange(layout.x_size)[layout.x_channel(name)] for name, _ in layout.channels
-        ]
+        columns = [torch.arange(layout.x_size)[layout.x_channel(name)] for name, _ in layout.channels]
         self.channel_columns = torch.cat(columns).to(device)
-        self.places = torch.arange(batch, device=device)
-        self.spread = EvenSpread(batch, device, first)
-        rows = batch if self.share else 0
         # The remembered rows of each place. A new row replaces the oldest one.
         self.poses, self.gaits, self.channels = (
-            torch.zeros(rows, REMEMBERED_ROWS, len(columns), device=device)
+            torch.zeros(len(places), REMEMBERED_ROWS, len(columns), device=device)
             for columns in (self.pose_columns, self.gait_columns, self.channel_columns)
         )
-        self.phases = torch.full((rows, REMEMBERED_ROWS), torch.nan, device=device)  # nan: no row yet
-        self.batches = 0
+        self.phases = torch.full((len(places), REMEMBERED_ROWS), torch.nan, device=device)  # nan: no row yet
 
     def begin_section(self) -> None:
-        """Forget all rows, so that a section does not depend on the previous one."""
+        """As in `Augmentation`."""
+        super().begin_section()
         self.phases.fill_(torch.nan)
-        self.batches = 0
 
-    def mix(self, x: Tensor, p: Tensor) -> None:
-        """Move the poses of standardised inputs x (B, X) in place. p: (B,) phases, 0 to 1."""
-        if not self.share or not len(x):
-            return
+    def change(self, batch: SampleBatch) -> None:
+        """As in `Augmentation`."""
+        x, p = batch.x, batch.p
         rows, slot = len(x), self.batches % REMEMBERED_ROWS
         pose, values = x[:, self.pose_columns], x[:, self.channel_columns]
         gait = x[:, self.gait_columns] * self.gait_std  # not standardised, apart from a constant
@@ -267,16 +280,15 @@ class OtherPoses:
         apart = torch.where(same_gait & other_value & (apart < NEAR), apart, torch.inf)
         nearest, chosen = apart.min(dim=1)
         factor = torch.where(nearest < NEAR, self._factors(rows).to(x.dtype), 0.0)
-        other_pose = self.poses[self.places[:rows], chosen]
+        other_pose = self.poses[torch.arange(rows, device=x.device), chosen]
         x[:, self.pose_columns] = torch.lerp(pose, other_pose, factor[:, None])
         remembered = (self.poses, self.gaits, self.channels, self.phases)
         for table, row in zip(remembered, (pose, gait, values, p), strict=True):
             table[:rows, slot] = row
-        self.batches += 1
 
     def _factors(self, rows: int) -> Tensor:
         """(rows,) how far each pose moves: in `share` of the rows spread evenly from -BEYOND to 1, else 0."""
-        even = self.spread.numbers(rows, self.batches)
+        even = self.spread(rows)
         factor = 1 - (1 - even) / self.share  # above 0 in `share` of the rows, and there spread from 0 to 1
         return torch.where(factor > 0, factor * (1 + BEYOND) - BEYOND, 0.0)
 
@@ -287,14 +299,13 @@ class OtherPoses:
 # neighbouring joints, such as hip and knee.
 
 
-SPLIT = "train"
 # Memory for the poses of the training rows. If they need more, only every second (third, ...) row is used.
 TABLE_BYTES = 256 << 20
 CANDIDATES = 8  # the pose comes from one of this many rows with the nearest phases: the most similar path
 NEAR_PHASE = 1 / 32  # largest difference in phase between two poses that are mixed, in cycles
 
 
-class VersionPoses:
+class VersionPoses(Augmentation):
     """Moves the pose in rows of X towards the pose of another version of the same clip. Y is unchanged.
 
     Each link is hurt in few clips. So a network can take the posture of these clips for a sign of the injury,
@@ -305,26 +316,20 @@ class VersionPoses:
     The pose of a hurt row moves along the line to a pose of the healthy clip. The pose of a healthy row moves
     along the line to a pose of a hurt version. This other pose comes from a row with nearly the same phase:
     the one whose path turns most like the path of the moved row. The pose moves by a factor of -1 to 1 times
-    the way to the other pose; a negative factor moves it away. The factors are spread evenly. They depend
-    only on the row's place in the batch and on the number of the batch, so several processes change the rows
-    just as one process would. Rows of clips without hurt versions are not changed.
+    the way to the other pose; a negative factor moves it away. The factors are spread evenly. Rows of clips
+    without hurt versions are not changed.
 
     The mean of the factors is 0, for this reason: if all poses of X moved towards the other version, Y would
     always be further from that version than X, because Y does not move. The network would learn to step away
     from that version in each frame, so the character would exaggerate its limp at run time.
 
-    share: share of the rows that are moved; 0 changes nothing. batch: largest number of this process's rows
-    in a batch. first: the place of its first row in the whole batch.
+    share: share of the rows that are moved.
     """
 
-    def __init__(
-        self, database: Database, share: float, batch: int, device: torch.device, first: int = 0
-    ) -> None:
-        names, sources = database.clips, database.sources
-        self.share = share if batch and sources else 0.0
-        if not self.share:
-            return
-        layout = database.layout
+    def __init__(self, database: Database, share: float, places: range, device: torch.device) -> None:
+        super().__init__(places, device)
+        names, sources, layout = database.clips, database.sources, database.layout
+        self.share = share
         index_of = {name: i for i, name in enumerate(names)}
         hurt = np.array([name in sources for name in names])
         # Each clip's family: the index of its healthy original; -1 for clips without hurt versions.
@@ -341,26 +346,19 @@ class VersionPoses:
         key, poses, directions = _pose_table(database, self.own_key)
         self.key = torch.from_numpy(key).to(device)
         self.poses, self.directions = (torch.from_numpy(array).to(device) for array in (poses, directions))
-        self.spread = EvenSpread(batch, device, first)
         # The places of the candidates, counted from the place of the sought key.
         self.offsets = torch.arange(CANDIDATES, device=device) - CANDIDATES // 2
-        self.batches = 0  # number of batches since `begin_section`
 
-    def begin_section(self) -> None:
-        """Count batches from 0 again, so that a section does not depend on the previous one."""
-        self.batches = 0
-
-    def mix(self, x: Tensor, p: Tensor, clip: np.ndarray) -> None:
-        """Move the poses of standardised inputs x (B, X) in place.
-
-        p: (B,) phases, 0 to 1. clip: (B,) indices into the database's clips.
-        """
-        if not self.share or not len(x) or not len(self.key):
+    def change(self, batch: SampleBatch) -> None:
+        """As in `Augmentation`."""
+        if not len(self.key):
             return
-        factors = self._factors(len(x))
-        self.batches += 1
+        x, even = batch.x, self.spread(len(batch.x))
+        # In `share` of the rows spread evenly from -1 to 1, else 0.
+        factors = torch.where(even < self.share, 2 * even / self.share - 1, 0.0)
         moved = torch.nonzero(factors).flatten()
-        sought = torch.from_numpy(self.other_key[clip]).to(x.device)[moved] + p[moved].double()
+        key = torch.from_numpy(self.other_key[batch.clip]).to(x.device)
+        sought = key[moved] + batch.p[moved].double()
         candidates = torch.searchsorted(self.key, sought)[:, None] + self.offsets
         candidates = candidates.clamp(0, len(self.key) - 1)
         is_near = ((self.key[candidates] - sought[:, None]).abs() < NEAR_PHASE) & (sought >= 0)[:, None]
@@ -373,82 +371,36 @@ class VersionPoses:
         for block, other_block in zip(self.pose_blocks, other_pose.chunk(2, dim=1), strict=True):
             x[moved, block] = torch.lerp(x[moved, block], other_block, factor[:, None])
 
-    def _factors(self, rows: int) -> Tensor:
-        """(rows,) the factor of each row: spread evenly from -1 to 1 in `share` of the rows, else 0."""
-        even = self.spread.numbers(rows, self.batches)
-        return torch.where(even < self.share, 2 * even / self.share - 1, 0.0)
-
 
 def _pose_table(database: Database, clip_keys: Array) -> tuple[Array, Array, Array]:
     """Keys (n,), poses (n, D) and path directions (n, E) of the training rows of clips with hurt versions.
 
     These are the clips of hurt versions and their healthy originals. Poses and directions are standardised.
-    clip_keys: (clips,) key of each clip; clips with a negative key are left out. The key of a row is the key
-    of its clip plus the phase. The rows are sorted by key.
+    Joint heights are measured from the mean ground height of the row's first terrain fit. clip_keys: (clips,)
+    key of each clip; clips with a negative key are left out. The key of a row is the key of its clip plus the
+    phase. The rows are sorted by key.
     """
-    manifest = database.manifest
-    blocks, buffers = blocks_without_terrain(database.layout), empty_buffers(manifest, SPLIT, 1)
-    pose_columns, direction_columns = (
-        np.r_[tuple(blocks[name] for name in names)]
-        for names in (("joint_position", "joint_velocity"), ("direction",))
-    )
-    table_bytes = 4 * (len(pose_columns) + len(direction_columns)) * manifest.row_count(SPLIT)  # float32
-    row_step = max(1, math.ceil(table_bytes / TABLE_BYTES))
-    parts = [
-        (  # arrays without rows, so that there is something to concatenate
-            np.empty(0),
-            np.empty((0, len(pose_columns)), np.float32),
-            np.empty((0, len(direction_columns)), np.float32),
-        ),
-        *(
-            _chunk_table(
-                database.load(SPLIT, [number], buffers),
-                clip_keys,
-                pose_columns,
-                direction_columns,
-                database,
-                row_step,
-            )
-            for number in range(len(manifest.chunks[SPLIT]))
-        ),
-    ]
+    blocks = blocks_without_terrain(database.layout)
+    std = np.delete(database.statistics.x_std, database.layout.x_terrain)
+    pose_columns = np.r_[blocks["joint_position"], blocks["joint_velocity"]]
+    row_bytes = 4 * len(np.r_[pose_columns, blocks["direction"]])  # float32
+    row_step = max(1, math.ceil(row_bytes * database.row_count(TRAIN) / TABLE_BYTES))
+    parts = []
+    for rows in database.each_row(TRAIN):
+        key = clip_keys[rows.clip] + rows.p
+        chosen = np.flatnonzero(key >= 0)[::row_step]
+        x, lift = rows.x[chosen], rows.fits[rows.first_fit[chosen], -1:]
+        lower_joints(x, blocks["joint_position"], lift, std)
+        parts.append((key[chosen], x[:, pose_columns], x[:, blocks["direction"]]))
     key, poses, directions = (np.concatenate(part) for part in zip(*parts, strict=True))
     order = np.argsort(key, kind="stable")
     return key[order], poses[order], directions[order]
 
 
-def _chunk_table(
-    window: ChunkWindow,
-    clip_keys: Array,
-    pose_columns: np.ndarray,
-    direction_columns: np.ndarray,
-    database: Database,
-    row_step: int,
-) -> tuple[Array, Array, Array]:
-    """The arrays of `_pose_table` for one chunk, not sorted, with every `row_step`-th row of the clips.
-
-    window: the rows of the chunk. pose_columns, direction_columns: columns of X without terrain. Joint
-    heights are measured from the mean ground height of the row's first terrain fit.
-    """
-    key = clip_keys[window.clip] + window.phase
-    chosen = np.flatnonzero(key >= 0)[::row_step]
-    x = to_floats(window.x[chosen]).astype(np.float32)
-    lift = to_floats(window.fits[window.first_fit[chosen]]).astype(np.float32)[:, -1:]
-    lower_joints(
-        x, blocks_without_terrain(database.layout)["joint_position"], lift, _without_terrain_std(database)
-    )
-    return key[chosen], x[:, pose_columns], x[:, direction_columns]
-
-
-def _without_terrain_std(database: Database) -> Array:
-    """(columns,) standard deviations of X without its terrain columns."""
-    return np.delete(database.statistics.x_std, database.layout.x_terrain)
-
-
 # Roll-outs in training: the network's own errors are added to its input poses, as at run time.
 
 
-class RollOut:
+class RollOut(Augmentation):
     """Adds to the pose in X the errors that the network would have accumulated; Y is unchanged.
 
     At run time a joint's next position is the mean of two: the predicted position, and the old position plus
@@ -461,15 +413,13 @@ class RollOut:
     joints. (If each row got the errors of its own past, the network would learn this past by heart, and the
     error on held-out clips would grow.)
 
-    frames: length of a roll-out. Its first pose is the captured one, so 1 changes nothing. batch: largest
-    number of this process's rows in a batch. first: the place of its first row in the whole batch.
+    frames: length of a roll-out, at least 2. Its first pose is the captured one.
     """
 
-    def __init__(
-        self, database: Database, frames: int, batch: int, device: torch.device, first: int = 0
-    ) -> None:
+    def __init__(self, database: Database, frames: int, places: range, device: torch.device) -> None:
+        super().__init__(places, device)
         layout, s = database.layout, database.statistics
-        self.frames, self.first = frames, first
+        self.frames = frames
         self.x_position, self.x_velocity = layout.x_joint_position, layout.x_joint_velocity
         self.y_position, self.y_velocity = layout.y_joint_position, layout.y_joint_velocity
         # Factors that turn errors in standardised Y into errors in standardised X. For example,
@@ -484,33 +434,30 @@ class RollOut:
         )
         # The present errors in standardised X, for each place in the batch.
         self.position, self.velocity = (
-            torch.zeros(batch, 3 * layout.joints, device=device) for _ in range(2)
+            torch.zeros(len(places), 3 * layout.joints, device=device) for _ in range(2)
         )
-        self.batches = 0
 
     def begin_section(self) -> None:
-        """Set all errors to 0, so that a section does not depend on the previous one."""
+        """As in `Augmentation`."""
+        super().begin_section()
         self.position.zero_()
         self.velocity.zero_()
-        self.batches = 0
 
-    def add(self, x: Tensor) -> None:
-        """Add the errors to standardised inputs x (B, X) in place."""
-        if self.frames > 1:
-            x[:, self.x_position] += self.position[: len(x)]
-            x[:, self.x_velocity] += self.velocity[: len(x)]
+    def change(self, batch: SampleBatch) -> None:
+        """As in `Augmentation`."""
+        rows = len(batch.x)
+        batch.x[:, self.x_position] += self.position[:rows]
+        batch.x[:, self.x_velocity] += self.velocity[:rows]
 
-    def remember(self, error: Tensor) -> None:
-        """Advance the errors by a frame. error: (B, Y) prediction minus Y of this batch, standardised."""
-        if self.frames == 1:
-            return
+    def after(self, error: Tensor) -> None:
+        """As in `Augmentation`: advance the errors by a frame."""
+        super().after(error)
         rows = len(error)
         position, velocity = error[:, self.y_position], error[:, self.y_velocity]
         added = position * self.position_of_position + velocity * self.position_of_velocity
         self.position[:rows] = joint_place(self.position[:rows], added)  # (d + p + v) / 2
         torch.mul(velocity, self.velocity_of_velocity, out=self.velocity[:rows])
-        self.batches += 1
         # After each batch, the roll-outs of every `frames`-th place end, so that not all end at once.
-        ended = slice((self.batches - self.first) % self.frames, None, self.frames)
+        ended = slice((self.batches - self.places.start) % self.frames, None, self.frames)
         self.position[ended] = 0
         self.velocity[ended] = 0

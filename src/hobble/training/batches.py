@@ -10,7 +10,7 @@ import torch
 from torch import Tensor
 
 from hobble.core.errors import HobbleError
-from hobble.database.order import SampleRange, SectionSharing
+from hobble.database.order import stretches_of_section
 from hobble.database.reader import Database
 from hobble.training.processes import ALONE, Processes
 
@@ -45,7 +45,8 @@ class HostRows:
     A section is a part of a pass.
 
     processes: the processes that share a batch. stretches: number of consecutive parts that a section is cut
-    into. Each batch takes samples from every part. None: one part for each process.
+    into, a multiple of the number of processes. Each batch takes samples from every part. None: one part for
+    each process.
     """
 
     def __init__(
@@ -58,11 +59,6 @@ class HostRows:
         self.database, self.device = database, device
         self.processes, self.stretches = processes, stretches
 
-    def share_section(self, section: int, sections: int, size: int) -> SectionSharing:
-        """How the processes share a section in batches of `size`."""
-        total = self.database.section_sample_count(TRAIN, section, sections)
-        return self.processes.share_section(total, size, self.stretches)
-
     def batches(
         self, pass_index: int, section: int, sections: int, seed: int, size: int
     ) -> Iterator[SampleBatch]:
@@ -73,27 +69,25 @@ class HostRows:
         section, and a checkpoint between sections is complete.
         """
         order_key = (pass_index, section, sections, seed)
-        # The number of chunks in memory at a time. The order of the rows depends on it and must be the same
-        # for any number of processes. So it follows from the size of the whole batch, not of this process's
-        # part.
-        window = self.database.chunks_per_window(TRAIN, self.database.block_rows(size))
-        sharing = self.share_section(section, sections, size)
-        stretches = [
-            self._pieces_of_stretch(order_key, stretch, window) for stretch in sharing.own_stretches()
-        ]
-        for total, _ in sharing.batch_sizes():
+        total = self.database.section_sample_count(TRAIN, section, sections)
+        stretches = stretches_of_section(total, size, self.stretches or self.processes.count)
+        own = self.processes.own_places(len(stretches))
+        parts = [self._pieces(order_key, *stretches[number], size) for number in own]
+        for start in range(0, total, size):
             # The last batch may be so short that some stretches have no samples for it.
-            pieces = [piece for stretch in stretches if (piece := next(stretch, None)) is not None]
+            pieces = [piece for part in parts if (piece := next(part, None)) is not None]
             piece = pieces[0] if len(pieces) == 1 else _join(pieces, self._empty_piece)
-            yield SampleBatch(*piece, total)
+            yield SampleBatch(*piece, min(size, total - start))
 
-    def _pieces_of_stretch(
-        self, order_key: tuple[int, int, int, int], stretch: SampleRange, window: int
+    def _pieces(
+        self, order_key: tuple[int, int, int, int], samples: range, per_batch: int, size: int
     ) -> Iterator[Piece]:
-        """Yield the samples that this process has of one stretch, batch by batch."""
-        per_batch = stretch.high - stretch.low
+        """Yield the samples of one stretch, batch by batch: `per_batch` of the `size` samples of a batch."""
+        # The number of chunks in memory at a time. The order of the rows depends on it and must be the same
+        # for any number of processes. So it follows from the size of the whole batch, not of this part.
+        window = self.database.chunks_per_window(TRAIN, self.database.block_rows(size))
         rows = self.database.block_rows(per_batch)
-        for block in self.database.blocks(TRAIN, *order_key, rows, stretch, window):
+        for block in self.database.blocks(TRAIN, *order_key, rows, samples, window):
             x, y, p = (torch.from_numpy(array).to(self.device) for array in block[:3])
             for start in range(0, len(p), per_batch):
                 part = slice(start, start + per_batch)
@@ -116,22 +110,21 @@ class LossWatch:
     """Adds up the losses of a section, and stops the training if it diverges.
 
     where: names the pass and section in messages. clips: names by index. processes: all of them stop
-    together, with the message of the process that has the broken rows. seen: number of samples that were
-    added. samples: number of those whose losses were already checked.
+    together, with the message of the process that has the broken rows. samples: number of samples that were
+    added.
     """
 
     def __init__(self, where: str, clips: tuple[str, ...], processes: Processes = ALONE) -> None:
         self.where, self.clips, self.processes = where, clips, processes
-        self.seen, self.samples, self._batches, self._total, self._unchecked = 0, 0, 0, 0.0, 0
+        self.samples, self._batches, self._total = 0, 0, 0.0
         self._waiting: list[tuple[Tensor, SampleBatch]] = []  # loss and batch, not yet checked
         self._worst: tuple[float, int, SampleBatch] | None = None  # loss, number of the batch, and batch
 
     def add(self, loss: Tensor, batch: SampleBatch) -> None:
         """Add a batch and its loss over all processes, a scalar tensor on any device."""
         self._waiting.append((loss, batch))
-        self.seen += batch.total
-        self._unchecked += batch.total
-        if self._unchecked >= CHECK_EVERY:
+        before, self.samples = self.samples, self.samples + batch.total
+        if self.samples // CHECK_EVERY > before // CHECK_EVERY:
             self._check()
 
     def mean(self) -> float:
@@ -139,32 +132,24 @@ class LossWatch:
         self._check()
         mean = self._total / max(self.samples, 1)
         if mean > DIVERGED and self._worst is not None:
-            raise HobbleError(
-                self._message(
-                    f"the mean error of the section is {mean:.3g}, and this batch has the largest error",
-                    *self._worst[1:],
-                )
-            )
+            problem = f"the mean error of the section is {mean:.3g}, and this batch has the largest error"
+            raise self._diverged(problem, *self._worst[1:])
         return mean
 
     def _check(self) -> None:
-        if not self._waiting:
-            return
-        losses = torch.stack([loss for loss, _ in self._waiting]).double().cpu().numpy()
-        for loss, (_, batch) in zip(losses.tolist(), self._waiting, strict=True):
+        losses = torch.stack([loss for loss, _ in self._waiting]).tolist() if self._waiting else []
+        for loss, (_, batch) in zip(losses, self._waiting, strict=True):
             self._batches += 1
             if not np.isfinite(loss):
-                raise HobbleError(self._message("its error is not a finite number", self._batches, batch))
-            if loss > DIVERGED and (self._worst is None or loss > self._worst[0]):
+                raise self._diverged("its error is not a finite number", self._batches, batch)
+            if self._worst is None or loss > self._worst[0]:
                 self._worst = (loss, self._batches, batch)
-            self.samples += batch.total
             self._total += loss * batch.total
         self._waiting.clear()
-        self._unchecked = 0
 
-    def _message(self, problem: str, number: int, batch: SampleBatch) -> str:
+    def _diverged(self, problem: str, number: int, batch: SampleBatch) -> HobbleError:
         text = f"training diverged in {self.where}, batch {number}: {problem}"
-        return self.processes.choose_error_message(*self._explain(text, batch))
+        return HobbleError(self.processes.choose_error_message(*self._explain(text, batch)))
 
     def _explain(self, text: str, batch: SampleBatch) -> tuple[str, bool]:
         """The message that begins with `text`, and whether broken rows are the cause.
@@ -193,7 +178,7 @@ def _name_list(names: list[str]) -> str:
 # The error on held-out clips, which are not trained on: over all outputs, and for each block of Y.
 
 
-SPLIT = "held_out"
+HELD_OUT = "held_out"
 ROWS_AT_ONCE = 2048  # rows predicted at once: enough to be fast, in less than 50 MB
 
 
@@ -258,5 +243,5 @@ class HeldOutErrors:
         every row once.
         """
         visits = self.database.manifest.visits
-        for block in self.database.blocks(SPLIT, 0, 0, visits, 0, ROWS_AT_ONCE):
+        for block in self.database.blocks(HELD_OUT, 0, 0, visits, 0, ROWS_AT_ONCE):
             yield tuple(torch.from_numpy(array).to(self.device) for array in block[:3])

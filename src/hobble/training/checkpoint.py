@@ -14,10 +14,12 @@ import numba
 import numpy as np
 import torch
 
+from hobble.core.declared import ArrayOf, check_arrays
 from hobble.core.errors import HobbleError, InputError
-from hobble.core.files import Arrays, load_npz, save_npz, write_text
+from hobble.core.files import DELETE_IT, Arrays, load_npz, save_npz, write_text
 from hobble.core.processors import count_cores, multiplies_bfloat16
 from hobble.core.skeleton import Skeleton
+from hobble.core.untrusted import printable
 from hobble.database.chunks import FILE
 from hobble.database.reader import Database
 from hobble.models.model import Options, Trainable, TrainedOptions, TrainingStep
@@ -82,8 +84,9 @@ class State:
 
     adam: the optimiser. samples, seconds: training samples and training time so far. best_mse, best: the
     lowest held-out error so far, and the weights with this error, laid out like `network.flat`. history: one
-    row of numbers per section, with the COLUMNS, then the held-out error of each
-    block of Y. recipe: hash of everything that determines the result (`run_name`).
+    row of numbers per section, with the COLUMNS, then the held-out error of each block of Y. recipe: hash of
+    everything that determines the result (`run_name`). half: whether products round their factors to
+    bfloat16, as chosen for the machine on which the training began.
     There is no state of random generators: pass and section seed the order of the rows and dropout.
     """
 
@@ -96,6 +99,7 @@ class State:
     best: torch.Tensor | None = None
     history: list[list[float]] = field(default_factory=list)
     recipe: str = ""
+    half: bool = False
 
     def keep_best(self, held_out_mse: float) -> None:
         """Remember the present weights if their held-out error is the lowest so far."""
@@ -122,36 +126,52 @@ def pack(state: State) -> dict[str, np.ndarray]:
         "sections": np.array(state.sections_done),
         "samples": np.array(state.samples),
         "seconds": np.array(state.seconds),
+        "half": np.array(state.half),
         "history": np.array(state.history, float),
         "network": np.array(state.network.description),
         "recipe": np.array(state.recipe),
     }
 
 
+# What a checkpoint holds, for a network of N parameters after S sections. Held-out errors are NaN, and the
+# best one is infinite, if no clip is held out.
+DECLARED = {
+    "network": ArrayOf((), "U"),
+    **{name: ArrayOf(("N",)) for name in ("weights", "first", "best")},
+    "second": ArrayOf(("N",), low=0),
+    **{name: ArrayOf((), "iu", low=0) for name in ("sections", "steps", "samples")},
+    "best_mse": ArrayOf((), low=0, finite=False),
+    "seconds": ArrayOf((), low=0),
+    "history": ArrayOf(("S", "columns"), finite=False),
+}
+
+
 def unpack(data: Mapping[str, np.ndarray], state: State, path: Path) -> None:
     """Set `state` from the arrays `data` of the checkpoint `path`.
 
-    Raises InputError if an array is missing or the checkpoint's network has another shape.
+    Raises InputError if an array is missing or wrong, or if the checkpoint's network has another shape.
     """
-    try:
-        described = str(data["network"])
-        if described != state.network.description:
-            raise InputError(
-                path,
-                f"holds a network of {described:.200}, not of {state.network.description}",
-                fix="Training can resume only with a network of the same shape: change the section network, "
-                "or remove training.continues.",
-            )
-        state.network.flat.copy_(torch.from_numpy(data["weights"]))
-        state.adam.first_moment.copy_(torch.from_numpy(data["first"]))
-        state.adam.second_moment.copy_(torch.from_numpy(data["second"]))
-        state.adam.steps = int(data["steps"])
-        state.best, state.best_mse = torch.from_numpy(data["best"]), float(data["best_mse"])
-        state.sections_done, state.samples = int(data["sections"]), int(data["samples"])
-        state.seconds = float(data["seconds"])
-        state.history = data["history"].tolist()
-    except KeyError as error:
-        raise InputError(path, f"is not a checkpoint of a training: it has no array {error}") from None
+    check_arrays(path, data, {"network": DECLARED["network"]}, fix=DELETE_IT)
+    described = str(data["network"])
+    if described != state.network.description:
+        raise InputError(
+            path,
+            printable(f"holds a network of {described:.200}, not of {state.network.description}", 500),
+            fix="Training can resume only with a network of the same shape: change the section network, "
+            "or remove training.continues.",
+        )
+    lengths = {"N": state.network.flat.numel()}
+    found = check_arrays(path, data, DECLARED, lengths, DELETE_IT)
+    if found["S"] != int(data["sections"]) or found["columns"] < len(COLUMNS):
+        raise InputError(path, "its history does not fit its number of sections", fix=DELETE_IT)
+    state.network.flat.copy_(torch.from_numpy(data["weights"]))
+    state.adam.first_moment.copy_(torch.from_numpy(data["first"]))
+    state.adam.second_moment.copy_(torch.from_numpy(data["second"]))
+    state.adam.steps = int(data["steps"])
+    state.best, state.best_mse = torch.from_numpy(data["best"]), float(data["best_mse"])
+    state.sections_done, state.samples = int(data["sections"]), int(data["samples"])
+    state.seconds, state.history = float(data["seconds"]), data["history"].tolist()
+    state.half = bool(data.get("half", state.half))
 
 
 def _numpy_copy(flat: torch.Tensor) -> np.ndarray:
@@ -205,13 +225,7 @@ NOT_IN_RECIPE_HASH = ("continues", "device", "keep", "patience", *Machines.model
 ADAM_KEYS = ("learning_rate", "beta1", "beta2", "l1")
 # The arrays of a checkpoint that determine how a training goes on. `run_name` includes them in the run's
 # name: weights, first and second (moments of the optimiser), and the numbers of steps and sections so far.
-START_ARRAYS = (
-    "weights",
-    "first",
-    "second",
-    "steps",
-    "sections",
-)
+START_ARRAYS = ("weights", "first", "second", "steps", "sections")
 # `precision: auto` uses bfloat16 for batches of this many rows or more, in which matrix products take most of
 # the time.
 BFLOAT16_FROM_BATCH = 256
@@ -284,44 +298,32 @@ def begin_or_resume(
     reads the checkpoint and sends the state to the other processes. These get `checkpoints` as the path,
     which they do not use.
     """
-    start_arrays = load_npz(start) if start is not None and processes.is_first else None
-    state = new_state(database, network, training, processes)
-    if not processes.is_first:
-        return _send_state(state, processes), checkpoints
-    state, own_path = _restore(state, training, recipe, checkpoints, start, start_arrays)
-    return _send_state(state, processes), own_path
-
-
-def _send_state(state: State, processes: Processes) -> State:
-    """Copy the first process's state to all processes."""
+    state, path = new_state(database, network, training, processes), checkpoints
+    if processes.is_first:
+        path = _restore(state, training, recipe, checkpoints, start)
     processes.take_from_first(state.network.flat, state.adam.first_moment, state.adam.second_moment)
-    numbers = processes.numbers_of_first(state.adam.steps, state.sections_done, state.samples)
-    state.adam.steps, state.sections_done, state.samples = numbers
-    return state
+    numbers = (state.adam.steps, state.sections_done, state.samples, int(state.half))
+    state.adam.steps, state.sections_done, state.samples, half = processes.numbers_of_first(*numbers)
+    state.half = bool(half)
+    return state, path
 
 
-def _restore(
-    state: State,
-    training: Training,
-    recipe: str,
-    checkpoints: Path,
-    start: Path | None,
-    start_arrays: Arrays | None,
-) -> tuple[State, Path]:
+def _restore(state: State, training: Training, recipe: str, checkpoints: Path, start: Path | None) -> Path:
     """Fill `state` from the run's own checkpoint or from `start`. Without both, leave it new.
 
-    For the arguments see `begin_or_resume`. start_arrays: what the file `start` holds. Returns the state and
-    the path of the run's own checkpoint.
+    For the arguments see `begin_or_resume`. Returns the path of the run's own checkpoint.
     """
+    start_arrays = None if start is None else load_npz(start)
     state.recipe = run_name(recipe, start_arrays)
     own_path = checkpoints / state.recipe / "checkpoint.npz"
     last_section = training.all_sections
     if own_path.exists():
         data = load_npz(own_path)
-        if int(data.get("sections", 0)) <= last_section:
+        check_arrays(own_path, data, {"sections": DECLARED["sections"]}, fix=DELETE_IT)
+        if int(data["sections"]) <= last_section:
             unpack(data, state, own_path)
             log.info("resuming from %s, after section %d of %d", own_path, state.sections_done, last_section)
-            return state, own_path
+            return own_path
         log.warning(
             "%s has more than %g passes, so it is not used and the training starts again",
             own_path,
@@ -336,7 +338,7 @@ def _restore(
                 start,
             )
         log.info("resuming from %s, after section %d of %d", start, state.sections_done, last_section)
-    return state, own_path
+    return own_path
 
 
 def _check_start(state: State, training: Training, path: Path) -> None:
@@ -367,9 +369,10 @@ def new_state(
     """The state before the first section: a new network for the database's rows, and a new optimiser."""
     skeleton = Skeleton.from_dict(database.skeleton)
     assert isinstance(network, TrainedOptions), "networks of this kind are built from rows without a training"
-    new_network = network.untrained_network(database.layout, skeleton, training.seed)
-    new_network = new_network.to(choose_device(training.device, processes))
-    return State(new_network, Adam(new_network, **training.model_dump(include=set(ADAM_KEYS))))
+    device = choose_device(training.device, processes)
+    new_network = network.untrained_network(database.layout, skeleton, training.seed).to(device)
+    adam = Adam(new_network, **training.model_dump(include=set(ADAM_KEYS)))
+    return State(new_network, adam, half=rounds_to_bfloat16(training, device))
 
 
 def choose_device(wanted: str, processes: Processes = ALONE) -> torch.device:
@@ -388,17 +391,21 @@ def choose_device(wanted: str, processes: Processes = ALONE) -> torch.device:
     return torch.device("cuda") if processes.is_alone else torch.device("cuda", processes.local_rank)
 
 
-def step_for(network: Trainable, training: Training) -> TrainingStep:
-    """The `TrainingStep` for the network's device and for the precision and batch size of the training.
+def rounds_to_bfloat16(training: Training, device: torch.device) -> bool:
+    """Whether a training that begins on this machine rounds the factors of matrix products to bfloat16."""
+    if training.precision != "auto" or training.batch < BFLOAT16_FROM_BATCH:
+        return training.precision == "bfloat16"
+    if device.type == "cpu":
+        return multiplies_bfloat16()
+    return torch.cuda.is_bf16_supported(including_emulation=False)
+
+
+def step_for(network: Trainable, training: Training, half: bool) -> TrainingStep:
+    """The `TrainingStep` for the network's device and the precision of the training. half: see `State`.
 
     The precision is that of the factors in matrix products; their sums are always float32. TF32 rounds the
     factors to 11 bits. PyTorch switches it on or off for the whole process.
     """
-    on_cpu = network.flat.device.type == "cpu"
-    precision = training.precision
-    half = precision == "bfloat16"
-    if precision == "auto" and training.batch >= BFLOAT16_FROM_BATCH:
-        half = multiplies_bfloat16() if on_cpu else torch.cuda.is_bf16_supported(including_emulation=False)
-    torch.backends.cuda.matmul.allow_tf32 = precision in ("auto", "tf32")
+    torch.backends.cuda.matmul.allow_tf32 = training.precision in ("auto", "tf32")
     torch.backends.cuda.matmul.allow_bf16_reduced_precision_reduction = False
     return network.step(training.dropout, half)

@@ -56,50 +56,32 @@ class Adam:
         network blends. They are without the L1 term, which is added here. share: factor of the learning rate.
         """
         self.steps += 1
-        if self.network.flat.device.type == "cpu":
-            self._step_on_cpu(gradients, *self.step_factors(share))
-        else:
-            factors = torch.tensor(self.step_factors(share))
-            self.step_with_torch(gradients, factors.to(self.network.flat.device, non_blocking=True))
-
-    def step_factors(self, share: float) -> tuple[float, float]:
-        """The factors that change from step to step: (rate, root).
-
-        rate: learning rate with the bias correction of the first moment. root: the bias correction by which
-        the square root of the second moment is multiplied.
-        """
-        steps = max(self.steps, 1)  # without this, the factors before the first step would divide by 0
-        rate = share * self.learning_rate / (1 - self.beta1**steps)
-        return rate, 1 / (1 - self.beta2**steps) ** 0.5
-
-    def _step_on_cpu(self, gradients: list[Tensor], rate: float, root: float) -> None:
-        """Take the step on a CPU. One loop goes through memory once, because memory limits the speed."""
-        views = [
-            self.network.layers,
-            self.network.views(self.first_moment),
-            self.network.views(self.second_moment),
-        ]
-        for *tensors, gradient, slope in zip(*views, gradients, self.slopes, strict=True):
-            arrays = [tensor.flatten(0, 1).numpy() for tensor in tensors]  # w, m and v of `_adam_loop`
-            arrays.append(gradient.view(tensors[0].shape).flatten(0, 1).numpy())
-            use_threads(tensors[0].numel())
-            numbers = (self.beta1, self.beta2, rate, root, slope, EPSILON)
-            _adam_loop(*arrays, *(arrays[0].dtype.type(number) for number in numbers))
-
-    def step_with_torch(self, gradients: list[Tensor], factors: Tensor) -> None:
-        """Take the step in PyTorch, on any device. factors: (2,) from `step_factors`, on the device."""
-        rate, root = factors.to(self.network.flat.dtype).unbind()
-        views = [
-            self.network.layers,
-            self.network.views(self.first_moment),
-            self.network.views(self.second_moment),
-        ]
+        rate = share * self.learning_rate / (1 - self.beta1**self.steps)  # with the first moment's correction
+        root = 1 / (1 - self.beta2**self.steps) ** 0.5  # the correction of the root of the second moment
+        update = _adam_on_cpu if self.network.flat.device.type == "cpu" else _adam_with_torch
+        views = [self.network.layers, *map(self.network.views, (self.first_moment, self.second_moment))]
         for w, m, v, gradient, slope in zip(*views, gradients, self.slopes, strict=True):
-            g = gradient.view(w.shape).to(w.dtype, copy=True)
-            g[:, :, :-1].add_(torch.sign(w[:, :, :-1]), alpha=slope)
-            m.lerp_(g, 1 - self.beta1)
-            v.mul_(self.beta2).addcmul_(g, g, value=1 - self.beta2)
-            w.addcdiv_(m * -rate, v.sqrt().mul_(root).add_(EPSILON))
+            update(w, m, v, gradient.view(w.shape), (self.beta1, self.beta2, rate, root, slope, EPSILON))
+
+
+Numbers = tuple[float, float, float, float, float, float]  # beta1, beta2, rate, root, slope, EPSILON
+
+
+def _adam_with_torch(w: Tensor, m: Tensor, v: Tensor, gradient: Tensor, numbers: Numbers) -> None:
+    """One step of Adam on a layer, on any device: parameters w, moments m and v."""
+    beta1, beta2, rate, root, slope, epsilon = numbers
+    g = gradient.to(w.dtype, copy=True)
+    g[:, :, :-1].add_(torch.sign(w[:, :, :-1]), alpha=slope)
+    m.lerp_(g, 1 - beta1)
+    v.mul_(beta2).addcmul_(g, g, value=1 - beta2)
+    w.addcdiv_(m * -rate, v.sqrt().mul_(root).add_(epsilon))
+
+
+def _adam_on_cpu(w: Tensor, m: Tensor, v: Tensor, gradient: Tensor, numbers: Numbers) -> None:
+    """The same on a CPU. One loop goes through memory once, because memory limits the speed."""
+    arrays = [tensor.flatten(0, 1).numpy() for tensor in (w, m, v, gradient)]
+    use_threads(w.numel())
+    _adam_loop(*arrays, *(arrays[0].dtype.type(number) for number in numbers))
 
 
 @njit(parallel=True, error_model="numpy")
@@ -108,7 +90,7 @@ def _adam_loop(
 ) -> None:
     """One step of Adam on a layer: parameters w, moments m and v, and gradient g, all (rows, in + 1).
 
-    b1, b2: beta1 and beta2. rate, root: see `Adam.step_factors`. slope: see `l1_slopes`.
+    b1, b2: beta1 and beta2. rate, root: see `Adam.step`. slope: see `l1_slopes`.
     """
     one, zero = w.dtype.type(1), w.dtype.type(0)
     last = w.shape[1] - 1
@@ -122,67 +104,44 @@ def _adam_loop(
             w[row, i] -= rate * m[row, i] / (root * np.sqrt(v[row, i]) + epsilon)
 
 
-# Updates the weights with one batch: computes the gradient and takes a step of the optimiser.
-#
-# On CUDA, the update of a small batch is captured as a graph, so that all its kernels start at once.
-
-
 class Update:
-    """Draws the dropout masks of a batch, computes the gradient and takes a step.
+    """Updates the weights with one batch: draws dropout masks, computes the gradient and takes a step.
 
-    undropped: blocks of columns of X that dropout never drops, such as channels. A dropped input gets its
-    mean value. So if channels were dropped, a hurt body would seem less hurt, and the network would rely less
-    on its channels.
-    """
+    If several processes train together, each has its own rows of a batch, maybe none. The loss is a mean over
+    the rows of the batch. So each process multiplies its gradient and loss by its share of the rows. Then the
+    sums over the processes are the gradient and the loss of the whole batch.
 
-    def __init__(self, step: TrainingStep, adam: Adam, undropped: Sequence[slice] = ()) -> None:
-        self.step, self.adam, self.undropped = step, adam, undropped
-
-    def masks(self, rows: int, own: slice = ALL_ROWS) -> list[Tensor]:
-        """Draw the dropout masks of a batch of `rows` rows, and return those of the rows `own`."""
-        masks = self.step.masks(rows, own)
-        for block in self.undropped:
-            masks[self.step.input_mask][:, block] = 1.0
-        return masks
-
-    def __call__(self, x: Tensor, y: Tensor, p: Tensor, share: float, total: int | None = None) -> Tensor:
-        """Train on x (B, X), y (B, Y) and phases p (B,). Returns the loss, a scalar tensor.
-
-        share: factor of the learning rate. total: rows of the batch over all processes, if there are several.
-        """
-        loss = self.step(x, y, p, self.masks(len(x)))
-        self.adam.step(self.step.gradients, share)
-        return loss
-
-
-class SharedUpdate(Update):
-    """The update by several processes. Each process has its own rows of the batch, maybe none.
-
-    The loss is a mean over the rows of the batch. So each process multiplies its gradient and loss by its
-    share of the rows. Then the sums over the processes are the gradient and the loss of the whole batch.
-
-    batch: rows of a whole batch.
+    batch: rows of a whole batch. undropped: blocks of columns of X that dropout never drops, such as
+    channels. A dropped input gets its mean value. So if channels were dropped, a hurt body would seem less
+    hurt, and the network would rely less on its channels.
     """
 
     def __init__(
         self,
         step: TrainingStep,
         adam: Adam,
-        processes: Processes,
-        batch: int,
+        batch: int = 0,
+        processes: Processes = ALONE,
         undropped: Sequence[slice] = (),
     ) -> None:
-        super().__init__(step, adam, undropped)
-        self.processes, self.own = processes, processes.own_places(batch)
-        # One buffer for the gradient and, in its last item, the loss, so that one message sends both.
-        self.sent = torch.empty(len(adam.network.flat) + 1, dtype=adam.network.flat.dtype)
-        self.sent = self.sent.to(adam.network.flat.device)
-        self.gradients = adam.network.views(self.sent[:-1])
+        self.step, self.adam, self.processes, self.undropped = step, adam, processes, undropped
+        self.own = processes.own_places(batch)
+        if not processes.is_alone:
+            # One buffer for the gradient and, in its last item, the loss, so that one message sends both.
+            self.sent = adam.network.flat.new_empty(len(adam.network.flat) + 1)
+            self.gradients = adam.network.views(self.sent[:-1])
 
     def __call__(self, x: Tensor, y: Tensor, p: Tensor, share: float, total: int | None = None) -> Tensor:
-        """See `Update.__call__`. Returns the loss of the whole batch."""
+        """Train on x (B, X), y (B, Y) and phases p (B,). Returns the loss, a scalar tensor.
+
+        share: factor of the learning rate. total: rows of the batch over all processes, if there are several.
+        """
+        if self.processes.is_alone:
+            loss = self.step(x, y, p, self._masks(len(x), ALL_ROWS))
+            self.adam.step(self.step.gradients, share)
+            return loss
         total = total or len(p)
-        masks = self.masks(total, slice(self.own.start, self.own.stop))
+        masks = self._masks(total, slice(self.own.start, self.own.stop))
         if len(p):
             loss = self.step(x, y, p, masks)
             for to_send, gradient in zip(self.gradients, self.step.gradients, strict=True):
@@ -196,17 +155,12 @@ class SharedUpdate(Update):
         self.adam.step(self.gradients, share)
         return self.sent[-1].clone()
 
-
-def update_for(
-    step: TrainingStep, adam: Adam, rows: int, processes: Processes = ALONE, undropped: Sequence[slice] = ()
-) -> Update:
-    """The fastest update for batches of `rows` rows.
-
-    On CUDA it is captured if there is one process and the batches are small.
-    """
-    if not processes.is_alone:
-        return SharedUpdate(step, adam, processes, rows, undropped)
-    return Update(step, adam, undropped)
+    def _masks(self, rows: int, own: slice) -> list[Tensor]:
+        """Draw the dropout masks of a batch of `rows` rows, and return those of the rows `own`."""
+        masks = self.step.masks(rows, own)
+        for block in self.undropped:
+            masks[self.step.input_mask][:, block] = 1.0
+        return masks
 
 
 # Keeps a network symmetric during its training: mirrored inputs then give exactly the mirrored outputs.

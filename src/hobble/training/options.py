@@ -178,6 +178,11 @@ class Training(Machines, Recipe):
             )
         if self.gpus and self.device == "cpu":
             raise ValueError("`gpus` needs `device: cuda` or `device: auto`")
+        if self.stretches and self.stretches % self.count:
+            raise ValueError(
+                f"`stretches` ({self.stretches}) must be a multiple of the {self.count} processes: "
+                "each process reads whole stretches"
+            )
         if self.count > self.batch:
             raise ValueError(
                 f"{self.count} processes share a batch of {self.batch}: each needs at least one sample"

@@ -20,7 +20,7 @@ import torch.distributed
 from torch import Tensor
 
 from hobble.core.errors import HobbleError
-from hobble.database.order import SectionSharing, own_places
+from hobble.database.order import own_part
 
 LONGEST_WAIT = timedelta(minutes=30)  # for the slowest process; a dead process is noticed at once
 
@@ -48,15 +48,7 @@ class Processes:
 
     def own_places(self, batch: int) -> range:
         """The places in a batch that this process fills."""
-        return own_places(batch, self.rank, self.count)
-
-    def share_section(self, total: int, batch: int, stretches: int | None) -> SectionSharing:
-        """What this process reads of a section of `total` samples, in batches of `batch` samples.
-
-        stretches: number of consecutive parts that the section is cut into. Each batch takes samples from
-        every part. None: one part for each process.
-        """
-        return SectionSharing.for_process(total, batch, stretches or self.count, self.rank, self.count)
+        return own_part(batch, self.rank, self.count)
 
     def sum(self, values: Tensor) -> None:
         """Replace values (n,) by their sum over the processes. All processes get the same bits."""

@@ -22,8 +22,8 @@ from hobble.models.load import load_network
 from hobble.models.model import BuiltOptions, FinishedNetwork, Options
 from hobble.models.network import TERRAIN_SIDE, Network, TrainingFacts
 from hobble.rows.layout import CONTACTS, GAITS
-from hobble.training.batches import TRAIN, HeldOutErrors
-from hobble.training.checkpoint import State, duration, pack, write_history
+from hobble.training.batches import HELD_OUT, TRAIN, HeldOutErrors, PredictsStandardised
+from hobble.training.checkpoint import duration, pack, write_history
 from hobble.training.options import Training
 from hobble.training.train import train
 
@@ -80,78 +80,7 @@ def network_metadata(
     )  # keys are not sorted, because the skeleton's joints must keep the order of the columns
 
 
-# Builds a network that needs no training, such as motion matching, from the clips.
-
-
 log = logging.getLogger("hobble.training")
-
-
-def build_and_save(
-    database: Database,
-    clips: Mapping[str, str | Path],
-    *,
-    configuration: str,
-    network: Options,
-    weights: Path,
-    history: Path,
-    checkpoint: Path,
-    terrain_side: float,
-) -> None:
-    """Build a network and write the files that a training would write: weights, history and checkpoint.
-
-    clips: name -> file with the clip's rows in order; it has at least the training clips of the database.
-    configuration: its name. terrain_side: distance from the path to the points at its sides where rows have
-    ground heights, cm. The history has one line, because every frame is read once. The checkpoint only
-    describes the network; training cannot resume from it.
-    """
-    began = time.perf_counter()
-    built, rows = build(database, network, clips)
-    seconds = time.perf_counter() - began
-    log.info("%s, from %d rows in %s", built.description, rows, duration(seconds))
-    about_training = {"passes": 1, "samples": rows, "steps": 0, "terrain_side": terrain_side}
-    write_weights(weights, built, database, configuration, about_training)
-    blocks = database.layout.blocks("y")
-    errors = HeldOutErrors(database, torch.device("cpu"), 0).errors_on_every_row(
-        StandardisedNetwork(load_network(weights))
-    )
-    log.info("error on every held-out row: %.4f", errors[0])
-    write_history(history, blocks, [[1, 1, rows, seconds, float("nan"), *errors]])
-    save_npz(checkpoint, network=np.array(built.description), sections=np.array(0))
-
-
-def build(
-    database: Database, network: Options, clips: Mapping[str, str | Path]
-) -> tuple[FinishedNetwork, int]:
-    """Build the network from the training clips; return it and the number of their rows in the database.
-
-    clips: as in `build_and_save`. Raises InputError if a file does not fit the database, and HobbleError if
-    a clip has no file.
-    """
-    assert isinstance(network, BuiltOptions), "this kind is trained, not built"
-    used = [clip for clip in database.manifest.clips if clip["split"] == TRAIN and clip["rows"]]
-    if missing := [clip["clip"] for clip in used if clip["clip"] not in clips]:
-        raise HobbleError(
-            f"the database has rows of {', '.join(missing)}, but the files of these clips are missing"
-        )
-    files = [clips[clip["clip"]] for clip in used]
-    built = network.build(files, database.layout, Skeleton.from_dict(database.skeleton))
-    return built, sum(clip["rows"] for clip in used)
-
-
-class StandardisedNetwork:
-    """A network read from a file, with standardised inputs and outputs like a network in training."""
-
-    def __init__(self, network: Network) -> None:
-        self.network, self.outputs = network, len(network.y_mean)
-
-    def __call__(self, x: Tensor, p: Tensor) -> Tensor:
-        """Standardised outputs (B, Y) of standardised inputs x (B, X) at phases p (B,)."""
-        n = self.network
-        y = n.predict(x.numpy() * n.x_std + n.x_mean, p.numpy())
-        return torch.from_numpy((y - n.y_mean) / np.maximum(n.y_std, 1e-30))
-
-
-# Entry point of the stage `training`: from a database on disk to weights, history and checkpoint.
 
 
 def run(
@@ -177,71 +106,85 @@ def run(
     training, checkpoints, threads, start, code: as in `hobble.training.train.train`. terrain_side: distance
     from the path to the points at its sides where rows have ground heights, cm. clips: name -> file with the
     clip's rows in order, needed only for a network that is built, not trained.
+
+    For a built network, the history has one line, because every frame is read once. Its checkpoint only
+    describes the network; training cannot resume from it.
     """
-    data = Database.open(database, training.memory_mb).with_phase_weight(training.phase_weight)
+    data = Database.open(database, training.memory_mb, training.phase_weight)
+
+    def write(finished: FinishedNetwork, about: Mapping[str, Any]) -> None:
+        write_weights(weights, finished, data, configuration, {**about, "terrain_side": terrain_side})
+
     if isinstance(network, BuiltOptions):
-        build_and_save(
-            data,
-            clips or {},
-            configuration=configuration,
-            network=network,
-            weights=weights,
-            history=history,
-            checkpoint=checkpoint,
-            terrain_side=terrain_side,
-        )
-        return
-    state = train(
-        data,
-        network=network,
-        training=training,
-        checkpoints=checkpoints,
-        threads=threads,
-        start=start,
-        code=code,
-    )
-    _write(state, data, configuration, training, terrain_side, weights, history, checkpoint)
+        began = time.perf_counter()
+        built, rows = build(data, network, clips or {})
+        seconds = time.perf_counter() - began
+        log.info("%s, from %d rows in %s", built.description, rows, duration(seconds))
+        write(built, {"passes": 1, "samples": rows, "steps": 0})
+        errors = errors_on_held_out(data, StandardisedNetwork(load_network(weights)))
+        lines = [[1, 1, rows, seconds, float("nan"), *errors]]
+        arrays = {"network": np.array(built.description), "sections": np.array(0)}
+    else:
+        options = {"network": network, "training": training, "checkpoints": checkpoints}
+        state = train(data, **options, threads=threads, start=start, code=code)  # type: ignore[arg-type]
+        arrays, lines = pack(state), state.history  # of the last weights, before the best ones replace them
+        about = {
+            "passes": count_passes(state.sections_done, training.sections),
+            "samples": state.samples,
+            "steps": state.adam.steps,
+            "precision": "bfloat16" if state.half else "float32",
+        }
+        if training.keep == "best" and state.best is not None:
+            state.network.flat.copy_(state.best)
+            about["best_section"] = state.sections_done - state.sections_since_best
+            log.info("best weights: section %d of %d", about["best_section"], state.sections_done)
+        errors = errors_on_held_out(data, state.network, state.network.flat.device)
+        if data.row_count(HELD_OUT):
+            about["held_out_mse"] = errors[0]
+        write(state.network, about)
+    write_history(history, data.layout.blocks("y"), lines)
+    save_npz(checkpoint, **arrays)
 
 
-def _write(
-    state: State,
-    data: Database,
-    configuration: str,
-    training: Training,
-    terrain_side: float,
-    weights: Path,
-    history: Path,
-    checkpoint: Path,
-) -> None:
-    """Measure the held-out error of the finished network, and write the three files."""
-    checkpoint_arrays = pack(state)  # of the last state, before the best weights replace the last ones
-    about_training = _training_numbers(state, training) | {"terrain_side": terrain_side}
-    if training.keep == "best" and state.best is not None:
-        state.network.flat.copy_(state.best)
-        about_training["best_section"] = state.sections_done - state.sections_since_best
-        log.info(
-            "best weights: section %d of %d, by the held-out error",
-            about_training["best_section"],
-            state.sections_done,
-        )
-    blocks = data.layout.blocks("y")
-    errors = HeldOutErrors(data, state.network.flat.device, 0).errors_on_every_row(state.network)
-    named = zip(["all outputs", *blocks], errors, strict=True)
+def errors_on_held_out(
+    data: Database, network: PredictsStandardised, device: torch.device | str = "cpu"
+) -> list[float]:
+    """The errors of `HeldOutErrors` on every held-out row, which are also logged."""
+    errors = HeldOutErrors(data, torch.device(device), 0).errors_on_every_row(network)
+    named = zip(["all outputs", *data.layout.blocks("y")], errors, strict=True)
     log.info("error on every held-out row: %s", ", ".join(f"{name} {error:.4f}" for name, error in named))
-    if data.row_count("held_out"):
-        about_training["held_out_mse"] = errors[0]
-    write_weights(weights, state.network, data, configuration, about_training)
-    write_history(history, blocks, state.history)
-    save_npz(checkpoint, **checkpoint_arrays)
+    return errors
 
 
-def _training_numbers(state: State, training: Training) -> dict[str, Any]:
-    """Passes, samples and optimiser steps of a training, for the metadata in the file of its weights."""
-    return {
-        "passes": count_passes(state.sections_done, training.sections),
-        "samples": state.samples,
-        "steps": state.adam.steps,
-    }
+def build(
+    database: Database, network: BuiltOptions, clips: Mapping[str, str | Path]
+) -> tuple[FinishedNetwork, int]:
+    """Build the network from the training clips; return it and the number of their rows in the database.
+
+    clips: as in `run`. Raises InputError if a file does not fit the database, and HobbleError if
+    a clip has no file.
+    """
+    used = [clip for clip in database.manifest.clips if clip["split"] == TRAIN and clip["rows"]]
+    if missing := [clip["clip"] for clip in used if clip["clip"] not in clips]:
+        raise HobbleError(
+            f"the database has rows of {', '.join(missing)}, but the files of these clips are missing"
+        )
+    files = [clips[clip["clip"]] for clip in used]
+    built = network.build(files, database.layout, Skeleton.from_dict(database.skeleton))
+    return built, sum(clip["rows"] for clip in used)
+
+
+class StandardisedNetwork:
+    """A network read from a file, with standardised inputs and outputs like a network in training."""
+
+    def __init__(self, network: Network) -> None:
+        self.network, self.outputs = network, len(network.y_mean)
+
+    def __call__(self, x: Tensor, p: Tensor) -> Tensor:
+        """Standardised outputs (B, Y) of standardised inputs x (B, X) at phases p (B,)."""
+        n = self.network
+        y = n.predict(x.numpy() * n.x_std + n.x_mean, p.numpy())
+        return torch.from_numpy((y - n.y_mean) / np.maximum(n.y_std, 1e-30))
 
 
 def count_passes(sections: int, per_pass: int) -> float:

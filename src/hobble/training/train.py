@@ -17,8 +17,8 @@ import numpy as np
 from hobble.core.errors import HobbleError
 from hobble.database.reader import Database
 from hobble.models.model import Options
-from hobble.training.augment import OtherPaces, OtherPoses, RollOut, VersionPoses
-from hobble.training.batches import SPLIT, TRAIN, HeldOutErrors, HostRows, LossWatch
+from hobble.training.augment import augmentations
+from hobble.training.batches import HELD_OUT, TRAIN, HeldOutErrors, HostRows, LossWatch
 from hobble.training.checkpoint import (
     Saver,
     State,
@@ -29,7 +29,7 @@ from hobble.training.checkpoint import (
     step_for,
     use_threads,
 )
-from hobble.training.optimiser import Symmetry, update_for
+from hobble.training.optimiser import Symmetry, Update
 from hobble.training.options import Training
 from hobble.training.processes import ALONE, Processes
 
@@ -62,7 +62,7 @@ def train(
     clip is held out, and if `symmetric` is set for a network that cannot be symmetric.
     """
     use_threads(threads)
-    if (training.patience or training.keep == "best") and not database.row_count(SPLIT):
+    if (training.patience or training.keep == "best") and not database.row_count(HELD_OUT):
         raise HobbleError(
             "`training.keep: best` and training.patience need the held-out error, but no clip is held out. "
             "List some clips under held_out in the data set."
@@ -95,17 +95,13 @@ def _run(
     """Train section by section, and change `state` in place. recorder: None except in the first process."""
     sections, seed = training.sections, training.seed
     device, batch_size = state.network.flat.device, training.batch
-    step = step_for(state.network, training)
-    update = update_for(step, state.adam, batch_size, processes, _undropped_inputs(database, training))
+    step = step_for(state.network, training, state.half)
+    update = Update(step, state.adam, batch_size, processes, _undropped_inputs(database, training))
     symmetry = Symmetry(state.network, database) if training.symmetric else None
     if symmetry and not state.adam.steps:  # no step yet, so the weights are new
         symmetry.make_new_network_symmetric()
     rows = HostRows(database, device, processes, training.stretches)
-    places = processes.own_places(batch_size)  # the places in each batch that this process fills
-    other_poses = OtherPoses(database, training.other_poses, len(places), device, places.start)
-    version_poses = VersionPoses(database, training.version_poses, len(places), device, places.start)
-    other_paces = OtherPaces(database, training.other_paces, len(places), device, places.start)
-    roll_out = RollOut(database, training.rollout, len(places), device, places.start)
+    augmented = augmentations(database, training, processes.own_places(batch_size), device)
     samples = database.sample_count(TRAIN)
     for index in range(state.sections_done, training.all_sections):
         if (
@@ -118,20 +114,15 @@ def _run(
         where = f"pass {pass_index + 1} of {training.passes:g}, section {section + 1} of {sections}"
         watch = LossWatch(where, database.clips, processes)
         step.seed(section_seed(seed, index))
-        other_poses.begin_section()
-        version_poses.begin_section()
-        other_paces.begin_section()
-        roll_out.begin_section()
+        for augmentation in augmented:
+            augmentation.begin_section()
         for batch in rows.batches(pass_index, section, sections, seed, batch_size):
-            # Play the motion slower or faster. Mix in poses of rows with other channel values, then poses of
-            # hurt or healthy versions of the same clip. Add the network's own errors.
-            other_paces.play(batch.x, batch.y)
-            other_poses.mix(batch.x, batch.p)
-            version_poses.mix(batch.x, batch.p, batch.clip)
-            roll_out.add(batch.x)
-            rate_share = training.learning_rate_share((state.samples + watch.seen) / samples)
+            for augmentation in augmented if len(batch.p) else ():
+                augmentation.change(batch)
+            rate_share = training.learning_rate_share((state.samples + watch.samples) / samples)
             watch.add(update(batch.x, batch.y, batch.p, rate_share, batch.total), batch)
-            roll_out.remember(step.error)
+            for augmentation in augmented:
+                augmentation.after(step.error)
             if symmetry:
                 symmetry.after_step(state.adam.steps)
         if symmetry:

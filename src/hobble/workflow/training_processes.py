@@ -193,7 +193,7 @@ def _train(job: dict[str, Any]) -> None:
     training = Training.model_validate(job["training"])
     with join_processes(training.device == "cuda") as processes:
         train(
-            Database.open(job["database"], training.memory_mb),
+            Database.open(job["database"], training.memory_mb, training.phase_weight),
             network=network_options(job["network"]),
             training=training,
             checkpoints=Path(job["checkpoints"]),

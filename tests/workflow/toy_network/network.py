@@ -7,8 +7,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from hobble.core.errors import InputError
-from hobble.models.load import read_numbers
+from hobble.core.declared import ArrayOf
+from hobble.models.load import read_arrays
 from hobble.models.model import Trainable
 from hobble.models.network import Network, inverse_or_0, pack_layer, standardise_inputs
 
@@ -23,10 +23,10 @@ class Toy(Network):
 
     @classmethod
     def read(cls, path, arrays, shared_fields):
-        w, b = read_numbers(path, arrays, "W0", 2), read_numbers(path, arrays, "b0", 1)
-        if w.shape != (len(shared_fields["y_mean"]), len(shared_fields["x_mean"])) or b.shape != w.shape[:1]:
-            raise InputError(path, f"W0 {w.shape} and b0 {b.shape} do not fit")
-        return cls(weights=w, biases=b, **shared_fields)
+        outputs, inputs = len(shared_fields["y_mean"]), len(shared_fields["x_mean"])
+        declared = {"W0": ArrayOf((outputs, inputs)), "b0": ArrayOf((outputs,))}
+        found, _ = read_arrays(path, arrays, declared)
+        return cls(weights=found["W0"], biases=found["b0"], **shared_fields)
 
     @property
     def sizes(self):

@@ -12,12 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
+from hobble.core.declared import ArrayOf
 from hobble.core.errors import InputError
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 from hobble.models.blend import BlendedNetwork, BlendedOptions, TrainableBlend
 from hobble.models.forward import forward, softmax
-from hobble.models.load import read_layers
+from hobble.models.load import read_arrays, read_layers
 from hobble.models.model import Trainable
 from hobble.models.network import pack_layer
 from hobble.rows.layout import GAITS, RowLayout
@@ -100,7 +101,10 @@ class Mann(BlendedNetwork):
 
         `gate` (G,) holds the columns of X that the gate gets.
         """
-        columns = _read_gate_columns(path, arrays, weights[0].shape[2])
+        inputs = weights[0].shape[2]
+        columns = read_arrays(path, arrays, {"gate": ArrayOf(("G",), "iu", 0, inputs - 1)})[0]["gate"]
+        if len(np.unique(columns)) != len(columns):
+            raise InputError(path, "gate must hold columns of X, each at most once")
         gate_weights, gate_biases = read_layers(path, arrays, "Vd", len(columns), len(weights[0]))
         return {"gate_weights": gate_weights, "gate_biases": gate_biases, "columns": columns}
 
@@ -146,18 +150,6 @@ class Mann(BlendedNetwork):
 
         h = add_layers(g, self.gate_weights, self.gate_biases, g("Gather", z, self.columns, axis=1))
         return None, g("Softmax", h, axis=1)
-
-
-def _read_gate_columns(path: str | Path, arrays: Mapping[str, Any], inputs: int) -> NDArray[np.int64]:
-    """The array `gate`: the columns of X that the gate gets. inputs: number of columns of X."""
-    if "gate" not in arrays:
-        raise InputError(path, "not a network: no gate")
-    array = np.asarray(arrays["gate"])
-    if array.ndim != 1 or array.dtype.kind not in "iu" or not array.size:
-        raise InputError(path, f"gate has shape {array.shape} and type {array.dtype}, not columns of X")
-    if array.min() < 0 or array.max() >= inputs or len(np.unique(array)) != array.size:
-        raise InputError(path, f"gate must hold columns of X (0 to {inputs - 1}), each at most once")
-    return array.astype(np.int64)
 
 
 @dataclass(frozen=True)

@@ -16,24 +16,21 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field
 from scipy.spatial import cKDTree
 
 from hobble.core.compiled import njit
+from hobble.core.declared import ArrayOf, read_declared
 from hobble.core.errors import InputError
 from hobble.core.files import to_base64
 from hobble.core.quat import Array
-from hobble.models.load import (
-    LARGEST_MEAN,
-    read_numbers,
-    require_number_in_range,
-    require_whole_number,
-)
-from hobble.models.network import STORAGES, Network, inverse_or_0, pack_table, standardise_inputs
-from hobble.models.predict import standardise_columns
+from hobble.models.load import LARGEST_MEAN, read_arrays
+from hobble.models.network import STORAGES, Network, pack_table, standardise_inputs
+from hobble.models.predict import StandardisingPredictor
 
 # Largest number of rows of the tables. The page keeps row numbers in float32, which is exact up to here.
 MOST_ROWS = 1 << 24
@@ -58,6 +55,14 @@ OFFSETS_PER_JOINT = 12
 # and the column of the change of phase.
 POSITION, VELOCITY, ROTATION, PHASE_CHANGE = 0, 1, 2, 3
 FASTEST_PULL = 0.002  # cycles per frame: the phase is corrected toward the clip's phase by at most this
+
+
+@dataclass(frozen=True)
+class Playing:
+    """The entries of `meta` for motion matching; see `Matching`."""
+
+    every: Annotated[int, Field(strict=True, ge=1, le=MOST_FRAMES)]
+    halflife: Annotated[float, Field(strict=True, gt=0, le=MOST_FRAMES)]
 
 
 @dataclass(frozen=True)
@@ -87,27 +92,19 @@ class Matching(Network):
     @classmethod
     def read(cls, path: str | Path, arrays: Mapping[str, Any], shared_fields: Mapping[str, Any]) -> Matching:
         """As in `Model`. arrays: those of `hobble.models.matching.build.Tables`."""
-        meta, inputs, outputs = (
-            shared_fields["meta"],
-            len(shared_fields["x_mean"]),
-            len(shared_fields["y_mean"]),
-        )
-        frames = read_numbers(path, arrays, "frames", 2, LARGEST_MEAN)
-        features = read_numbers(path, arrays, "features", 2, LARGEST_MEAN)
-        phases = read_numbers(path, arrays, "phase", 1, 1.0)
-        weights = read_numbers(path, arrays, "feature_weights", 1, MOST_WEIGHT)
-        columns = _whole_numbers(path, arrays, "columns", inputs - 1)
-        remaining = _whole_numbers(path, arrays, "remaining", MOST_ROWS)
-        rows, n = len(frames), len(columns)
-        expected = {"frames": (rows, outputs), "features": (rows, n), "phase": (rows,), "remaining": (rows,)}
-        arrays_read = {"frames": frames, "features": features, "phase": phases, "remaining": remaining}
-        for name, shape in expected.items():
-            if arrays_read[name].shape != shape:
-                raise InputError(path, f"{name} has shape {arrays_read[name].shape}, expected {shape}")
-        if weights.shape != (n,) or weights.min() < 0:
-            raise InputError(path, f"feature_weights has to hold {n} numbers of 0 or more")
-        if rows > MOST_ROWS:
-            raise InputError(path, f"{rows} frames; at most {MOST_ROWS} are allowed")
+        inputs, outputs = len(shared_fields["x_mean"]), len(shared_fields["y_mean"])
+        declared = {
+            "frames": ArrayOf(("frames", outputs), "fiu", -LARGEST_MEAN, LARGEST_MEAN),
+            "features": ArrayOf(("frames", "features"), "fiu", -LARGEST_MEAN, LARGEST_MEAN),
+            "phase": ArrayOf(("frames",), "fiu", -1, 1),
+            "feature_weights": ArrayOf(("features",), "fiu", 0, MOST_WEIGHT),
+            "columns": ArrayOf(("features",), "iu", 0, inputs - 1),
+            "remaining": ArrayOf(("frames",), "iu", 0, MOST_ROWS),
+        }
+        found, lengths = read_arrays(path, arrays, declared)
+        remaining = found["remaining"]
+        if lengths["frames"] > MOST_ROWS:
+            raise InputError(path, f"{lengths['frames']} frames; at most {MOST_ROWS} are allowed")
         # With this check, a character that plays a run never gets beyond the end of the table.
         if (
             remaining[-1] != 0
@@ -116,15 +113,16 @@ class Matching(Network):
             raise InputError(path, "remaining has to count down by 1 a row, to 0 at the end of each run")
         if shared_fields["skeleton"] is None:
             raise InputError(path, "motion matching needs a skeleton, but the meta of the file has none")
+        playing = read_declared(path, "meta", Playing, shared_fields["meta"])
         return cls(
-            features=features,
-            frames=frames,
-            phases=phases,
+            features=found["features"],
+            frames=found["frames"],
+            phases=found["phase"],
             remaining=remaining,
-            columns=columns,
-            weights=weights,
-            every=require_whole_number(path, "every", meta.get("every"), 1, MOST_FRAMES),
-            halflife=require_number_in_range(path, "halflife", meta.get("halflife"), MOST_FRAMES),
+            columns=found["columns"],
+            weights=found["feature_weights"],
+            every=playing.every,
+            halflife=playing.halflife,
             **shared_fields,
         )
 
@@ -250,30 +248,18 @@ class Matching(Network):
         }
 
 
-def _whole_numbers(path: str | Path, arrays: Mapping[str, Any], name: str, most: int) -> NDArray[np.int64]:
-    """The array `name` of whole numbers (n,) from 0 to `most`."""
-    if name not in arrays:
-        raise InputError(path, f"not a network for motion matching: it has no array {name}")
-    array = np.asarray(arrays[name])
-    if array.dtype.kind not in "iu" or array.ndim != 1 or not array.size:
-        raise InputError(
-            path, f"{name} has shape {array.shape} and type {array.dtype}, not a list of whole numbers"
-        )
-    if array.min() < 0 or array.max() > most:
-        raise InputError(path, f"{name} holds numbers outside 0 to {most}")
-    return array.astype(np.int64)
-
-
-class MatchingPredictor:
+class MatchingPredictor(StandardisingPredictor):
     """Motion matching prepared to run; a `hobble.models.network.Predictor`.
 
     storage: how it keeps the frames: "float32", or "int16" with a factor for each column.
     """
 
+    network: Matching
+
     def __init__(self, network: Matching, storage: str = "float32") -> None:
+        super().__init__(network)
         if storage not in STORAGES:
             raise ValueError(f"storage {storage!r}: not one of {', '.join(STORAGES)}")
-        self.network = network
         self._frames, self._scale = network.frames, np.ones(network.frames.shape[1], np.float32)
         if storage == "int16":
             self._scale = np.maximum(np.abs(network.frames).max(axis=0) / 32767, 1e-30).astype(np.float32)
@@ -283,17 +269,9 @@ class MatchingPredictor:
             layout.y_joint_position, layout.y_joint_velocity, layout.y_joint_rotation, layout.y_phase_change
         )  # fmt: skip
         self._first_columns = np.array([block.start for block in blocks], np.int64)
-        self._x_mean, self._x_inverse = (
-            np.ascontiguousarray(statistic, np.float32)
-            for statistic in (network.x_mean, inverse_or_0(network.x_std))
-        )
         _ = network.tree  # build the tree now, not in the first frame
 
-    def standardise(self, x: Array, z: Array) -> None:
-        """As in `Predictor`."""
-        standardise_columns(x, self._x_mean, self._x_inverse, z)
-
-    def evaluate(self, z: Array, phase: Array, out: Array, memory: Array | None = None) -> None:
+    def evaluate(self, z: Array, phase: Array, out: Array, memory: Any = None, *_: Any) -> None:
         """As in `Predictor`. memory: (C, M) float64 with M = `Network.memory_size`. With None or zeros, each
         character shows the frame nearest to its inputs."""
         network, count = self.network, len(z)
@@ -327,15 +305,6 @@ class MatchingPredictor:
         nearer = np.square(queries - network.features[found]).sum(axis=1) < distance**2
         stay = ~nearer | (np.abs(found - following) <= SURROUNDING)
         return np.where(stay & (following >= 0), following, found)
-
-    def predict(self, x: Array, phase: Array, out: Array | None = None, memory: Array | None = None) -> Any:
-        """As in `Predictor`."""
-        z = np.empty_like(x)
-        self.standardise(x, z)
-        if out is None:
-            out = np.empty((len(x), self.network.frames.shape[1]), np.float32)
-        self.evaluate(z, phase, out, memory)
-        return out
 
 
 def memory_size(joints: int) -> int:
