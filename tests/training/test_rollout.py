@@ -78,24 +78,20 @@ def test_poses_carry_the_same_errors_as_a_roll_out(data: Database) -> None:
 
 
 def test_each_place_restarts_after_its_frames(data: Database) -> None:
-    """A fifth of the places restarts at every batch. With one frame, only recorded poses are used."""
+    """A fifth of the places restarts at every batch."""
     frames, rows = 5, 10
-    for length in (frames, 1):
-        carried = RollOut(data, frames, range(rows), CPU)
-        carried.begin_section()
-        zero = []
-        for _ in range(3 * frames):
-            x = torch.zeros(rows, data.layout.x_size)
-            change(carried, x)
-            zero.append((torch.count_nonzero(x, dim=1) == 0).numpy())
-            carried.after(torch.ones(rows, data.layout.y_size))
-        if length == 1:
-            assert np.all(zero)
-            continue
-        assert zero[0].all()
-        counts = np.sum(zero[frames:], axis=1)
-        assert set(counts) == {rows // frames}
-        assert set(np.sum(zero[frames : 2 * frames], axis=0)) == {1}
+    carried = RollOut(data, frames, range(rows), CPU)
+    carried.begin_section()
+    zero = []
+    for _ in range(3 * frames):
+        x = torch.zeros(rows, data.layout.x_size)
+        change(carried, x)
+        zero.append((torch.count_nonzero(x, dim=1) == 0).numpy())
+        carried.after(torch.ones(rows, data.layout.y_size))
+    assert zero[0].all()
+    counts = np.sum(zero[frames:], axis=1)
+    assert set(counts) == {rows // frames}
+    assert set(np.sum(zero[frames : 2 * frames], axis=0)) == {1}
 
 
 def test_training_uses_the_roll_outs(
