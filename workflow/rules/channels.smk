@@ -2,14 +2,7 @@ rule channel_clips:
     """The values of the data set's channels in each frame of clips and of their mirrors."""
     input:
         batches=folders("motion"),
-        files=lambda w: keep_local(
-            [
-                file
-                for channel in batches.channels(batch_of(w))
-                for clip in batch_of(w).clips
-                for file in channel_files(w.dataset, clip, channel)
-            ]
-        ),
+        files=local_files(channel_inputs),
     output:
         batch=directory("results/datasets/{dataset}/batches/channels/{batch}"),
     log:
@@ -32,7 +25,7 @@ rule channel_clips:
             for channel in batches.channels(batch_of(w))
             for clip in batch_of(w).clips
         ],
-        contents=contents_of,
+        contents=contents_of(channel_inputs),
         mirrored=lambda w: batch_of(w).mirrored,
     script:
         "../scripts/channel_clips.py"

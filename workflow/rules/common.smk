@@ -12,9 +12,53 @@ comparison = project.comparison
 contents = Contents(project.base / "data" / "downloaded")
 
 
-def contents_of(w, input):
-    """A param: hashes of the user's files among a job's inputs, see hobble.workflow.contents."""
-    return contents.of(input)
+def contents_of(files):
+    """A param function: hashes of the user's files, see hobble.workflow.contents. files: an input function.
+
+    (Snakemake does not compare params that are made from `input`.)
+    """
+    return lambda w: contents.of(files(w))
+
+
+def local_files(files):
+    """An input function: what the input function `files` returns, marked as local."""
+    return lambda w: keep_local(files(w))
+
+
+def motion_inputs(w):
+    """The BVH files of a batch's clips, and the files of their rigs."""
+    return [
+        file
+        for clip in batch_of(w).clips
+        for file in [
+            clips.source(w.dataset, clip),
+            *clips.clip_skeleton_files(w.dataset, clip),
+        ]
+    ]
+
+
+def label_inputs(w):
+    """The label files of a batch's clips."""
+    return [
+        file
+        for clip in batch_of(w).clips
+        for file in clips.label_files(w.dataset, clip)
+    ]
+
+
+def channel_inputs(w):
+    """The files that a batch's channels read."""
+    return [
+        file
+        for channel in batches.channels(batch_of(w))
+        for clip in batch_of(w).clips
+        for file in channel_files(w.dataset, clip, channel)
+    ]
+
+
+def heightmap_inputs(w):
+    """The heightmaps of a data set that are files."""
+    return clips.heightmap_files(w.dataset)
 
 
 wildcard_constraints:

@@ -2,13 +2,7 @@ rule labels_clips:
     """Contacts, phase and gait of clips and their mirrors. Label files beside a clip are used if there are any."""
     input:
         batches=folders("motion"),
-        files=lambda w: keep_local(
-            [
-                file
-                for clip in batch_of(w).clips
-                for file in clips.label_files(w.dataset, clip)
-            ]
-        ),
+        files=local_files(label_inputs),
     output:
         batch=directory("results/datasets/{dataset}/batches/labels/{batch}"),
     log:
@@ -28,7 +22,7 @@ rule labels_clips:
             }
             for clip in batch_of(w).clips
         ],
-        contents=contents_of,
+        contents=contents_of(label_inputs),
         mirrored=lambda w: batch_of(w).mirrored,
         options=lambda w: datasets.options(w.dataset, "labels"),
         code=lambda w: package.code("labels_clips"),

@@ -20,16 +20,7 @@ rule download_clip:
 rule motion_clips:
     """Clips made from BVH files: checked, retargeted to the data set's skeleton, at 60 Hz. Also their mirrors."""
     input:
-        files=lambda w: keep_local(
-            [
-                file
-                for clip in batch_of(w).clips
-                for file in [
-                    clips.source(w.dataset, clip),
-                    *clips.clip_skeleton_files(w.dataset, clip),
-                ]
-            ]
-        ),
+        files=local_files(motion_inputs),
         skeleton=lambda w: keep_local(clips.skeleton_file(w.dataset)),
     output:
         batch=directory("results/datasets/{dataset}/batches/motion/{batch}"),
@@ -49,7 +40,7 @@ rule motion_clips:
             }
             for clip in batch_of(w).clips
         ],
-        contents=contents_of,
+        contents=contents_of(motion_inputs),
         mirrored=lambda w: batch_of(w).mirrored,
         skeleton_name=lambda w: catalogue.dataset(w.dataset).skeleton,
         # The folder of skeleton files. They map the joints of one rig to those of another.

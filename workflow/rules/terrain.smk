@@ -4,7 +4,7 @@ from hobble.terrain.options import PatchOptions, FitOptions, HeightSampling
 rule terrain_patches:
     """Patches of ground, cut from random places of the heightmaps."""
     input:
-        files=lambda w: keep_local(clips.heightmap_files(w.dataset)),
+        files=local_files(heightmap_inputs),
     output:
         patches="results/datasets/{dataset}/terrain/patches.npz",
     log:
@@ -15,7 +15,7 @@ rule terrain_patches:
         mem_mb=2000,
         runtime=10,
     params:
-        contents=contents_of,
+        contents=contents_of(heightmap_inputs),
         options=lambda w: datasets.options_of_class(w.dataset, "terrain", PatchOptions),
         code=lambda w: package.code("terrain_patches"),
     script:
