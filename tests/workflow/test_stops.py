@@ -152,7 +152,7 @@ main(sys.argv[1:])
 
 @pytest.mark.slow
 def test_a_kill_at_any_step_before_the_first_job_leaves_no_lock(workflow) -> None:
-    """The run is killed at its first steps in its folder, then at each sixth, until one gets past all of them."""
+    """It is killed at its first steps in its folder, then at each sixth, until one run gets past all."""
     target, step, status = "results/datasets/tiny/terrain/patches.npz", 0, -signal.SIGKILL
     while status == -signal.SIGKILL:
         step += 1 if step < 6 else 6
