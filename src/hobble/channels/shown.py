@@ -119,6 +119,17 @@ def channel_loops(
     ]
 
 
+def other_names(
+    name: str, skeleton: Skeleton | None, columns: Sequence[str], trained: Collection[str]
+) -> Mapping[str, str]:
+    """Other names of the channel's columns, such as those of parts of the body -> column. By default none.
+
+    columns, trained: as in `channel_display`.
+    """
+    own_names = _from_module(name, "other_names")
+    return own_names(skeleton, columns, trained) if own_names and skeleton is not None else {}
+
+
 def shown_names(skeleton: Mapping[str, Any]) -> Callable[[str], str]:
     """A function from a column's label to the name that readers see. It returns any other text unchanged.
 

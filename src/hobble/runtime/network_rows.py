@@ -10,6 +10,7 @@ import numpy as np
 from numba.extending import register_jitable
 
 from hobble.channels import CHANNEL_NAMES, channel
+from hobble.channels.shown import other_names
 from hobble.core.compiled import njit
 from hobble.core.quat import Array
 from hobble.models.network import Network
@@ -49,6 +50,8 @@ class ChannelValues:
             name: {label: i for i, label in enumerate(column_labels)}
             for name, column_labels in network.channels.items()
         }
+        self._network = network
+        self._names: dict[str, Mapping[str, str]] = {}  # channel -> from `other_names`, once it is needed
         self.scales = dict(scales)
         self.columns: dict[str, slice] = {}
         start = 0
@@ -69,14 +72,14 @@ class ChannelValues:
         values = np.full((characters, len(labels)), definition.default)
         if isinstance(given, Mapping):
             for label, value in given.items():
-                self._check_label(name, label)
+                column = labels[self._label(name, label)]
                 if np.shape(value) not in ((), (1,), (characters,)):
                     shape = np.shape(value)
                     raise ValueError(
                         f"{label} has to be one {definition.value_word} for all characters, or an array of "
                         f"{characters}, one for each; its shape is {shape}"
                     )
-                values[:, labels[label]] = value
+                values[:, column] = value
         else:
             array = np.asarray(given, float)
             if not labels and array.size:
@@ -95,13 +98,22 @@ class ChannelValues:
             )
         return self.columns.get(name, slice(0, 0)), values / self.scales.get(name, 1.0)
 
-    def _check_label(self, name: str, label: str) -> None:
-        """Raise ValueError or UnknownName if the network has no input for this label of channel `name`."""
+    def _label(self, name: str, label: str) -> str:
+        """The label of a column of channel `name`. label: it, or another name of it, such as "left knee".
+
+        Raises ValueError or UnknownName if the network has no input of this name.
+        """
         labels = self.labels.get(name, {})
         if not labels:
             raise ValueError(f"{label} cannot be set: {_no_input(name)}")
-        if label not in labels:
+        if label in labels:
+            return label
+        if name not in self._names:
+            network, trained = self._network, self._network.trained_labels(name)
+            self._names[name] = other_names(name, network.skeleton, list(labels), trained)
+        if label not in self._names[name]:
             raise UnknownName(f"{name} has no", label, labels)
+        return self._names[name][label]
 
 
 def _no_input(name: str) -> str:

@@ -165,6 +165,19 @@ def links_between(skeleton: Skeleton, upper: str, lower: str) -> list[str]:
     return out[::-1]
 
 
+def other_names(skeleton: Skeleton, links: Sequence[str], hurt: Collection[str]) -> dict[str, str]:
+    """Other names of links: a part of the body ("left thigh") or the joint below it ("left knee") -> link.
+
+    links, hurt: as in `link_of_part`.
+    """
+    found: dict[str, str] = {}
+    for label, upper, lower in (*PARTS_WITH_SLIDER, *PARTS_WITHOUT_SLIDER):
+        if (link := link_of_part(skeleton, (upper, lower), links, hurt)) is not None:
+            found.setdefault(label, link)
+            found.setdefault(lower.replace("_heel", "_ankle").replace("_", " "), link)
+    return found
+
+
 def spoken_link(skeleton: Skeleton, link: str) -> str:
     """The name of a link for readers, such as "left thigh". A link without a name keeps its label."""
     for label, upper, lower in (*PARTS_WITH_SLIDER, *PARTS_WITHOUT_SLIDER):
@@ -185,9 +198,10 @@ def spoken_link(skeleton: Skeleton, link: str) -> str:
 
 
 def spoken_links(skeleton: Skeleton, links: Sequence[str]) -> list[str]:
-    """The name of each link from `spoken_link`. If links share a name, their labels are added to it."""
+    """The name of each link from `spoken_link`. Links that share a name are numbered, from above."""
     names = [spoken_link(skeleton, link) for link in links]
+    counts = [(names[: i + 1].count(name), names.count(name)) for i, name in enumerate(names)]
     return [
-        name if names.count(name) == 1 or name == link else f"{name} ({link})"
-        for name, link in zip(names, links, strict=True)
+        name if total == 1 else f"{name}, part {number} of {total}"
+        for name, (number, total) in zip(names, counts, strict=True)
     ]
