@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import copy
+import pickle
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,8 +17,9 @@ from hobble.measures.walks import foot_slide, largest_turn
 from hobble.models.load import load_network
 from hobble.models.network import Network
 from hobble.runtime import ProceduralAnimation
+from hobble.runtime.caller_targets import Axes
 from hobble.runtime.waypoints import TRACK
-from tests.runtime.walking import KNEE, hills, walk
+from tests.runtime.walking import KNEE, hills, same, same_poses, walk
 
 
 def test_the_input_row_follows_its_definition(hurtable) -> None:
@@ -291,11 +294,20 @@ def test_copies_go_on_as_their_characters_would(hurtable: Network) -> None:
     copies = two.copies(np.array([0, 1, 0]))
     two.next_pose((3.0, 0.0))  # what the first does after the copy changes nothing
     for _ in range(25):
-        asked, made = (c.next_pose(targets, injury={link: [0, 6, 9]}) for c in (three, copies))
-        for name in ("positions", "rotations", "contacts", "phase", "root", "yaw"):
-            np.testing.assert_array_equal(getattr(made, name), getattr(asked, name), name)
+        same_poses(*(c.next_pose(targets, injury={link: [0, 6, 9]}) for c in (three, copies)))
 
 
-def test_characters_on_waypoints_are_not_copied(network: Network) -> None:
-    with pytest.raises(ValueError, match="waypoints"):
-        ProceduralAnimation(network, waypoints=TRACK).copies(np.array([0]))
+@pytest.mark.parametrize("copied", [copy.copy, copy.deepcopy, lambda c: pickle.loads(pickle.dumps(c))])
+@pytest.mark.parametrize("track", [None, TRACK])
+def test_a_copied_character_goes_on_bit_for_bit(hurtable: Network, copied: Any, track: Any) -> None:
+    """Also on hills, hurt, on a track of waypoints, and in the mode and axes of the first."""
+    options = {"waypoints": track, "axes": Axes("left", "Y"), "scales": {"injury": 2.0}}
+    first = ProceduralAnimation(hurtable, mode="linear", storage="int16", **options)
+    arguments = {"target_velocity": None if track else (1, 2), "terrain": hills, "injury": {KNEE: 6.0}}
+    walk(first, 70, **arguments)
+    second = copied(first)
+    for _ in range(60):
+        same_poses(first.next_pose(**arguments), second.next_pose(**arguments))
+    before = copy.deepcopy(first.state)
+    second.reset()  # changes the copy alone
+    assert same(first.state, before)

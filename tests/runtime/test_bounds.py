@@ -95,6 +95,22 @@ def test_a_character_starts_in_the_start_frame(make_network) -> None:
     np.testing.assert_allclose(state.joint_position[0], np.stack([z + 100, y, 50 - x], axis=1), atol=1e-4)
 
 
+@pytest.mark.parametrize("with_facts", [False, True])
+def test_the_hips_keep_their_height_when_the_ground_is_switched(make_network, with_facts: bool) -> None:
+    """The ground under a walking character jumps up and down by a metre, or becomes a slope."""
+    network = make_network(scale=0.2)
+    if with_facts:
+        network = replace(network, training_facts=walked(network))
+    character, hips, heights = ProceduralAnimation(network), network.skeleton.role("hips"), []
+    grounds = [lambda x, z, g=g: g[0] + g[1] * z for g in ((0, 0), (100, 0), (-100, 0), (0, 0.4), (30, 0))]
+    for frame in range(300):
+        ground = grounds[frame // 30 % len(grounds)]
+        x, y, z = character.next_pose((0, 2.5), terrain=ground).positions[hips]
+        heights.append(y - ground(x, z))
+    mean = network.y_mean[network.layout.y_joint_position].reshape(-1, 3)[hips, 1]
+    assert 0.65 * mean - 1e-3 <= min(heights) <= max(heights) <= 1.175 * mean + 1e-3
+
+
 def test_rows_are_clipped_to_the_bounds() -> None:
     rows = np.array([[0, 5, -5], [np.nan, 1, np.inf]], np.float32)
     low, high, wild = np.full(3, -1, np.float32), np.full(3, 2, np.float32), np.zeros(2, bool)

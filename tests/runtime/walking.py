@@ -23,3 +23,9 @@ def hills(x: np.ndarray, z: np.ndarray) -> np.ndarray:
 def same(a, b) -> bool:
     """Whether two states are equal, bit for bit."""
     return all(np.array_equal(getattr(a, f.name), getattr(b, f.name)) for f in fields(a))
+
+
+def same_poses(a: Pose, b: Pose) -> None:
+    """Fail unless two poses are equal, bit for bit."""
+    for name in ("positions", "rotations", "contacts", "phase", "root", "yaw"):
+        np.testing.assert_array_equal(getattr(a, name), getattr(b, name), name)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -105,6 +104,7 @@ class ProceduralAnimation:
             "steering": steering,
             "side": network.terrain_side,
         }
+        self._predicted_by = (mode, storage)
         self._predictor = network.predictor(mode, storage)
         self._waypoints = list(waypoints) if waypoints is not None else None
         self._contacts = network.layout.y_contacts
@@ -177,17 +177,35 @@ class ProceduralAnimation:
     def copies(self, of: np.ndarray) -> ProceduralAnimation:
         """A new animation whose character i is a copy of character of[i] of this animation.
 
-        of: (C',) indices. The two animations share no state. Raises ValueError if the characters follow
-        waypoints.
+        of: (C',) indices. The two animations share the network, but no state.
         """
-        if self.follower is not None:
-            raise ValueError("characters that follow waypoints cannot be copied")
-        out = copy.copy(self)
-        out.characters, out._seeds = len(of), self._seeds[of]
+        out = object.__new__(ProceduralAnimation)
+        seeds = self._seeds[of]
+        out.__dict__.update(self.__dict__, characters=len(of), _seeds=seeds, _terrain=(None, None))
         out._targets = CallerTargets(self.network.gaits, self.axes, len(of))
+        out.follower = self.follower.copies(of) if self.follower else None
         out._continue_from(self.state.copies(of))
-        out._controller.copy_drawn_pose(self._controller, of)
+        out._controller.draw(tuple(array[of] for array in self._controller.drawn))
         return out
+
+    def __copy__(self) -> ProceduralAnimation:
+        return self.copies(np.arange(self.characters))
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> ProceduralAnimation:
+        return self.__copy__()
+
+    def __getstate__(self) -> dict[str, Any]:
+        """For pickle: all but the predictor and the controller, which are made anew. They hold no state."""
+        made_anew = ("_predictor", "_controller", "_limiter", "_terrain")
+        kept = {name: value for name, value in self.__dict__.items() if name not in made_anew}
+        return kept | {"drawn": self._controller.drawn}
+
+    def __setstate__(self, kept: dict[str, Any]) -> None:
+        drawn = kept.pop("drawn")
+        self.__dict__.update(kept, _terrain=(None, None))
+        self._predictor = self.network.predictor(*self._predicted_by)
+        self._continue_from(self.state)
+        self._controller.draw(drawn)
 
     def _continue_from(self, state: Character) -> None:
         """Make a new controller, which continues from `state`."""

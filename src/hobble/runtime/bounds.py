@@ -23,6 +23,9 @@ MARGIN_SHARE = 0.25  # margin on each side, as a share of a column's range in tr
 # mean +- (DEFAULT_DEVIATIONS * standard deviation + DEFAULT_MARGIN).
 DEFAULT_DEVIATIONS = 15.0
 DEFAULT_MARGIN = 50.0  # in the unit of each column: cm for positions
+# Then the hips stay within these multiples of their mean height above the ground. Without such limits, a
+# character whose ground is switched under it folds up or hangs in the air until the body has followed.
+DEFAULT_HIPS = (0.65, 1.175)
 SPEED_MARGIN = 1.5  # largest joint speed, as a multiple of the fastest joint in training
 # A larger number is called unsound, like one that is not finite. A working character never has such values.
 LARGEST_SOUND = 1e8
@@ -33,8 +36,8 @@ class Bounds:
     """The allowed values of the network's inputs, x_low to x_high (X,), and outputs, y_low to y_high (Y,).
 
     The values are float32 and not standardised. fastest: largest movement of a joint, cm a frame. hips:
-    lowest and highest height of the hips in training, cm above the ground; without limits if the network's
-    file does not have the ranges of the training data.
+    lowest and highest height of the hips in training, cm above the ground; or DEFAULT_HIPS times the mean
+    height.
     """
 
     x_low: Array = field(repr=False)
@@ -42,17 +45,20 @@ class Bounds:
     y_low: Array = field(repr=False)
     y_high: Array = field(repr=False)
     fastest: float
-    hips: tuple[float, float] = (-LARGEST_SOUND, LARGEST_SOUND)
+    hips: tuple[float, float]
 
     @classmethod
     def of(cls, network: Network) -> Bounds:
         """The bounds of a network. Channel inputs get no bounds, because each channel has its own range."""
         layout, facts = network.layout, network.training_facts
+        assert network.skeleton is not None
+        hips_height = layout.y_joint_position.start + 3 * network.skeleton.role("hips") + 1
         if facts is None:
+            low, high = (float(share * network.y_mean[hips_height]) for share in DEFAULT_HIPS)
             spread = DEFAULT_DEVIATIONS * network.y_std + DEFAULT_MARGIN
             x = np.full(layout.x_size, LARGEST_SOUND, np.float32)
             spread[layout.y_joint_rotation] = 2 * np.pi  # angles of joints stay within a full turn
-            return cls(-x, x, network.y_mean - spread, network.y_mean + spread, LARGEST_SOUND)
+            return cls(-x, x, network.y_mean - spread, network.y_mean + spread, LARGEST_SOUND, (low, high))
         x_margin = MARGIN_SHARE * (facts.x_high - facts.x_low)
         y_margin = MARGIN_SHARE * (facts.y_high - facts.y_low)
         x_low, x_high = facts.x_low - x_margin, facts.x_high + x_margin
@@ -61,8 +67,6 @@ class Bounds:
         y_low, phase_change = facts.y_low - y_margin, layout.y_phase_change
         # The phase may run backwards only as fast as it did in training.
         y_low[phase_change] = np.maximum(y_low[phase_change], np.minimum(facts.y_low[phase_change], 0.0))
-        assert network.skeleton is not None
-        hips_height = layout.y_joint_position.start + 3 * network.skeleton.role("hips") + 1
         hips = float(facts.y_low[hips_height]), float(facts.y_high[hips_height])
         return cls(x_low, x_high, y_low, facts.y_high + y_margin, SPEED_MARGIN * facts.fastest, hips)
 

@@ -277,10 +277,10 @@ class Controller:
         self._warned = False
         self._group_arrays(character)
 
-    def copy_drawn_pose(self, other: Controller, of: np.ndarray) -> None:
-        """Copy the pose of character i from character of[i] of the controller `other`. of: (C,) indices."""
-        for name in ("root", "yaw", "pose_position", "pose_rotation"):
-            getattr(self, name)[:] = getattr(other, name)[of]
+    def draw(self, drawn: tuple[Array, ...]) -> None:
+        """Take over root, yaw, pose_position and pose_rotation of another controller, its `drawn`."""
+        for array, values in zip(self.drawn, drawn, strict=True):
+            array[:] = values
 
     def _group_arrays(self, c: Character) -> None:
         """Group the arrays for the compiled functions. Once is enough: the arrays only change in place."""
@@ -288,7 +288,7 @@ class Controller:
         self._smoothed = (c.smoothed_velocity, c.smoothed_direction, c.strafe, c.correction)
         self._channels = (c.channel_values, c.channel_targets, self._channel_steps)
         self._joints = (c.joint_position, c.joint_velocity, c.joint_rotation)
-        self._drawn = (self.root, self.yaw, self.pose_position, self.pose_rotation)
+        self.drawn = (self.root, self.yaw, self.pose_position, self.pose_rotation)
         self._feet = (
             (c.foot_lock, c.foot_hold, c.foot_step, c.foot_missed),
             *(c.foot_lift, c.foot_added, c.leg_shown, c.root_height, c.body_lift),
@@ -373,7 +373,7 @@ class Controller:
         c = self.character
         network_rows.write_poses(
             self.y, self._y_joints, self._path, (c.root_height, c.body_lift), self._joints,
-            self.bounds.fastest, self._drawn,
+            self.bounds.fastest, self.drawn,
         )  # fmt: skip
         if ground is not None:
             at = np.ascontiguousarray(self.pose_position[:, self._ground_joints]).reshape(-1, 3)

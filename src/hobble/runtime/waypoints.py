@@ -64,6 +64,12 @@ class Follower:
         ahead = self.places[0] - self.places[-1]
         return self.places[-1].copy(), float(np.arctan2(ahead[0], ahead[1]))
 
+    def copies(self, of: np.ndarray) -> Follower:
+        """A follower whose character i is as far on the track as character of[i] of this one."""
+        out = Follower(self.track, len(of), self.arrived)
+        out.reached[:], out.off_path[:] = self.reached[of], self.off_path[of]
+        return out
+
     def lead(self, position: Array) -> tuple[Array, list[Waypoint]]:
         """The velocity (C, 2), cm a frame, of each character toward its next waypoint, and these C waypoints.
 
