@@ -68,6 +68,17 @@ def test_every_row_is_stored_once_whatever_the_bucket_size(rows_of, tmp_path, mo
     np.testing.assert_array_equal(read_all(tmp_path / "db"), expected)
 
 
+def test_training_may_use_every_fourth_frame(rows_of, tmp_path):
+    """Also of hurt versions, each of which begins elsewhere; held-out clips keep all frames."""
+    rows = {name: rows_of(name, 40, None, seed=i) for i, name in enumerate("abcd")}
+    splits = {"a": "train", "b": "held_out", "c": "train", "d": "train"}
+    hurt = {"c": "a", "d": "a"}
+    write_database(tmp_path / "db", rows, splits, sources=hurt, hurt_every=2, every=4, **OPTIONS)
+    kept = [range(60, 100, 4), range(60, 100), range(60, 100, 8), range(64, 100, 8)]
+    expected = [(clip, frame) for clip, frames in enumerate(kept) for frame in frames]
+    np.testing.assert_array_equal(read_all(tmp_path / "db"), expected)
+
+
 def test_buckets_put_rows_and_their_fits_into_the_final_order(tmp_path):
     rng = np.random.default_rng(0)
     count = rng.choice([1, 3], 100)

@@ -27,8 +27,8 @@ def test_the_input_row_follows_its_definition(hurtable) -> None:
     character = ProceduralAnimation(hurtable)
     walk(character, 90, injury={KNEE: 6.0}, terrain=hills)
     seen = {}
-    evaluate = character._predictor.evaluate
-    character._predictor.evaluate = lambda *a: (
+    evaluate = character.predictor.evaluate
+    character.predictor.evaluate = lambda *a: (
         seen.update(state=copy.deepcopy(character.state)),
         evaluate(*a),
     )
@@ -89,7 +89,7 @@ def test_the_pose_follows_from_the_prediction(network) -> None:
 def test_no_joint_turns_faster_than_the_limit(steady) -> None:
     """After a jump of the prediction by half a turn, the pose follows at 25 degrees a frame."""
     character = ProceduralAnimation(steady)
-    evaluate, hand = character._predictor.evaluate, steady.skeleton.role("left_wrist")
+    evaluate, hand = character.predictor.evaluate, steady.skeleton.role("left_wrist")
     first = steady.layout.y_joint_rotation.start + 3 * hand
     angles = iter([10.0, 30.0, *[175.0] * 9, *[-175.0] * 3])
 
@@ -97,7 +97,7 @@ def test_no_joint_turns_faster_than_the_limit(steady) -> None:
         evaluate(z, phase, out)
         out[:, first : first + 3] = [0.0, 0.0, np.radians(next(angles)) / 2]
 
-    character._predictor.evaluate = jumping
+    character.predictor.evaluate = jumping
     seen = []
     for _ in range(14):
         q = character.next_pose((0, 1.5)).rotations[hand]

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from hobble.core import quat
 from hobble.core.skeleton import Skeleton, two_bone_knee
 from hobble.runtime.feet import leg_joints, rest_facing
-from hobble.runtime.leg_reach import MOST_ADDED, bend_leg, move_heel
+from hobble.runtime.leg_reach import KNEE_AHEAD, MOST_ADDED, bend_leg, move_heel
 from tests.runtime.one_figure import Feet, crouched
 
 coordinate = st.floats(-25, 25)
@@ -50,7 +50,7 @@ def test_the_knee_stays_on_its_side(holden31: Skeleton) -> None:
     knees = []
     for z in np.linspace(-70, 90, 321):
         position, _ = crouched(holden31)
-        move_heel(position, hip, knee, heel, np.array([0.0, 0.0, z]), (0.0, 0.0, 1.0))
+        move_heel(position, hip, knee, heel, np.array([0.0, 0.0, z]), (0.0, 0.0, 1.0), KNEE_AHEAD)
         knees.append(position[knee] - position[hip])
     assert np.linalg.norm(np.diff(knees, axis=0), axis=1).max() < 2
 
@@ -71,7 +71,7 @@ def test_no_leg_turns_too_fast_for_any_foot_target(holden31: Skeleton) -> None:
             np.linalg.norm(np.diff(position[[hip, knee, heel]], axis=0), axis=1), lengths, rtol=1e-6
         )
         straight = feet.base[0] + moved
-        move_heel(straight, hip, knee, heel, rng.uniform(-30, 30, 3), tuple(feet.ahead))
+        move_heel(straight, hip, knee, heel, rng.uniform(-30, 30, 3), tuple(feet.ahead), KNEE_AHEAD)
         leg, base = straight[knee] - straight[hip], feet.base[0][knee] - feet.base[0][hip]
         plain = max(plain, float(np.arccos(leg @ base / lengths[0] ** 2)))
         last = feet.rotation

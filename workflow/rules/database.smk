@@ -47,7 +47,7 @@ rule database_merge:
         # Hurt version -> the healthy clip from which it is made.
         sources=lambda w: datasets.sources(splits_of(w)),
         # Training uses every n-th row of hurt versions; this is n.
-        every=lambda w: datasets.hurt_row_step(w.dataset),
+        hurt_every=lambda w: datasets.hurt_row_step(w.dataset),
         options=lambda w: datasets.options_of_class(w.dataset, "database", Merging),
         code=lambda w: package.code(
             "database_merge", *channel_packages(channels_of_folder(w.channels))

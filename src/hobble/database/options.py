@@ -35,6 +35,11 @@ class Merging(Section):
         "float32", description="type of the rows on disk; float16 and bfloat16 take half the bytes"
     )
     seed: int = Field(1, description="seed of the order in which rows are stored")
+    every: Positive = Field(
+        1,
+        description="training uses every n-th frame of its clips; 4 as Segerstedt (2021) did for AVA. "
+        "Measurements use all frames",
+    )
 
 
 class DatabaseOptions(RowOptions, Merging):

@@ -94,6 +94,7 @@ def make_plan(
     number_bytes: int,
     chunk_bytes: int,
     sources: Mapping[str, str],
+    hurt_every: int = 1,
     every: int = 1,
 ) -> Plan | None:
     """The plan of a database with the rows of `clips`; None if there are no clips.
@@ -116,11 +117,16 @@ def make_plan(
             where = name if isinstance(source, ClipRows) else source
             raise InputError(where, f"the layout of its rows differs from that of {min(clips)}")
         entry: dict[str, Any] = {"clip": name, "split": splits[name]}
+        step, start = 1, 0
+        if splits[name] == "train":
+            step = every
+            if name in sources:
+                step, start = every * hurt_every, every * (versions[sources[name]] % hurt_every)
+                versions[sources[name]] += 1
         if name in sources:
             entry["source"] = sources[name]
-            if every > 1 and splits[name] == "train":
-                entry |= {"every": every, "first_row": versions[sources[name]] % every}
-                versions[sources[name]] += 1
+        if step > 1:
+            entry |= {"every": step, "first_row": start}
         fits = current.fits[used_rows(entry)]
         entries.append(entry | {"rows": len(fits), "pairs": int(fits.sum())})
         visits = max(visits, current.visits, int(fits.max(initial=1)))
@@ -404,6 +410,7 @@ def write_database(
     *,
     channels: Sequence[str],
     sources: Mapping[str, str] | None = None,
+    hurt_every: int = 1,
     every: int = 1,
     joint_weight: float,
     dtype: Precision = "float32",
@@ -414,14 +421,16 @@ def write_database(
 
     clips: clip name -> its rows, or the file with them. splits: clip name -> "train" or "held_out". channels:
     the network's input channels, in the order of their columns. sources: name of a hurt version -> name of
-    the healthy clip from which it was computed. every: a hurt version in training uses only each `every`-th
-    of its rows. joint_weight: factor by which the standardised joints in the network's input are multiplied.
-    dtype: type of the numbers on disk. seed: seed of the order of the rows. chunk_bytes: rough size of a
-    chunk. The statistics are those of the training clips. The same rows and options give the same bytes.
+    the healthy clip from which it was computed. every: training uses only each `every`-th row of a clip, and
+    of these only each `hurt_every`-th of a hurt version. joint_weight: factor of the standardised joints in
+    the network's input. dtype: type of the numbers on disk. seed: seed of the order of the rows. chunk_bytes:
+    rough size of a chunk. The statistics are those of the training clips. The same rows and options give the
+    same bytes.
     Raises HobbleError if no training clip has rows, InputError if the rows of the clips differ in columns or
     joints.
     """
-    plan = make_plan(clips, splits, channels, STORED[dtype].itemsize, chunk_bytes, sources or {}, every)
+    number_bytes = STORED[dtype].itemsize
+    plan = make_plan(clips, splits, channels, number_bytes, chunk_bytes, sources or {}, hurt_every, every)
     if plan is None or not plan.row_count("train"):
         raise HobbleError(
             "There is nothing to train on: no training clip has a whole locomotion cycle. Add clips, or list "

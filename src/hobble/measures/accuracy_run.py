@@ -25,6 +25,7 @@ from hobble.models.load import load_network
 from hobble.models.network import Network
 from hobble.rows.clip_rows import ClipRows, Excerpt, pair_batches
 from hobble.rows.layout import RowLayout
+from hobble.runtime.error_calculator import relative_and_distance
 
 if TYPE_CHECKING:
     from hobble.measures.accuracy import Options
@@ -36,7 +37,6 @@ Predict = Callable[[Array, Array], Array]
 BATCH = 256  # frames predicted in one call; the inputs of more frames do not fit in the processor's cache
 # Segerstedt measured at most the first so many joint positions of a clip, in the phase mode `constant`.
 PUBLISHED_POSITIONS = 500_000
-LEAST_DISTANCE = 1e-3  # cm: a joint nearer to the root counts as this far from it
 # With the option `joints: equivalent`, only joints with a counterpart on this skeleton are measured.
 REFERENCE = "holden31"
 # Keys of the errors that have a confidence interval, if only a sample was measured.
@@ -98,16 +98,6 @@ def joint_errors(layout: RowLayout, truth: Array, predicted: Array, joints: Sequ
     block = layout.y_joint_position
     t = truth[:, block].reshape(len(truth), -1, 3)[:, joints].astype(np.float64)
     return relative_and_distance(t, predicted[:, block].reshape(len(truth), -1, 3)[:, joints])
-
-
-def relative_and_distance(truth: Array, predicted: Array) -> Array:
-    """(..., 2): relative error, and distance in cm, of predicted joint positions.
-
-    truth, predicted: (..., 3) captured and predicted positions relative to the root, cm.
-    """
-    distance = np.linalg.norm(truth - predicted, axis=-1)
-    from_root = np.maximum(np.linalg.norm(truth, axis=-1), LEAST_DISTANCE)
-    return np.stack([distance / from_root, distance], axis=-1)
 
 
 def predict_function(network: Network) -> Predict:

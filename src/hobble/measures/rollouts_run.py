@@ -22,13 +22,14 @@ import numpy as np
 from hobble.core.files import Json
 from hobble.core.quat import Array
 from hobble.database.statistics import Moments
-from hobble.measures.accuracy_run import check_layout, joint_indices, joints_to_measure, relative_and_distance
+from hobble.measures.accuracy_run import check_layout, joint_indices, joints_to_measure
 from hobble.measures.measure import SPLITS, MeasureInputs, Outcome, Row
 from hobble.measures.sample import ClipPart, LoadedPart, Sample, clip_parts, sample_to_measure, with_sample
 from hobble.models.load import load_network
 from hobble.models.network import Network, Predictor
 from hobble.rows.clip_rows import ClipRows, Excerpt, compose_pairs, rotate_by_yaw, unbroken_stretches
 from hobble.rows.layout import GAITS, RowLayout
+from hobble.runtime.error_calculator import relative_and_distance
 from hobble.runtime.rule import joint_place, movement_share, phase_change
 
 if TYPE_CHECKING:

@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from hobble.core import quat
 from hobble.core.array_parts import ArrayParts
 from hobble.core.files import load_npz, to_base64
 from hobble.core.quat import Array
@@ -17,15 +16,8 @@ from hobble.figure.gltf import fitted_rotations
 from hobble.figure.mesh import body_mesh, mesh_key
 from hobble.figure.pack import packed_turns
 from hobble.models.network import Network
-from hobble.rows.clip_rows import (
-    ClipRows,
-    compose_pairs,
-    headings,
-    load_clip_rows,
-    root_path,
-    rotate_by_yaw,
-    unbroken_stretches,
-)
+from hobble.rows.clip_rows import ClipRows, load_clip_rows, unbroken_stretches
+from hobble.runtime.animation import ProceduralAnimation
 from hobble.runtime.export import restore_bone_lengths
 
 FPS = 20  # frame rate of the motion in the page
@@ -182,49 +174,24 @@ def _compared_clip(network: Network, rows: ClipRows, split: str, drawn_joints: l
     number; `captured` and `predicted`, from `packed_motion`; `error`, for each frame the mean distance from
     predicted to captured joints, cm.
     """
-    (chosen,) = unbroken_stretches(rows.frame)  # indices of the rows, only one for each frame
-    layout, figure = network.layout, network.skeleton
-    assert figure is not None
-    pose = slice(layout.y_joint_position.start, layout.y_joint_rotation.stop)
-    samples = compose_pairs(rows, layout, chosen, rows.first_fit[chosen])
-    outputs = (samples.y, network.predict(samples.x, samples.p))
-    # Captured and predicted, each an array (F, 3, J, 3): position, velocity and rotation of each joint.
-    poses = [y[:, pose].astype(float).reshape(len(chosen), 3, -1, 3) for y in outputs]
-    error = np.linalg.norm(poses[0][:, 0] - poses[1][:, 0], axis=-1).mean(axis=1)
-    ground = rows.mean[rows.first_fit[chosen]][:, None]
-    y = rows.y[chosen].astype(float)
-    turn = y[:, layout.y_turn][:, 0]
-    root, yaw = root_path(y[:, layout.y_root_velocity], turn), headings(turn)
+    found = ProceduralAnimation(network).compare(rows).all
     frame_step = round(60 / FPS)  # rows have 60 frames a second, the page has FPS
+    error = found.distance.mean(axis=1)[::frame_step]
+    assert network.skeleton is not None
     captured, predicted = (
         packed_motion(
-            figure,
-            in_world(of_joints[:, 0], root, yaw, ground)[::frame_step],
-            quat.mul(quat.yaw(yaw)[:, None], quat.exp(of_joints[:, 2]))[::frame_step],
-            drawn_joints,
+            network.skeleton, pose.positions[::frame_step], pose.rotations[::frame_step], drawn_joints
         )
-        for of_joints in poses
+        for pose in (found.truth, found.predicted)
     )
     return {
         "name": rows.clip,
         "split": split,
-        "frames": len(error[::frame_step]),
+        "frames": len(error),
         "captured": captured,
         "predicted": predicted,
-        "error": np.round(error[::frame_step], 2).tolist(),
+        "error": np.round(error, 2).tolist(),
     }
-
-
-def in_world(points: Array, root: Array, yaw: Array, ground: Array) -> Array:
-    """World positions (F, J, 3) of points (F, J, 3) that are given in the coordinates of the root, cm.
-
-    root: (F, 3) positions of the root, cm. yaw: (F,) directions of the root, radians. ground: (F, 1) mean
-    height of the ground, cm. It is added, because the heights of the points are measured from the ground.
-    """
-    world = points.copy()
-    world[..., ::2] = rotate_by_yaw(points[..., ::2], yaw[:, None])
-    world[..., 1] += ground
-    return world + root[:, None]
 
 
 STEPS_PER_CM = 10  # lengths are stored as 16-bit integers, in steps of a millimetre

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -25,6 +26,12 @@ from hobble.runtime.network_rows import ChannelValues
 from hobble.runtime.trajectory import target_facing
 from hobble.runtime.variation import count_steps, vary_step
 from hobble.runtime.waypoints import Follower, Waypoint
+
+if TYPE_CHECKING:
+    from hobble.rows.clip_rows import ClipRows
+    from hobble.runtime.error_calculator import ErrorCalculator
+    from hobble.runtime.layers import Layers
+    from hobble.runtime.retarget import RigDriver
 
 # Largest x or z of a start position, cm (100 km). Farther from the origin, floats are imprecise.
 FARTHEST = 1e7
@@ -50,6 +57,14 @@ class Pose:
     root: Array
     yaw: Any
     channels: Mapping[str, Array] = field(repr=False)
+
+    def __getitem__(self, k: int) -> Pose:
+        """The pose of character k of several."""
+        channels = {name: values[k] for name, values in self.channels.items()}
+        return Pose(
+            self.positions[k], self.rotations[k], self.contacts[k], float(self.phase[k]), self.root[k],
+            float(self.yaw[k]), channels,
+        )  # fmt: skip
 
 
 class ProceduralAnimation:
@@ -78,6 +93,8 @@ class ProceduralAnimation:
         variation: float = 0.0,
         seed: int = 0,
         axes: Axes | None = None,
+        rig: Any = None,
+        rig_joints: Mapping[str, str] | None = None,
         position: Any = None,
         facing: Any = None,
     ) -> None:
@@ -94,7 +111,15 @@ class ProceduralAnimation:
                 bound = f"{least} or more" if least in (0, 1) else "more than 0"
                 raise ValueError(f"{name} is {value!r}, but has to be {bound}, and finite")
         self.network, self.skeleton = network, network.skeleton
-        self.characters, self.axes = characters, axes or Axes()
+        self.characters = characters
+        self.axes = self._pose_axes = axes or Axes()
+        self._rig: RigDriver | None = None
+        if rig is not None:
+            from hobble.runtime.retarget import RigDriver, plan_rig  # only then: it reads files of clips
+
+            self._rig = RigDriver(plan_rig(network.skeleton, rig, rig_joints))
+            self.skeleton = self._rig.skeleton
+            self.axes = replace(self.axes, size=self.axes.size * self._rig.scale)
         self._channel_values = ChannelValues(network, scales or {})
         self._limit_speed = limits
         self._variation, self._seeds = variation, seed + np.arange(characters)
@@ -105,7 +130,7 @@ class ProceduralAnimation:
             "side": network.terrain_side,
         }
         self._predicted_by = (mode, storage)
-        self._predictor = network.predictor(mode, storage)
+        self.predictor = network.predictor(mode, storage)
         self._waypoints = list(waypoints) if waypoints is not None else None
         self._contacts = network.layout.y_contacts
         self._targets = CallerTargets(network.gaits, self.axes, characters)
@@ -135,7 +160,13 @@ class ProceduralAnimation:
         limits: whether the target speed is limited to what a body with these channel values can reach.
         variation: how much steps differ from each other: 0 not at all, 1 as those of people do.
         seed: of this variation; character i has the seed `seed` + i. The same seed gives the same walk.
-        axes: the caller's axes and unit. position, facing: see `reset`.
+        axes: the caller's axes and unit, and the size of the character.
+        rig: another rig that the character drives: a skeleton, or a file of config/skeletons or a BVH file
+            whose zero pose stands. The pose then has the joints of this rig, which is `skeleton`. Velocities
+            and ground are in the world of the rig.
+        rig_joints: name of a rig's joint -> joint of the network's skeleton that it follows; by default they
+            are matched. Other joints follow the joint above them.
+        position, facing: see `reset`.
 
         Raises InputError for a file that is not a usable network, ValueError for an option out of range, and
         UnknownName for a waypoint's gait that the network does not have.
@@ -196,14 +227,14 @@ class ProceduralAnimation:
 
     def __getstate__(self) -> dict[str, Any]:
         """For pickle: all but the predictor and the controller, which are made anew. They hold no state."""
-        made_anew = ("_predictor", "_controller", "_limiter", "_terrain")
+        made_anew = ("predictor", "_controller", "_limiter", "_terrain")
         kept = {name: value for name, value in self.__dict__.items() if name not in made_anew}
         return kept | {"drawn": self._controller.drawn}
 
     def __setstate__(self, kept: dict[str, Any]) -> None:
         drawn = kept.pop("drawn")
         self.__dict__.update(kept, _terrain=(None, None))
-        self._predictor = self.network.predictor(*self._predicted_by)
+        self.predictor = self.network.predictor(*self._predicted_by)
         self._continue_from(self.state)
         self._controller.draw(drawn)
 
@@ -211,11 +242,28 @@ class ProceduralAnimation:
         """Make a new controller, which continues from `state`."""
         count = self.characters
         self.state = state
-        self._controller = Controller(self._predictor, state, **self._controller_options)
+        self._controller = Controller(self.predictor, state, **self._controller_options)
         # Written in each frame by `target_facing`.
         self._target_strafe, self._target_look = np.zeros(count), np.zeros((count, 2))
         self._no_facing = np.zeros((count, 2))  # zero means: face the direction of movement
         self._limiter = SpeedLimiter(self.network, self._channel_values.columns, count)
+
+    @cached_property
+    def layers(self) -> Layers:
+        """Functions that put other animation, such as a wave, on top of a pose."""
+        from hobble.runtime.layers import Layers
+
+        return Layers(self.skeleton, self._pose_axes)
+
+    def compare(self, rows: ClipRows) -> ErrorCalculator:
+        """Step through recorded rows: for each frame the captured pose, the predicted one and the error.
+
+        rows: `hobble.rows.clip_rows.load_clip_rows("database/clips/<clip>.npz")`. The state of the characters
+        stays as it is. Raises ValueError for rows of other joints or without the network's channels.
+        """
+        from hobble.runtime.error_calculator import ErrorCalculator
+
+        return ErrorCalculator(self, rows)
 
     @property
     def seconds(self) -> Array:
@@ -345,28 +393,29 @@ class ProceduralAnimation:
     def _pose(self) -> Pose:
         """The pose after the last frame, as copies in the caller's axes and unit."""
         controller, state = self._controller, self.state
-        positions, rotations = controller.pose_position.copy(), controller.pose_rotation.copy()
-        root = controller.root.copy()
-        if not self.axes.is_native:
-            positions[:], root[:] = self.axes.points_to_caller(positions), self.axes.points_to_caller(root)
-            rotations = self.axes.rotations_to_caller(rotations)
         contacts = np.minimum(np.maximum(controller.y[:, self._contacts], 0), 1)
         channels = {
             name: state.channel_values[:, columns].copy()
             for name, columns in self._channel_values.columns.items()
         }
-        if self.characters > 1:
-            yaw = controller.yaw.copy()
-            return Pose(positions, rotations, contacts, state.phase.copy(), root, yaw, channels)
-        return Pose(
-            positions[0],
-            rotations[0],
-            contacts[0],
-            float(state.phase[0]),
-            root[0],
-            float(controller.yaw[0]),
-            {name: values[0] for name, values in channels.items()},
-        )
+        root, yaw, positions, rotations = (array.copy() for array in controller.drawn)
+        phase = state.phase.copy()
+        pose = self.pose_in_callers_axes(positions, rotations, contacts, phase, root, yaw, channels)
+        return pose if self.characters > 1 else pose[0]
+
+    def pose_in_callers_axes(
+        self, positions: Array, rotations: Array, contacts: Array, phase: Array, root: Array, yaw: Array,
+        channels: Mapping[str, Array],
+    ) -> Pose:  # fmt: skip
+        """C poses of the network's joints in Hobble's axes as those that the caller gets, see `Pose`."""
+        if self._rig is not None:
+            positions, rotations = self._rig(positions, rotations)
+        if not self._pose_axes.is_native:
+            positions = self._pose_axes.points_to_caller(positions)
+            rotations = self._pose_axes.rotations_to_caller(rotations)
+        if not self.axes.is_native:
+            root = self.axes.points_to_caller(root)
+        return Pose(positions, rotations, contacts, phase, root, yaw, channels)
 
 
 def world_rotations(turns: Array, yaw: Array) -> Array:

@@ -31,26 +31,30 @@ UNITS = {"cm": 1.0, "m": 0.01}  # unit of the caller -> length of one centimetre
 
 @dataclass(frozen=True)
 class Axes:
-    """The caller's convention: handedness, up axis, unit of length.
+    """The caller's convention: handedness, up axis, unit of length, and how large the character is.
 
-    handed: whether the axes are right-handed or left-handed. In every convention, velocities are per frame at
-    60 Hz, and quaternions have w first.
+    handed: whether the axes are right-handed or left-handed. size: how many times as large as in training the
+    character is; steps, speeds and the ground under it are in the caller's unit at any size. In every
+    convention, velocities are per frame at 60 Hz, and quaternions have w first.
     """
 
     handed: Literal["right", "left"] = "right"
     up: Literal["Y", "Z"] = "Y"
     unit: Literal["cm", "m"] = "cm"
+    size: float = 1.0
 
     def __post_init__(self) -> None:
         if (self.handed, self.up) not in MATRICES or self.unit not in UNITS:
             raise ValueError(
                 f"{self}: handed has to be right or left, up has to be Y or Z, unit has to be cm or m"
             )
+        if not 0 < self.size < np.inf:
+            raise ValueError(f"size is {self.size!r}, but has to be more than 0, and finite")
 
     @property
     def is_native(self) -> bool:
         """Whether this is Hobble's own convention. Then no conversion is needed."""
-        return (self.handed, self.up, self.unit) == ("right", "Y", "cm")
+        return (self.handed, self.up, self.unit, self.size) == ("right", "Y", "cm", 1.0)
 
     @property
     def matrix(self) -> Array:
@@ -59,8 +63,8 @@ class Axes:
 
     @property
     def scale(self) -> float:
-        """Length of one centimetre in the caller's unit."""
-        return UNITS[self.unit]
+        """Length of one centimetre of the character in training, in the caller's unit."""
+        return UNITS[self.unit] * self.size
 
     def directions_to_caller(self, v: Array) -> Array:
         """Convert Hobble's directions (..., 3) to the caller's."""

@@ -10,7 +10,7 @@ import numpy as np
 
 from hobble.core.compiled import njit
 from hobble.core.quat import Array
-from hobble.runtime.caller_targets import Axes
+from hobble.runtime.caller_targets import UNITS, Axes
 
 CELL = 3.937007874  # cm, the cell size of the heightmaps of Holden et al. (2017)
 
@@ -61,7 +61,7 @@ def as_ground(terrain: Any, axes: Axes) -> Callable[[Array, Array], Array] | Non
     if axes.is_native:  # the caller's axes and unit are Hobble's
         return terrain  # type: ignore[no-any-return]
     if isinstance(terrain, Heightmap) and terrain.cell is None:
-        terrain = replace(terrain, cell=CELL * axes.scale)
+        terrain = replace(terrain, cell=CELL * UNITS[axes.unit])
     up = "XYZ".index(axes.up)
     ground_axes = [k for k in range(3) if k != up]
 

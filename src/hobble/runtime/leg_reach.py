@@ -80,12 +80,12 @@ def turn_rotation(by: Any, rotation: Any) -> None:
 
 @njit
 def move_heel(
-    position: Any, hip: int, knee: int, heel: int, shift: Any, ahead: tuple[float, float, float]
+    position: Any, hip: int, knee: int, heel: int, shift: Any, ahead: tuple[float, float, float], least: float
 ) -> None:
     """Move the heel of a pose by `shift` (3,), by bending the knee.
 
     position: (J, 3), changed in place. ahead: the direction in which a straight knee bends. Bone lengths
-    stay. The knee keeps bending to the same side, but is at least KNEE_AHEAD ahead of the line between hip
+    stay. The knee keeps bending to the same side, but is at least `least` cm ahead of the line between hip
     and heel. If the target is out of reach, the leg stretches to 99.9% of its length. The knee's angle
     follows from the law of cosines, as in `hobble.core.skeleton.two_bone_knee`. If `shift` is 0 and the knee
     is far enough ahead, nothing changes.
@@ -114,7 +114,7 @@ def move_heel(
     along = ahead[0] * ax + ahead[1] * ay + ahead[2] * az
     fx, fy, fz = ahead[0] - along * ax, ahead[1] - along * ay, ahead[2] - along * az
     size = max(np.sqrt(fx * fx + fy * fy + fz * fz), 1e-6)
-    more = max(KNEE_AHEAD - (ox * fx + oy * fy + oz * fz) / size, 0.0)
+    more = max(least - (ox * fx + oy * fy + oz * fz) / size, 0.0)
     if more == 0.0 and abs(sx) + abs(sy) + abs(sz) < 1e-9:
         return
     ox, oy, oz = ox + more * fx / size, oy + more * fy / size, oz + more * fz / size
@@ -174,7 +174,8 @@ def bend_leg(
     kx, ky, kz = position[knee, 0], position[knee, 1], position[knee, 2]
     tx, ty, tz = kx - hx, ky - hy, kz - hz
     lx, ly, lz = position[heel, 0] - kx, position[heel, 1] - ky, position[heel, 2] - kz
-    move_heel(position, hip, knee, heel, shift, turn_vector(rotation[hip], ahead[0], ahead[1], ahead[2]))
+    ahead_now = turn_vector(rotation[hip], ahead[0], ahead[1], ahead[2])
+    move_heel(position, hip, knee, heel, shift, ahead_now, KNEE_AHEAD)
     kx, ky, kz = position[knee, 0], position[knee, 1], position[knee, 2]
     w, x, y, z = rotation_between(tx, ty, tz, kx - hx, ky - hy, kz - hz)
     limited = turn_toward(added[0], w, x, y, z)

@@ -1,0 +1,134 @@
+"""A character drives other rigs: AVA's 191 joints, Mixamo's, and those of strangers' files."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hobble.core import quat
+from hobble.core.errors import HobbleError
+from hobble.runtime.animation import ProceduralAnimation
+from hobble.runtime.caller_targets import Axes
+from hobble.runtime.retarget import RigDriver, load_rig, plan_rig
+from tests.motion.conftest import make_walk
+from tests.runtime.walking import hills, walk
+
+# These joints of ava191 are elsewhere in hand and pelvis than those of holden31 that they follow.
+ELSEWHERE = ("Index", "Thumb", "Ass")
+
+
+def both(rig) -> list[tuple[int, int]]:
+    """Joints of ava191, and of holden31, that are at the same places of the body."""
+    pairs = rig.maps["holden31"].items()
+    mine, theirs = rig.skeleton.index, load_rig("holden31").skeleton.index
+    return [(mine(a), theirs(b)) for a, b in pairs if not any(word in a for word in ELSEWHERE)]
+
+
+def test_191_joints_are_where_the_31_of_a_clip_are(holden31) -> None:
+    """Poses whose bones have the skeleton's lengths: the joints that both have are at the same places."""
+    clip, rig = make_walk(holden31, 241, 120.0), load_rig("ava191")
+    driver = RigDriver(plan_rig(holden31, rig))
+    positions, rotations = driver(clip.positions, clip.global_rotations)
+    mine, theirs = np.transpose(both(rig))
+    assert np.linalg.norm(positions[:, mine] - clip.positions[:, theirs], axis=-1).max() < 0.12
+    assert quat.angle(rotations[:, mine], clip.global_rotations[:, theirs]).max() < np.radians(1)
+
+
+@pytest.mark.parametrize("gait", ["walk", "jog"])
+def test_191_joints_are_where_the_31_of_a_character_are(make_network, gait: str) -> None:
+    """A network's bones change their lengths a little. On average, joints are 1 cm apart at most."""
+    network, rig = make_network(scale=4.0), load_rig("ava191")
+    own, ava = ProceduralAnimation(network), ProceduralAnimation(network, rig="ava191")
+    mine, theirs = np.transpose(both(rig))
+    poses = [[c.next_pose((0.5, 2.5), gait=gait, terrain=hills) for _ in range(150)] for c in (own, ava)]
+    at, driven = (np.array([pose.positions for pose in motion]) for motion in poses)
+    apart = np.linalg.norm(driven[:, mine] - at[:, theirs], axis=-1)
+    assert driven.shape == (150, 191, 3)
+    assert apart.mean(axis=0).max() < 1.0
+
+
+@pytest.mark.parametrize("name", ["mixamo55", "rig22", "ava191"])
+@pytest.mark.parametrize("axes", [Axes(), Axes("left", "Z", "m", size=1.5)])
+def test_a_driven_rig_keeps_its_bones_and_its_feet(network, name: str, axes: Axes) -> None:
+    """In any axes: bones have the rig's lengths, balls of the feet are where the scaled character's are."""
+    options = {"axes": axes, "characters": 2}
+    unit = axes.scale
+    with_rig = ProceduralAnimation(network, rig=name, **options)
+    rig, legs = with_rig.skeleton, ("left_toe", "right_toe")
+    ratio = with_rig.axes.size / axes.size
+    own = ProceduralAnimation(network, axes=replace(axes, size=axes.size * ratio), characters=2)
+    velocity = np.array([(0.5, 2.0), (1.0, 1.0)]) * unit * ratio
+    for _ in range(60):
+        mine, driven = (c.next_pose(velocity, terrain=lambda x, z: 0 * x) for c in (own, with_rig))
+    matrix = axes.matrix
+    for j, p in enumerate(rig.parents):
+        if p >= 0:
+            bone = quat.rotate(driven.rotations[:, p], matrix @ rig.offsets[j] * unit)
+            np.testing.assert_allclose(
+                driven.positions[:, j] - driven.positions[:, p], bone, atol=1e-6 * unit
+            )
+    np.testing.assert_allclose(driven.root, mine.root, atol=1e-9)
+    for role in legs:
+        apart = driven.positions[:, rig.role(role)] - mine.positions[:, network.skeleton.role(role)]
+        assert np.linalg.norm(apart, axis=-1).max() < 0.5 * unit
+
+
+def test_a_larger_character_takes_larger_steps(network) -> None:
+    """Twice the size at twice the speed on twice the hills is the same motion, twice as large."""
+    one, two = ProceduralAnimation(network), ProceduralAnimation(network, axes=Axes(size=2.0))
+    for _ in range(60):
+        a = one.next_pose((0.5, 2.0), terrain=hills)
+        b = two.next_pose((1.0, 4.0), terrain=lambda x, z: 2 * hills(x / 2, z / 2))
+    np.testing.assert_allclose(b.positions, 2 * a.positions, rtol=1e-6, atol=1e-3)
+    np.testing.assert_allclose(b.root, 2 * a.root, rtol=1e-6, atol=1e-3)
+
+
+def test_unknown_joints_follow_the_joint_above_them(network) -> None:
+    character = ProceduralAnimation(network, rig="mixamo55")
+    rig, pose = character.skeleton, walk(character, 30)[-1]
+    for name in ("LeftEye", "LeftHandThumb2", "RightHandPinky3"):
+        j = rig.index(name)
+        np.testing.assert_allclose(pose.rotations[j], pose.rotations[rig.parents[j]], atol=1e-9)
+
+
+@pytest.mark.shared
+@pytest.mark.parametrize(
+    "file",
+    [
+        "taeil/124_01_ret_MIXAMO_rest.bvh",
+        "makehuman/walk1.bvh",
+        "ammarkov/102_01cc.bvh",
+        "olafhaag/walk01.bvh",
+    ],
+)
+def test_strangers_rigs_walk(shared: Path, network, file: str) -> None:
+    """Rigs with a rest pose stand upright, face ahead and put their feet on the ground."""
+    character = ProceduralAnimation(network, rig=shared / "wild" / "rigs" / file)
+    rig, pose = character.skeleton, walk(character, 60, target_velocity=(0, 2.0))[-1]
+    at = {role: pose.positions[rig.role(role)] for role in rig.roles}
+    up = at["head"] - at["hips"]
+    assert up[1] > 0.9 * np.linalg.norm(up)
+    left = at["left_hip"] - at["right_hip"]
+    assert left[0] > 0.8 * np.linalg.norm(left)
+    toes = np.array([at["left_toe"], at["right_toe"]])
+    assert -2 < toes[:, 1].min() < 12
+    assert (toes - [at["left_heel"], at["right_heel"]])[:, 2].min() > 3  # they point ahead
+
+
+@pytest.mark.shared
+def test_a_rig_without_a_rest_pose_is_refused(shared: Path, network) -> None:
+    with pytest.raises(HobbleError, match="no rest pose"):
+        ProceduralAnimation(network, rig=shared / "wild/rigs/lafan_orig/obstacles1_subject1.bvh")
+
+
+def test_wrong_maps_and_roles_are_refused(network) -> None:
+    rig = load_rig("rig22").skeleton
+    with pytest.raises(HobbleError, match="no joint for left_toe"):
+        plan_rig(
+            network.skeleton, replace(rig, roles={k: v for k, v in rig.roles.items() if k != "left_toe"})
+        )
+    with pytest.raises(HobbleError, match="no joint Tail"):
+        plan_rig(network.skeleton, rig, {rig.joints[0]: "Tail"})
