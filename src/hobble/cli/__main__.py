@@ -117,6 +117,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except HobbleError as error:
         print(error, file=sys.stderr)
         return 1
+    except ModuleNotFoundError as error:
+        print(f"hobble {options.command} needs {error.name}: pip install 'hobble[workflow]'", file=sys.stderr)
+        return 1
     except KeyboardInterrupt:
         return 128 + signal.SIGINT
     except BrokenPipeError:  # the reader, such as `head`, has read enough
