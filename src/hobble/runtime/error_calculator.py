@@ -65,7 +65,8 @@ class ErrorCalculator:
         predict = network.predict if network.memory_size else character.predictor.predict
         predicted = predict(pairs.x, pairs.p.astype(float))
         ground = rows.mean[rows.first_fit[chosen]]
-        roots, yaws = [np.zeros((0, 3))], [np.zeros(0)]
+        roots: list[Array] = [np.zeros((0, 3))]
+        yaws: list[Array] = [np.zeros(0)]
         for stretch in stretches:
             y = rows.y[stretch].astype(float)
             turn = y[:, layout.y_turn][:, 0]

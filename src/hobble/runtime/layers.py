@@ -15,9 +15,9 @@ import numpy as np
 from hobble.core import quat
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
+from hobble.motion.axes import rest_frame
 from hobble.runtime.animation import Pose
 from hobble.runtime.caller_targets import Axes
-from hobble.runtime.feet import rest_facing
 
 NECK_SHARE = 0.4  # share of a look's turn that the neck takes; the head takes the rest
 
@@ -36,7 +36,7 @@ class Layers:
         for k, p in enumerate(skeleton.parents):
             if p >= 0:
                 self._below[:, k] |= self._below[:, p]
-        self._ahead = axes.directions_to_caller(rest_facing(skeleton))
+        self._ahead = axes.directions_to_caller(quat.rotate(rest_frame(skeleton), [0.0, 0.0, 1.0]))
 
     def turn(self, pose: Pose, joint: str, rotation: Any) -> Pose:
         """Turn a joint and all joints below it about its place, by a world rotation (4,) or (C, 4)."""
@@ -60,7 +60,7 @@ class Layers:
     def look_at(self, pose: Pose, point: Any, weight: float = 1.0, most: float = 70.0) -> Pose:
         """Turn neck and head so that the face points to a world position (3,) or (C, 3).
 
-        weight: share of the turn, 0 to 1. most: largest turn, degrees. The skeleton needs the role head.
+        weight: share of the turn, 0 to 1. most: largest turn, degrees, before `weight`. Needs the role head.
         """
         head = self.skeleton.role("head")
         ahead = quat.rotate(pose.rotations[..., head, :], self._ahead)
