@@ -24,9 +24,10 @@ from hobble.measures.measure import MeasureInputs, Outcome, Row
 from hobble.measures.walks import FPS, foot_slide, mean_of_known, turns_between
 from hobble.models.load import load_network
 from hobble.models.network import Network
-from hobble.runtime.animation import ProceduralAnimation, world_rotations
+from hobble.runtime.animation import ProceduralAnimation
 from hobble.runtime.controller import STEPS
 from hobble.runtime.options import Runtime
+from hobble.runtime.pose import world_rotations
 from hobble.runtime.waypoints import TRACK, Waypoint
 
 if TYPE_CHECKING:

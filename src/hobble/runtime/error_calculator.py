@@ -4,17 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from hobble.core.quat import Array
 from hobble.rows.captured import headings, root_path, rotate_by_yaw, unbroken_stretches
 from hobble.rows.clip_rows import ClipRows, compose_pairs
-from hobble.runtime.animation import Pose, world_rotations
-
-if TYPE_CHECKING:
-    from hobble.runtime.animation import ProceduralAnimation
+from hobble.runtime.pose import Pose, world_rotations
 
 # cm: a joint nearer than this to the root counts as this far from it, so that nothing is divided by 0.
 LEAST_DISTANCE = 1e-3
@@ -54,7 +51,7 @@ class ErrorCalculator:
     cycles has two rows, of which the first is used, with the first of its terrain fits.
     """
 
-    def __init__(self, character: ProceduralAnimation, rows: ClipRows) -> None:
+    def __init__(self, character: Any, rows: ClipRows) -> None:
         network, layout = character.network, character.network.layout
         if rows.layout.joints != layout.joints or not set(layout.channels) <= set(rows.layout.channels):
             raise ValueError(f"the rows ({rows.layout}) are not those that the network has learnt ({layout})")
