@@ -21,7 +21,7 @@ from hobble.motion.body import SIDES, body_by_roles, match_joints
 from hobble.motion.make import raw_clip, rig_in_file
 from hobble.motion.read import read_bvh
 from hobble.motion.rest_pose import why_not_standing
-from hobble.motion.retarget import BENT, LIMB_BONES, MOST_DROP, NEARLY_STRAIGHT, Retarget, plan
+from hobble.motion.retarget import BENT, LIMB_BONES, MOST_DROP, NEARLY_STRAIGHT, SPARED, Retarget, plan
 from hobble.motion.rig import body_in_file, leg_length, likely_unit, match_rig
 from hobble.motion.skeleton_file import KnownSkeleton, find_skeleton, load_skeleton, skeleton_folder
 from hobble.runtime.feet import leg_joints
@@ -96,7 +96,7 @@ class RigDriver:
         self._followed = np.stack([how.joints, how.follows], axis=1).astype(np.int64), how.turns
         self._joints = np.array(above, np.int64), own, how.driver_offsets, hips
         legs = leg_joints(target).astype(np.int64), leg_joints(how.source).astype(np.int64)
-        self._body = *legs, how.pelvis, how.forward, float(how.scale), float(how.lift)
+        self._body = *legs, how.pelvis, how.forward, float(how.scale), np.asarray(how.lifts, float)
         self._limbs = _limb_bones(how)
 
     def __call__(self, positions: Array, rotations: Array) -> tuple[Array, Array]:
@@ -145,9 +145,10 @@ def drive_rig(
     come down if a leg would be straighter than the character's, and legs bend until the balls of the feet are
     where they are in the scaled character.
     """
-    (pairs, turns), (_, _, offsets, hips), (ends, bones) = followed, joints, limbs
-    legs, leading, pelvis, forward, scale, lift = body
+    (pairs, turns), (_, _, offsets, hips), (ends, limb_bones) = followed, joints, limbs
+    legs, leading, pelvis, forward, scale, lifts = body
     shift, by = np.zeros((2, 3)), np.empty(4)
+    lift = 0.5 * (lifts[0] + lifts[1])
     for c in range(len(position)):
         p, q, s = position[c], rotation[c], source[c]
         for i in range(len(pairs)):
@@ -156,7 +157,7 @@ def drive_rig(
         for i in range(len(ends)):
             # By positions, because predicted rotations do not quite lead to the predicted positions.
             j, wanted = ends[i, 0], s[ends[i, 2]] - s[ends[i, 1]]
-            x, y, z = turn_vector(q[j], bones[i, 0], bones[i, 1], bones[i, 2])
+            x, y, z = turn_vector(q[j], limb_bones[i, 0], limb_bones[i, 1], limb_bones[i, 2])
             by[0], by[1], by[2], by[3] = rotation_between(x, y, z, wanted[0], wanted[1], wanted[2])
             turn_rotation(by, q[j])
         x, y, z = turn_vector(q[hips], pelvis[0], pelvis[1], pelvis[2])
@@ -172,11 +173,11 @@ def drive_rig(
             ball = s[leading[f, 3]]
             shift[f, 0], shift[f, 1], shift[f, 2] = (
                 scale * ball[0] - x,
-                scale * ball[1] - y,
+                scale * ball[1] + lift - lifts[f] - y,
                 scale * ball[2] - z,
             )
-            reach = _length(offsets[legs[f, 1]]) + _length(offsets[heel])
-            drop = max(drop, _drop(p[hip], shift[f], reach, s, leading[f]))
+            bones = _length(offsets[legs[f, 1]]), _length(offsets[heel])
+            drop = max(drop, _drop(p[hip], shift[f], bones, s, leading[f]))
             shift[f] -= p[heel]
         p[:, 1] -= drop
         shift[:, 1] += drop
@@ -221,16 +222,20 @@ def _length(v: Any) -> float:
 
 
 @njit
-def _drop(hip: Any, ankle: Any, reach: float, source: Any, leg: Any) -> float:
-    """How far the hips must come down for the rig's leg to be no straighter than the character's, cm.
+def _drop(hip: Any, ankle: Any, bones: tuple[float, float], source: Any, leg: Any) -> float:
+    """How far the hips must come down for the rig's knee to bend as the character's does, cm.
 
-    hip: (3,) where the rig's leg begins. ankle: (3,) where it must end. reach: length of the rig's leg.
-    source: (J, 3) the character's joints. leg: (4,) the joints of its leg. See `_Leg.drop` in
+    hip: (3,) where the rig's leg begins. ankle: (3,) where it must end. bones: lengths of the rig's thigh and
+    shank. source: (J, 3) the character's joints. leg: (4,) the joints of its leg. See `_Leg.excess` in
     `hobble.motion.retarget`.
     """
     thigh, shank = source[leg[1]] - source[leg[0]], source[leg[2]] - source[leg[1]]
-    stretch = _length(source[leg[2]] - source[leg[0]]) / max(_length(thigh) + _length(shank), 1e-9)
-    level = min((hip[0] - ankle[0]) ** 2 + (hip[2] - ankle[2]) ** 2, (stretch * reach) ** 2)
-    need = max(hip[1] - ankle[1] - np.sqrt((stretch * reach) ** 2 - level), 0.0)
+    upper, lower = max(_length(thigh), 1e-9), max(_length(shank), 1e-9)
+    cosine = (thigh[0] * shank[0] + thigh[1] * shank[1] + thigh[2] * shank[2]) / (upper * lower)
+    bend = max(np.arccos(min(max(cosine, -1.0), 1.0)) - SPARED, 0.0)
+    reach = bones[0] ** 2 + bones[1] ** 2 + 2 * bones[0] * bones[1] * np.cos(bend)  # squared
+    level = min((hip[0] - ankle[0]) ** 2 + (hip[2] - ankle[2]) ** 2, reach)
+    need = max(hip[1] - ankle[1] - np.sqrt(reach - level), 0.0)
+    stretch = _length(source[leg[2]] - source[leg[0]]) / (upper + lower)
     share = min(max((stretch - BENT) / (NEARLY_STRAIGHT - BENT), 0.0), 1.0)
     return min(need, MOST_DROP) * share * share * (3.0 - 2.0 * share)
