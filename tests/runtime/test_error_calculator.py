@@ -7,8 +7,7 @@ import pytest
 
 from hobble.core import quat
 from hobble.measures.accuracy_run import joint_errors
-from hobble.rows.captured import headings, root_path
-from hobble.rows.clip_rows import ClipRows, compose_pairs
+from hobble.rows.clip_rows import ClipRows, compose_pairs, headings, root_path
 from hobble.runtime.animation import ProceduralAnimation
 from hobble.runtime.caller_targets import Axes
 

@@ -9,8 +9,14 @@ from typing import Any
 import numpy as np
 
 from hobble.core.quat import Array
-from hobble.rows.captured import headings, root_path, rotate_by_yaw, unbroken_stretches
-from hobble.rows.clip_rows import ClipRows, compose_pairs
+from hobble.rows.clip_rows import (
+    ClipRows,
+    compose_pairs,
+    headings,
+    root_path,
+    rotate_by_yaw,
+    unbroken_stretches,
+)
 from hobble.runtime.pose import Pose, world_rotations
 
 # cm: a joint nearer than this to the root counts as this far from it, so that nothing is divided by 0.
