@@ -1,6 +1,8 @@
 """Hobble: from motion capture to a character controller that limps the way the body would.
 
-    character = hobble.load("results/injured/network")
+    from hobble import load
+
+    character = load("results/injured/network")
     pose = character.next_pose((0, 2.5), injury={"LeftUpLeg-LeftLeg": 7})
 
 The function `results` of this package gives tables of results as data frames (`hobble.measures.results`).
