@@ -44,9 +44,10 @@ export const glbFile = (spec, body, frames) => {
     const n = Math.hypot(normals[i], normals[i + 1], normals[i + 2]) || 1;
     for (let k = 0; k < 3; k++) normals[i + k] /= n;
   }
+  const shares = new Uint8Array(bytes(body.share));
   const attributes = {
     POSITION: buffer.add(corners, "VEC3", 5126, { min: ends(Math.min), max: ends(Math.max) }), NORMAL: buffer.add(normals, "VEC3"),
-    JOINTS_0: buffer.add(new Uint8Array(bytes(body.bone)), "VEC4", 5121), WEIGHTS_0: buffer.add(new Uint8Array(bytes(body.share)), "VEC4", 5121, { normalized: true }),
+    JOINTS_0: buffer.add(new Uint8Array(bytes(body.bone)).map((bone, i) => (shares[i] ? bone : 0)), "VEC4", 5121), WEIGHTS_0: buffer.add(shares, "VEC4", 5121, { normalized: true }),
   };
   const faces = body.wide ? new Uint32Array(bytes(body.faces)) : new Uint16Array(bytes(body.faces));
   const indices = buffer.add(faces, "SCALAR", body.wide ? 5125 : 5123);
