@@ -12,7 +12,18 @@ import pytest
 # The rooms of src/hobble, in the order in which data passes through them.
 ROOMS = (
     *("core", "figure", "motion", "labels", "gait", "synthetic", "channels", "hurt", "terrain", "rows"),
-    *("models", "runtime", "database", "training", "report", "measures", "config", "workflow", "cli"),
+    *(
+        "models",
+        "runtime",
+        "engine",
+        "database",
+        "training",
+        "report",
+        "measures",
+        "config",
+        "workflow",
+        "cli",
+    ),
 )
 
 

@@ -147,13 +147,15 @@ def test_a_configuration_that_continues_another_starts_at_its_end(copied) -> Non
     assert len(rows) == 1 + 3 * 10
 
 
-EXPORTS = [f"results/test/export/{name}" for name in ("character.glb", "web", "pfnn", "linear.onnx")]
+EXPORTS = [
+    f"results/test/export/{name}" for name in ("character.glb", "web", "engine", "pfnn", "linear.onnx")
+]
 
 
 def test_every_export_has_its_own_rule(finished) -> None:
     planned = finished.planned(*EXPORTS, "results/test/questionnaire/questionnaire.html")
     assert planned == dict.fromkeys(
-        ("export_glb", "export_web", "export_release", "export_onnx", "questionnaire"), 1
+        ("export_glb", "export_web", "export_engine", "export_release", "export_onnx", "questionnaire"), 1
     )
 
 
@@ -172,5 +174,7 @@ def test_every_export_is_made(copied) -> None:
     assert spec["names"] == list(json.loads(str(weights["meta"]))["skeleton"]["joints"])
     names = ("hobble.js", "hobble.d.ts", "index.html", "three.module.js")
     assert all((export / "web" / name).stat().st_size > 500 for name in names)
+    assert (export / "engine/character.hob").read_bytes()[:6] == b"HOBBLE"
+    assert len(list((export / "engine/traces").iterdir())) == 8
     assert len(list((export / "pfnn").glob("W0_*.bin"))) == 50
     assert (export / "linear.onnx").stat().st_size > 1e4

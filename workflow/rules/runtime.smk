@@ -88,3 +88,28 @@ rule export_glb:
         ),
     script:
         "../scripts/export_glb.py"
+
+
+rule export_engine:
+    """The character for any game engine: a runtime in C, character.hob, examples, and traces to check ports against."""
+    input:
+        weights=lambda w: configurations.network(w.configuration, "weights.npz"),
+        sources=keep_local(package.engine_files()),
+    output:
+        folder=directory("results/{configuration}/export/engine"),
+    log:
+        "results/{configuration}/logs/runtime/export_engine.log",
+    benchmark:
+        "results/{configuration}/benchmarks/runtime/export_engine.tsv"
+    resources:
+        mem_mb=1000,
+        runtime=10,
+    params:
+        runtime=lambda w: configurations.section(w.configuration, "runtime"),
+        code=lambda w: package.code(
+            "export_engine",
+            configurations.model_package(w.configuration),
+            *display_modules(),
+        ),
+    script:
+        "../scripts/export_engine.py"

@@ -23,7 +23,7 @@ from hobble.core.skeleton import Skeleton
 from hobble.models.forward import forward
 from hobble.models.load import read_layers
 from hobble.models.model import LayerMirror, Trainable, TrainedOptions, TrainingStep
-from hobble.models.network import Export, pack_layer, standardise_inputs
+from hobble.models.network import FIXED, Export, pack_layer, standardise_inputs
 from hobble.models.onnx_file import Graph, Node, OnnxNetwork, add_layers, write_checked
 from hobble.rows.layout import ColumnMirror, RowLayout
 
@@ -153,6 +153,18 @@ class BlendedNetwork(OnnxNetwork):
 
         prepared = self.prepare(self.resolve_mode(mode))
         return BlendPredictor(self, *prepared, self.extended, storage or self.default_storage)
+
+    def engine_data(
+        self, mode: str, storage: str, inputs: NDArray[np.int64]
+    ) -> tuple[dict[str, int], dict[str, np.ndarray]]:
+        """As in `Network`."""
+        from hobble.models.predict import Stack
+
+        weights, biases, _ = self.prepare(mode)
+        first = weights[0][:, :, np.r_[inputs, len(self.x_mean) : weights[0].shape[2]]]
+        stack = Stack([first, *weights[1:]], biases, storage, self.y_mean, self.y_std)
+        sizes = {"form": FIXED, "layers": len(weights), "sets": len(first), "extra": self.extra_inputs}
+        return sizes, stack.sections()
 
     def page_data(self, inputs: NDArray[np.int64], outputs: NDArray[np.int64]) -> dict[str, Any]:
         """As in `Network`. layers: see `pack_layer`."""

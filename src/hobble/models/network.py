@@ -26,6 +26,10 @@ from hobble.rows.layout import GAITS, RowLayout, compose
 TERRAIN_SIDE = 25.0
 STORAGES = ("float32", "int16")  # types in which a predictor can keep its weights
 
+# Where the runtime in C gets a prediction from: sets of weights blended around the phase, one set of weights,
+# sets that a gate blends, or recorded frames.
+PHASED, FIXED, GATED, RECORDED = range(4)
+
 Export = Callable[[Path, str], str]  # see `Network.exports`
 
 
@@ -266,6 +270,21 @@ class Network(ABC):
 
         mode: one of `modes`, by default the exact one. storage: one of STORAGES, by default the kind's own.
         Raises ValueError for an unknown mode or storage.
+        """
+
+    @abstractmethod
+    def engine_data(
+        self, mode: str, storage: str, inputs: NDArray[np.int64]
+    ) -> tuple[dict[str, int], dict[str, np.ndarray]]:
+        """The network in a character file (`hobble.engine.hob`): entries of its section "sizes"; sections.
+
+        mode: one of `modes`. storage: one of STORAGES. inputs: the columns of X to read; others have no
+        effect.
+
+        The entries are form (PHASED, FIXED, GATED or RECORDED), layers, sets, and extra, which is 2 if the
+        first layer gets sine and cosine of the phase after X; for PHASED blended, how many sets are blended;
+        for GATED gate_layers and gate_inputs; for RECORDED only form, rows, features and every.
+        `Stack.sections` makes the sections of layers.
         """
 
     @abstractmethod

@@ -90,6 +90,11 @@ class Stack:
         self.numbers = np.concatenate([np.asarray(array, np.float32) for array in numbers])
         self.plan = np.array(plan, np.int64)
 
+    def sections(self, prefix: str = "") -> dict[str, np.ndarray]:
+        """The stack as sections of a character file (`hobble.engine.hob`)."""
+        plan = self.plan[:, [INPUTS, OUTPUTS]].ravel().astype(np.int32)
+        return {f"{prefix}plan": plan, f"{prefix}weights": self.weights, f"{prefix}layers": self.numbers}
+
     def run(self, shares: Array, z: Array, out: Array) -> None:
         """Write the last layer's outputs for C characters, in raw units, into out (C, Y).
 

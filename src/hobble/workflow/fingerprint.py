@@ -240,6 +240,11 @@ class Package:
         files = [*(self.folder / "report" / "web").iterdir(), *self.folder.glob("models/**/*.js")]
         return sorted(str(path) for path in files if path.suffix == suffix)
 
+    def engine_files(self) -> list[str]:
+        """Paths of the runtime in C, its README and its examples."""
+        files = [path for name in ("c", "examples") for path in (self.folder / "engine" / name).rglob("*")]
+        return sorted(str(path) for path in files if path.is_file() and "__pycache__" not in path.parts)
+
     def published_file(self) -> str:
         """Path of the published results, such as errors and times, with which the report compares ours."""
         return str(self.folder / "report" / "published.yaml")

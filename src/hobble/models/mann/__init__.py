@@ -20,7 +20,7 @@ from hobble.models.blend import BlendedNetwork, BlendedOptions, TrainableBlend
 from hobble.models.forward import forward, softmax
 from hobble.models.load import read_arrays, read_layers
 from hobble.models.model import Trainable
-from hobble.models.network import pack_layer
+from hobble.models.network import GATED, pack_layer
 from hobble.rows.layout import GAITS, RowLayout
 
 if TYPE_CHECKING:
@@ -131,6 +131,19 @@ class Mann(BlendedNetwork):
         # The gate stays float32: it is small, and rounding it would change the shares of all experts.
         gate = Stack(self.gate_weights, self.gate_biases)
         return self.weights, self.biases, partial(gate_shares, gate, self.columns, self.sets)
+
+    def engine_data(
+        self, mode: str, storage: str, inputs: NDArray[np.int64]
+    ) -> tuple[dict[str, int], dict[str, np.ndarray]]:
+        """As in `Network`."""
+        from hobble.models.predict import Stack
+
+        sizes, sections = super().engine_data(mode, storage, inputs)
+        read = np.isin(self.columns, inputs)
+        gate = Stack([self.gate_weights[0][:, :, read], *self.gate_weights[1:]], self.gate_biases)
+        columns = np.searchsorted(inputs, self.columns[read]).astype(np.int32)
+        sizes |= {"form": GATED, "gate_layers": len(self.gate_weights), "gate_inputs": len(columns)}
+        return sizes, sections | gate.sections("gate_") | {"gate_columns": columns}
 
     def page_data(self, inputs: NDArray[np.int64], outputs: NDArray[np.int64]) -> dict[str, Any]:
         """As in `BlendedNetwork`. gateLayers: of the gate. gate: its columns, as positions in `inputs`."""

@@ -29,7 +29,7 @@ from hobble.core.errors import InputError
 from hobble.core.files import to_base64
 from hobble.core.quat import Array
 from hobble.models.load import LARGEST_MEAN, read_arrays
-from hobble.models.network import STORAGES, Network, pack_table, standardise_inputs
+from hobble.models.network import RECORDED, STORAGES, Network, pack_table, standardise_inputs
 from hobble.models.predict import StandardisingPredictor
 
 # Largest number of rows of the tables. The page keeps row numbers in float32, which is exact up to here.
@@ -209,6 +209,24 @@ class Matching(Network):
         self.resolve_mode(mode)
         return MatchingPredictor(self, storage or self.default_storage)
 
+    def engine_data(
+        self, mode: str, storage: str, inputs: NDArray[np.int64]
+    ) -> tuple[dict[str, int], dict[str, np.ndarray]]:
+        """As in `Network`. findable: 1 for the rows `start_rows`. Other sections have the names of fields."""
+        predictor, findable = MatchingPredictor(self, storage), np.zeros(len(self.remaining), np.uint8)
+        findable[self.start_rows] = 1
+        sizes = {"form": RECORDED, "rows": len(findable), "features": len(self.columns), "every": self.every}
+        return sizes, {
+            "frames": predictor.frames,
+            "frame_scale": predictor.scale,
+            "features": self.features.astype(np.float32),
+            "feature_columns": self.columns.astype(np.int32),
+            "feature_weights": self.weights.astype(np.float32),
+            "phases": self.phases.astype(np.float32),
+            "remaining": self.remaining.astype(np.int32),
+            "findable": findable,
+        }
+
     def page_data(self, inputs: NDArray[np.int64], outputs: NDArray[np.int64]) -> dict[str, Any]:
         """As in `Network`. Frames are integers with a factor for each column. Features stay float32, so that
         the page finds the same rows. Large tables are shortened to about MOST_ON_PAGE rows."""
@@ -260,10 +278,10 @@ class MatchingPredictor(StandardisingPredictor):
         super().__init__(network)
         if storage not in STORAGES:
             raise ValueError(f"storage {storage!r}: not one of {', '.join(STORAGES)}")
-        self._frames, self._scale = network.frames, np.ones(network.frames.shape[1], np.float32)
+        self.frames, self.scale = network.frames, np.ones(network.frames.shape[1], np.float32)
         if storage == "int16":
-            self._scale = np.maximum(np.abs(network.frames).max(axis=0) / 32767, 1e-30).astype(np.float32)
-            self._frames = np.round(network.frames / self._scale).astype(np.int16)
+            self.scale = np.maximum(np.abs(network.frames).max(axis=0) / 32767, 1e-30).astype(np.float32)
+            self.frames = np.round(network.frames / self.scale).astype(np.int16)
         layout = network.layout
         blocks = (
             layout.y_joint_position, layout.y_joint_velocity, layout.y_joint_rotation, layout.y_phase_change
@@ -284,7 +302,7 @@ class MatchingPredictor(StandardisingPredictor):
         if due.any():
             searching = np.flatnonzero(due)
             shown[searching] = self._search(network.input_features(z[searching]), following[searching])
-        table, choice = (self._frames, self._scale, network.phases), (before, following, due, shown)
+        table, choice = (self.frames, self.scale, network.phases), (before, following, due, shown)
         show_rows(
             memory, table, choice, phase, (network.layout.joints, self._first_columns, network.halflife), out
         )

@@ -9,13 +9,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, get_args
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field
 
 from hobble.core.quat import Array
 from hobble.core.section import PhaseMode
 from hobble.models.blend import BlendedNetwork, BlendedOptions, TrainableBlend
 from hobble.models.forward import catmull_rom, phase_shares, weights_at
-from hobble.models.network import Export
+from hobble.models.network import PHASED, Export
 from hobble.models.pfnn.release import read_release, write_release
 
 if TYPE_CHECKING:
@@ -102,6 +103,13 @@ class Pfnn(BlendedNetwork):
             tuple(weights_at(points, phases) for points in layers) for layers in (self.weights, self.biases)
         )
         return weights, biases, partial(shares_at, blended, stored)
+
+    def engine_data(
+        self, mode: str, storage: str, inputs: NDArray[np.int64]
+    ) -> tuple[dict[str, int], dict[str, np.ndarray]]:
+        """As in `Network`."""
+        sizes, sections = super().engine_data(mode, storage, inputs)
+        return sizes | {"form": PHASED, "blended": STORED_AND_BLENDED[mode][1]}, sections
 
     def onnx_shares(self, g: Graph, z: Node, mode: str) -> tuple[Node | None, Node]:
         """As in `BlendedNetwork`."""

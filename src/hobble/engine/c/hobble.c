@@ -1,0 +1,2189 @@
+/* The runtime of Hobble in C99; hobble.h explains how to use it. It computes what src/hobble/runtime and
+   src/hobble/models compute in Python, in the same order, and a test holds both together. Parts of this file:
+
+   1. Constants and small functions     5. The trajectory (trajectory.py, bounds.py, caller_targets.py)
+   2. What a file holds                 6. Rows of the network (network_rows.py) and its prediction moved on
+   3. Networks (predict.py)             7. Feet (leg_reach.py, feet.py)
+   4. Motion matching (matching)        8. A frame (controller.py), and the functions of hobble.h
+
+   X are the inputs of the network and Y its outputs. A column is one of them. State is in double precision,
+   because a character may walk far from the origin; networks are in single precision. */
+#include "hobble.h"
+
+#include <math.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <string.h>
+
+/* ---- 1. Constants and small functions -------------------------------------------------------------------
+ */
+
+#define PI 3.14159265358979323846
+#define GAITS HOBBLE_GAITS
+#define RADIANS(degrees) ((degrees) * (PI / 180))
+
+/* Limits of what a file may hold. Products of them fit 64 bits. */
+enum { MOST_JOINTS = 1024, MOST_WINDOW = 4096, MOST_COLUMNS = 4096, MOST_CHANNELS = 64, MOST_LAYERS = 16 };
+enum {
+    MOST_UNITS = 1 << 16,
+    MOST_SETS = 64,
+    MOST_ROWS = 1 << 24,
+    MOST_LEVELS = 64,
+    MOST_CHARACTERS = 1 << 20
+};
+#define LARGEST_SOUND 1e8 /* a larger number is called unsound, like one that is not finite */
+#define HIGHEST_GROUND 1e7
+#define FARTHEST 1e7
+
+/* Trajectory and targets. The Python modules say why these numbers were chosen. */
+#define STEERING_LIMIT 2.0
+#define TARGET_MIX 0.9
+#define GAIT_MIX 0.1
+#define CORRECTION_RATE 0.01
+#define CORRECTION_WITHIN 0.8
+#define MOST_CORRECTION 1.0
+#define FURTHEST_TURN RADIANS(137)
+#define STRAFE_FROM RADIANS(45)
+#define STILL 0.1
+#define FASTEST_TARGET 30.0
+#define TURN_IN_PLACE RADIANS(20)
+#define JOG_FROM 5.0
+#define LAME_BELOW 4.5
+#define HURRY_FACTOR 1.25
+#define SUM_NORM 3.0
+#define SLOWEST_SHARE 0.1
+/* Poses. */
+#define FASTEST_TURN RADIANS(25)
+#define MOST_CLIMB 5.0
+#define PULL 0.2
+#define PULL_AHEAD 0.5
+#define BACKWARD_LOSS 0.5
+#define CARRIED_SHARE 0.5
+#define STANDING_SHARE 0.1
+/* Feet. */
+#define LOCK_AT 0.5
+#define RELEASE 0.2
+#define TOO_FAR 20.0
+#define MISSED 1.0
+#define TOO_FAR_ALONE 30.0
+#define MISSED_ALONE 4.0
+#define STEP_FRAMES 10
+#define STEP_HEIGHT 5.0
+#define HEIGHT_MIX 0.5
+#define FASTEST_LIFT 8.0
+#define STRETCH 0.99
+#define BEHIND 10.0
+#define BODY_MIX 0.15
+#define BODY_FREE 3.0
+#define BODY_MIN_CONTACT 0.3
+#define FLOATING 3.0
+#define MOST_ADDED RADIANS(28)
+#define KNEE_AHEAD 3.0
+/* Networks and motion matching. */
+#define NEGLIGIBLE_SHARE 1e-7f
+#define FASTEST_PULL 0.002
+enum { SURROUNDING = 20, ROW = 0, SINCE = 1, OFFSETS = 2, OFFSETS_PER_JOINT = 12, BLOCK = 16 };
+
+static double smaller(double a, double b) { return a < b ? a : b; }
+static double larger(double a, double b) { return a > b ? a : b; }
+static double clamp(double v, double low, double high) { return smaller(larger(v, low), high); }
+static double length2(double x, double z) { return sqrt(x * x + z * z); }
+static double length3(double x, double y, double z) { return sqrt(x * x + y * y + z * z); }
+static double wrap(double angle) { return angle - 2 * PI * floor((angle + PI) / (2 * PI)); }
+
+/* ---- 2. What a file holds --------------------------------------------------------------------------------
+
+   A header of 64 bytes, a table of sections, and the sections, each aligned to 64 bytes. A section has a
+   name, a type and a number of values. src/hobble/engine/hob.py writes the file. Everything is checked here
+   before it is used. */
+
+enum { I32 = 1, F32 = 2, F64 = 3, I16 = 4, U8 = 5 };
+enum { HEADER = 64, ENTRY = 40, NAME = 16 };
+
+/* The values of the section "sizes". EXTRA: 2 if the first layer gets sine and cosine of the phase after X,
+   else 0. */
+enum {
+    JOINTS,
+    WINDOW,
+    STEP,
+    COLUMNS,
+    CHANNELS,
+    X_SIZE,
+    Y_SIZE,
+    INPUTS,
+    HIPS,
+    FORM,
+    STORAGE,
+    EXTRA,
+    LAYERS,
+    SETS,
+    BLENDED,
+    GATE_LAYERS,
+    GATE_INPUTS,
+    ROWS,
+    FEATURES,
+    EVERY,
+    SIZES
+};
+/* The values of the section "numbers". */
+enum { SIDE, STEERING, LOCKING, FASTEST, HIPS_LOW, HIPS_HIGH, START_PHASE, HALFLIFE, NUMBERS };
+/* Where a prediction comes from. PHASED: sets of weights, of which those around the phase are blended. FIXED:
+   one set. GATED: sets that a second network, the gate, blends. RECORDED: frames of clips, see part 4. */
+enum { PHASED, FIXED, GATED, RECORDED, FORMS };
+enum { FLOAT32, INT16 }; /* how weights and frames are stored */
+/* Blocks of X whose first columns are in the section "x_first". */
+enum { X_POSITION, X_DIRECTION, X_GAIT, X_JOINTS, X_VELOCITIES, X_TERRAIN, X_BLOCKS };
+enum { HIP, KNEE, HEEL, TOE }; /* columns of `legs` */
+enum { FOOT = 1, TOES = 2 };   /* the part of a foot to which a joint belongs, in `parts` */
+
+/* Layers with an ELU between them. Their weights are in panels: see `multiply`. */
+typedef struct {
+    int layers, sets, storage;
+    int inputs[MOST_LAYERS], outputs[MOST_LAYERS];
+    uint64_t weights_at[MOST_LAYERS]; /* index in `weights` where a layer's weights begin */
+    const float *factors[MOST_LAYERS], *biases[MOST_LAYERS]; /* (sets, outputs) each */
+    const void *weights;
+    const float *mean, *std; /* of the last layer's outputs */
+} stack;
+
+/* Speed limits of the columns of a channel: speeds (GAITS, columns, levels), see speed_limits.py. */
+typedef struct {
+    int first, columns, levels; /* levels: 0 if the channel has no limits */
+    const double *level, *usual, *speeds;
+} channel;
+
+typedef struct { /* a character file, read only */
+    int size[SIZES];
+    double number[NUMBERS];
+    int samples, future, length; /* of the trajectory: in X, in Y, and in frames */
+    int stand, walk, jog, crouch;
+    int y_contacts, y_position, y_direction,
+        y_joints; /* first columns in Y; 0 to 3 are velocity, turn, phase */
+    const int32_t *inputs, *x_first, *x_channels, *parents, *legs, *channel_of;
+    const uint8_t *parts;
+    const float *x_mean, *x_inverse, *x_low, *x_high, *y_low, *y_high;
+    const double *offsets, *sole, *ahead, *rates, *scales, *highest;
+    const double *start_path, *start_direction, *start_gait, *start_joints, *start_velocities,
+        *start_rotations;
+    channel channels[MOST_CHANNELS];
+    stack network, gate;
+    const int32_t *gate_columns;
+    /* Motion matching: the Y and the features of each recorded frame, and how many frames of its run follow.
+     */
+    const void *frames;
+    const float *frame_scale, *features, *feature_weights, *phases;
+    const int32_t *feature_columns, *remaining;
+    const uint8_t *findable; /* whether a search may find a frame */
+} model;
+
+typedef struct {
+    const unsigned char *bytes;
+    uint64_t size;
+    uint32_t sections;
+    char *why;
+    int failed;
+} reader;
+
+static void fail(reader *r, const char *what, const char *name) {
+    if (!r->failed && r->why) snprintf(r->why, HOBBLE_WHY, "the character file %s%s", what, name);
+    r->failed = 1;
+}
+
+static uint64_t read64(const unsigned char *at) {
+    uint64_t value;
+    memcpy(&value, at, 8);
+    return value;
+}
+
+static uint32_t read32(const unsigned char *at) {
+    uint32_t value;
+    memcpy(&value, at, 4);
+    return value;
+}
+
+/* The checksum Adler-32 (RFC 1950). 5552 sums of bytes fit 32 bits. */
+static uint32_t checksum(const unsigned char *bytes, uint64_t count) {
+    uint32_t a = 1, b = 0;
+    for (uint64_t from = 0; from < count; from += 5552) {
+        uint64_t end = count - from < 5552 ? count : from + 5552;
+        for (uint64_t i = from; i < end; i++) b += a += bytes[i];
+        a %= 65521;
+        b %= 65521;
+    }
+    return b << 16 | a;
+}
+
+static void read_header(reader *r) {
+    if ((uintptr_t)r->bytes % 8) fail(r, "is not aligned to 8 bytes", "");
+    else if (r->size < HEADER) fail(r, "is shorter than its header", "");
+    else if (memcmp(r->bytes, "HOBBLE\r\n", 8)) fail(r, "does not begin as one", "");
+    else if (read32(r->bytes + 12) != 0x01020304) fail(r, "was written for another byte order", "");
+    else if (read32(r->bytes + 8) != HOBBLE_FILE_VERSION)
+        fail(r, "has another version than this runtime", "");
+    else if (read64(r->bytes + 16) != r->size) fail(r, "has another size than it says", "");
+    else if (read32(r->bytes + 24) != checksum(r->bytes + HEADER, r->size - HEADER))
+        fail(r, "is damaged", "");
+    else {
+        r->sections = read32(r->bytes + 28);
+        if (r->sections > (r->size - HEADER) / ENTRY) fail(r, "has a table that is too long", "");
+    }
+}
+
+/* The section `name`, which must have this type and count. After a failure, NULL. */
+static const void *section(reader *r, const char *name, unsigned type, uint64_t count) {
+    static const unsigned char bytes_of[] = {0, 4, 4, 8, 2, 1};
+    char padded[NAME] = {0};
+    if (r->failed) return NULL;
+    memcpy(padded, name, strlen(name));
+    for (uint32_t i = 0; i < r->sections; i++) {
+        const unsigned char *entry = r->bytes + HEADER + (uint64_t)ENTRY * i;
+        if (memcmp(entry, padded, NAME)) continue;
+        uint64_t offset = read64(entry + 24), found = read64(entry + 32);
+        if (read64(entry + 16) != type || found != count)
+            fail(r, "has another type or size in its section ", name);
+        else if (offset % 64 || offset > r->size || count > (r->size - offset) / bytes_of[type])
+            fail(r, "ends within its section ", name);
+        return r->failed ? NULL : r->bytes + offset;
+    }
+    fail(r, "has no section ", name);
+    return NULL;
+}
+
+/* The number of values of a section; 0 if there is none. */
+static uint64_t count_of(const reader *r, const char *name) {
+    char padded[NAME] = {0};
+    memcpy(padded, name, strlen(name));
+    for (uint32_t i = 0; !r->failed && i < r->sections; i++) {
+        const unsigned char *entry = r->bytes + HEADER + (uint64_t)ENTRY * i;
+        if (!memcmp(entry, padded, NAME)) return read64(entry + 32);
+    }
+    return 0;
+}
+
+/* A section of floats with absolute values up to `most`, or between `low` and `high`. */
+static const float *floats(reader *r, const char *name, uint64_t count, float most) {
+    const float *values = section(r, name, F32, count);
+    for (uint64_t i = 0; values && i < count; i++)
+        if (!(fabsf(values[i]) <= most)) {
+            fail(r, "holds an impossible number in its section ", name);
+            return NULL;
+        }
+    return values;
+}
+
+static const double *doubles(reader *r, const char *name, uint64_t count, double low, double high) {
+    const double *values = section(r, name, F64, count);
+    for (uint64_t i = 0; values && i < count; i++)
+        if (!(values[i] >= low && values[i] <= high)) {
+            fail(r, "holds an impossible number in its section ", name);
+            return NULL;
+        }
+    return values;
+}
+
+static const int32_t *indices(reader *r, const char *name, uint64_t count, int64_t low, int64_t high) {
+    const int32_t *values = section(r, name, I32, count);
+    for (uint64_t i = 0; values && i < count; i++)
+        if (values[i] < low || values[i] > high) {
+            fail(r, "holds an impossible number in its section ", name);
+            return NULL;
+        }
+    return values;
+}
+
+static const uint8_t *small(reader *r, const char *name, uint64_t count, int high) {
+    const uint8_t *values = section(r, name, U8, count);
+    for (uint64_t i = 0; values && i < count; i++)
+        if (values[i] > high) {
+            fail(r, "holds an impossible number in its section ", name);
+            return NULL;
+        }
+    return values;
+}
+
+static void require(reader *r, int is_true, const char *name) {
+    if (!is_true) fail(r, "holds an impossible number in its section ", name);
+}
+
+enum { WIDTH = 16 }; /* outputs in a panel of weights */
+static uint64_t panels_of(uint64_t outputs) { return (outputs + WIDTH - 1) / WIDTH; }
+
+/* Reads a stack of layers whose sections have the names `plan`, `weights` and `numbers`. */
+static void read_stack(reader *r, stack *s, const char *const names[3], int inputs, int outputs) {
+    const int32_t *plan = indices(r, names[0], 2 * (uint64_t)s->layers, 1, MOST_UNITS);
+    uint64_t weights = 0, count = 2 * (uint64_t)outputs;
+    if (!plan) return;
+    for (int i = 0; i < s->layers; i++) {
+        require(r, plan[2 * i] == (i ? plan[2 * i - 1] : inputs), names[0]);
+        s->inputs[i] = plan[2 * i];
+        s->outputs[i] = plan[2 * i + 1];
+        s->weights_at[i] = weights;
+        weights += s->sets * panels_of((uint64_t)s->outputs[i]) * WIDTH * (uint64_t)s->inputs[i];
+        count += 2 * (uint64_t)s->sets * (uint64_t)s->outputs[i];
+    }
+    require(r, s->outputs[s->layers - 1] == outputs, names[0]);
+    s->weights = s->storage == INT16 ? section(r, names[1], I16, weights)
+                                     : (const void *)floats(r, names[1], weights, 1e6f);
+    const float *numbers = floats(r, names[2], count, 1e20f);
+    if (!numbers) return;
+    s->mean = numbers;
+    s->std = numbers + outputs;
+    numbers += 2 * outputs;
+    for (int i = 0; i < s->layers; i++) {
+        s->factors[i] = numbers;
+        s->biases[i] = numbers + (size_t)s->sets * (size_t)s->outputs[i];
+        numbers += 2 * (size_t)s->sets * (size_t)s->outputs[i];
+    }
+}
+
+static void read_sizes(reader *r, model *m) {
+    static const int low[SIZES] = {1, 2, 1, 0, 0, 1, 1};
+    static const int high[SIZES] = {MOST_JOINTS, MOST_WINDOW, MOST_WINDOW, MOST_COLUMNS,    MOST_CHANNELS,
+                                    MOST_UNITS,  MOST_UNITS,  MOST_UNITS,  MOST_JOINTS - 1, FORMS - 1,
+                                    INT16,       2,           MOST_LAYERS, MOST_SETS,       4,
+                                    MOST_LAYERS, MOST_UNITS,  MOST_ROWS,   MOST_UNITS,      1000000};
+    const int32_t *sizes = section(r, "sizes", I32, SIZES);
+    const double *numbers = section(r, "numbers", F64, NUMBERS);
+    if (!sizes || !numbers) return;
+    for (int i = 0; i < SIZES; i++) {
+        require(r, sizes[i] >= low[i] && sizes[i] <= high[i], "sizes");
+        m->size[i] = sizes[i];
+    }
+    for (int i = 0; i < NUMBERS; i++) m->number[i] = numbers[i];
+    if (r->failed) return;
+    int joints = m->size[JOINTS], window = m->size[WINDOW], step = m->size[STEP], form = m->size[FORM];
+    require(r, window % step == 0 && window / step >= 2 && m->size[HIPS] < joints, "sizes");
+    if (r->failed) return;
+    m->future = window / step;
+    m->samples = 2 * m->future;
+    m->length = 2 * window;
+    m->y_contacts = 4;
+    m->y_position = 8;
+    m->y_direction = 8 + 2 * m->future;
+    m->y_joints = 8 + 4 * m->future;
+    require(r, m->size[X_SIZE] == m->samples * (7 + GAITS) + 6 * joints + m->size[COLUMNS], "sizes");
+    require(r, m->size[Y_SIZE] == m->y_joints + 9 * joints, "sizes");
+    require(r, form == RECORDED ? m->size[ROWS] > 0 && m->size[EVERY] > 0 : m->size[LAYERS] > 0, "sizes");
+    require(r, form != PHASED || m->size[BLENDED] == 1 || m->size[BLENDED] == 2 || m->size[BLENDED] == 4,
+            "sizes");
+    require(r, form == RECORDED || m->size[SETS] >= (form == PHASED ? m->size[BLENDED] : 1), "sizes");
+    require(r, (form != FIXED || m->size[SETS] == 1) && m->size[EXTRA] != 1, "sizes");
+    require(r, form != GATED || (m->size[GATE_LAYERS] > 0 && m->size[GATE_INPUTS] > 0), "sizes");
+    const double *n = m->number;
+    require(r, n[SIDE] >= 0 && n[SIDE] <= 1e4 && n[STEERING] >= 0 && n[STEERING] <= 1e6, "numbers");
+    require(r, (n[LOCKING] == 0 || n[LOCKING] == 1) && n[FASTEST] > 0 && n[FASTEST] <= LARGEST_SOUND,
+            "numbers");
+    require(r, n[HIPS_LOW] >= -LARGEST_SOUND && n[HIPS_LOW] <= n[HIPS_HIGH] && n[HIPS_HIGH] <= LARGEST_SOUND,
+            "numbers");
+    require(r, n[START_PHASE] >= 0 && n[START_PHASE] <= 1 && n[HALFLIFE] > 0 && n[HALFLIFE] <= 1e6,
+            "numbers");
+}
+
+/* Reads the columns of X, the skeleton, and the state in which a character starts. */
+static void read_body(reader *r, model *m) {
+    uint64_t joints = (uint64_t)m->size[JOINTS], x_size = (uint64_t)m->size[X_SIZE],
+             y_size = (uint64_t)m->size[Y_SIZE];
+    uint64_t inputs = (uint64_t)m->size[INPUTS], length = (uint64_t)m->length, last = joints - 1;
+    const int block[X_BLOCKS] = {2 * m->samples,    2 * m->samples,    GAITS * m->samples,
+                                 (int)(3 * joints), (int)(3 * joints), 3 * m->samples};
+    m->inputs = indices(r, "inputs", inputs, 0, (int64_t)x_size - 1);
+    m->x_mean = floats(r, "x_mean", inputs, 1e9f);
+    m->x_inverse = floats(r, "x_inverse", inputs, 1e31f);
+    m->x_low = floats(r, "x_low", x_size, 1e10f);
+    m->x_high = floats(r, "x_high", x_size, 1e10f);
+    m->y_low = floats(r, "y_low", y_size, 1e10f);
+    m->y_high = floats(r, "y_high", y_size, 1e10f);
+    m->x_first = indices(r, "x_first", X_BLOCKS, 0, (int64_t)x_size - 1);
+    m->x_channels = indices(r, "x_channels", (uint64_t)m->size[COLUMNS], 0, (int64_t)x_size - 1);
+    m->parents = indices(r, "parents", joints, -1, (int64_t)last);
+    m->offsets = doubles(r, "offsets", 3 * joints, -1e5, 1e5);
+    m->legs = indices(r, "legs", 8, 0, (int64_t)last);
+    m->parts = small(r, "parts", 2 * joints, TOES);
+    m->sole = doubles(r, "sole", 2, -1e6, 1e6);
+    m->ahead = doubles(r, "ahead", 3, -1.001, 1.001);
+    m->start_path = doubles(r, "start_path", 2 * length, -1e6, 1e6);
+    m->start_direction = doubles(r, "start_facing", 2 * length, -1.001, 1.001);
+    m->start_gait = doubles(r, "start_gait", GAITS * length, -1e3, 1e3);
+    m->start_joints = doubles(r, "start_joints", 3 * joints, -1e6, 1e6);
+    m->start_velocities = doubles(r, "start_speeds", 3 * joints, -1e6, 1e6);
+    m->start_rotations = doubles(r, "start_turns", 4 * joints, -1.001, 1.001);
+    if (r->failed) return;
+    for (int i = 0; i < X_BLOCKS; i++) require(r, m->x_first[i] + block[i] <= (int)x_size, "x_first");
+    for (uint64_t i = 0; i < x_size; i++) require(r, m->x_low[i] <= m->x_high[i], "x_low");
+    for (uint64_t i = 0; i < y_size; i++) require(r, m->y_low[i] <= m->y_high[i], "y_low");
+    for (int j = 0; j < (int)joints; j++)
+        require(r, j ? m->parents[j] >= 0 && m->parents[j] < j : m->parents[j] == -1, "parents");
+}
+
+/* Reads the channels and their speed limits. */
+static void read_channels(reader *r, model *m) {
+    uint64_t columns = (uint64_t)m->size[COLUMNS], channels = (uint64_t)m->size[CHANNELS];
+    m->channel_of = indices(r, "channel_of", columns, 0, (int64_t)channels - 1);
+    m->rates = doubles(r, "rates", columns, 0, 1e9);
+    m->scales = doubles(r, "scales", columns, 1e-9, 1e9);
+    m->highest = doubles(r, "highest", columns, 0, 1e6);
+    const int32_t *levels = indices(r, "limit_levels", channels, 0, MOST_LEVELS);
+    if (r->failed) return;
+    for (uint64_t k = 1; k < columns; k++) require(r, m->channel_of[k - 1] <= m->channel_of[k], "channel_of");
+    for (uint64_t k = columns; k-- > 0;) {
+        m->channels[m->channel_of[k]].first = (int)k;
+        m->channels[m->channel_of[k]].columns++;
+    }
+    uint64_t count = 0;
+    for (uint64_t i = 0; i < channels; i++) {
+        require(r, levels[i] != 1, "limit_levels");
+        if (levels[i]) count += (uint64_t)levels[i] * (1 + GAITS * (uint64_t)m->channels[i].columns) + GAITS;
+    }
+    const double *limits = doubles(r, "limits", count, 0, 1e9);
+    for (uint64_t i = 0; !r->failed && i < channels; i++) {
+        channel *one = &m->channels[i];
+        one->levels = levels[i];
+        if (!one->levels) continue;
+        one->level = limits;
+        one->usual = one->level + one->levels;
+        one->speeds = one->usual + GAITS;
+        limits = one->speeds + GAITS * one->columns * one->levels;
+        for (int l = 1; l < one->levels; l++) require(r, one->level[l - 1] < one->level[l], "limits");
+        for (const double *speed = one->speeds; speed < limits; speed++) require(r, *speed > 0, "limits");
+    }
+}
+
+static void read_matching(reader *r, model *m) {
+    uint64_t rows = (uint64_t)m->size[ROWS], features = (uint64_t)m->size[FEATURES],
+             y_size = (uint64_t)m->size[Y_SIZE];
+    int findable = 0;
+    m->frames = m->size[STORAGE] == INT16 ? section(r, "frames", I16, rows * y_size)
+                                          : (const void *)floats(r, "frames", rows * y_size, 1e9f);
+    m->frame_scale = floats(r, "frame_scale", y_size, 1e9f);
+    m->features = floats(r, "features", rows * features, 1e15f);
+    m->feature_columns = indices(r, "feature_columns", features, 0, m->size[X_SIZE] - 1);
+    m->feature_weights = floats(r, "feature_weights", features, 1e9f);
+    m->phases = floats(r, "phases", rows, 1);
+    m->remaining = indices(r, "remaining", rows, 0, MOST_ROWS);
+    m->findable = small(r, "findable", rows, 1);
+    if (r->failed) return;
+    for (uint64_t i = 0; i < rows; i++) {
+        findable |= m->findable[i];
+        /* With this check, a character that plays a run never gets beyond the end of the table. */
+        require(r, m->remaining[i] == 0 || (i + 1 < rows && m->remaining[i + 1] == m->remaining[i] - 1),
+                "remaining");
+    }
+    require(r, findable, "findable");
+}
+
+static int name_count(const model *m) {
+    return m->size[JOINTS] + GAITS + m->size[CHANNELS] + 2 * m->size[COLUMNS];
+}
+
+/* Finds the names of joints, gaits, channels, columns and their parts. names: NULL, or where they are
+   written. */
+static void read_names(reader *r, model *m, const char **names) {
+    int wanted = name_count(m), found = 0;
+    uint64_t count = count_of(r, "names");
+    const char *text = section(r, "names", U8, count), *name = text;
+    static const char *const needed[4] = {"stand", "walk", "jog", "crouch"};
+    int *const gaits[4] = {&m->stand, &m->walk, &m->jog, &m->crouch};
+    if (!text) return;
+    require(r, count > 0 && count < (1u << 28) && text[count - 1] == 0, "names");
+    for (int i = 0; i < 4; i++) *gaits[i] = -1;
+    while (!r->failed && found < wanted && name < text + count) {
+        if (names) names[found] = name;
+        for (int i = 0; i < 4; i++)
+            if (found >= m->size[JOINTS] && found < m->size[JOINTS] + GAITS && !strcmp(name, needed[i]))
+                *gaits[i] = found - m->size[JOINTS];
+        found++;
+        name += strlen(name) + 1;
+    }
+    require(r, found == wanted && name == text + count, "names");
+    for (int i = 0; i < 4; i++) require(r, *gaits[i] >= 0, "names");
+}
+
+/* Reads a character file. Returns whether it can be used; if not, `why` says why. */
+static int read_model(const void *file, size_t bytes, model *m, const char **names, char *why) {
+    static const char *const network[3] = {"plan", "weights", "layers"}, *const gate[3] = {"gate_plan",
+                                                                                           "gate_weights",
+                                                                                           "gate_layers"};
+    reader r = {(const unsigned char *)file, bytes, 0, why, 0};
+    memset(m, 0, sizeof *m);
+    read_header(&r);
+    if (!r.failed) read_sizes(&r, m);
+    if (!r.failed) read_names(&r, m, names);
+    if (!r.failed) read_body(&r, m);
+    if (!r.failed) read_channels(&r, m);
+    if (r.failed) return 0;
+    if (m->size[FORM] == RECORDED) {
+        read_matching(&r, m);
+        return !r.failed;
+    }
+    m->network.layers = m->size[LAYERS];
+    m->network.sets = m->size[SETS];
+    m->network.storage = m->size[STORAGE];
+    read_stack(&r, &m->network, network, m->size[INPUTS] + m->size[EXTRA], m->size[Y_SIZE]);
+    if (m->size[FORM] == GATED) {
+        m->gate.layers = m->size[GATE_LAYERS];
+        m->gate.sets = 1;
+        m->gate.storage = FLOAT32;
+        m->gate_columns = indices(&r, "gate_columns", (uint64_t)m->size[GATE_INPUTS], 0, m->size[INPUTS] - 1);
+        read_stack(&r, &m->gate, gate, m->size[GATE_INPUTS], m->size[SETS]);
+    }
+    return !r.failed;
+}
+
+/* The state of a character between frames; `Character` in character.py explains each of these fields. */
+typedef struct {
+    double (*position)[2], (*direction)[2], (*gait)[GAITS], (*ground)[3];
+    double (*joint_position)[3], (*joint_velocity)[3], (*joint_rotation)[4];
+    double (*pose_position)[3], (*pose_rotation)[4];
+    double *values, *targets, *memory;
+    double root_height, phase, smoothed_velocity[2], smoothed_direction[2], strafe, correction[2];
+    double foot_lock[2], foot_hold[2][2], foot_step[2], foot_missed[2], foot_lift[2], foot_added[2][2][4];
+    double leg_shown[2][3][3], body_lift;
+    double root[3], yaw, report[6]; /* report: what hobble_state returns */
+    int placed;
+} character;
+
+/* What a character shall do in a frame, after all corrections. */
+typedef struct {
+    double velocity[2], facing[2], strafe, gait[GAITS];
+} goal;
+
+struct hobble {
+    model model;
+    int characters, memory_size;
+    const char **names;
+    character *state, *saved_state; /* saved: as before the frame, in case the ground is refused */
+    double *numbers, *saved_numbers;
+    size_t number_count;
+    goal *goals;
+    float *x, *z, *y, *shares, *gate_inputs, *room;
+    int *members;
+    size_t *slots;
+    size_t widest;                         /* numbers that the widest layer needs for each character */
+    double *points, *heights;              /* where the ground is looked up */
+    double *powers, powers_strafe;         /* see blend_future */
+    float *query, *block_low, *block_high; /* motion matching: see nearest_row */
+    double *rows_old;                      /* four unpacked rows */
+};
+
+/* ---- 3. Networks -----------------------------------------------------------------------------------------
+
+   A layer is linear before its activation, so the outputs of the sets of weights are blended, not the
+   weights. Weights are in panels of WIDTH outputs, (sets, panels, inputs, WIDTH): the WIDTH weights of the
+   same input are neighbours. Each output is one running sum over the inputs. A tile is a group of rows and
+   panels whose sums stay in registers. */
+
+enum { DEPTH = 256, AHEAD_IN_MEMORY = 48, TILE_ROWS = 6 };
+
+#if defined(__GNUC__) || defined(__clang__)
+#define ALWAYS_INLINE static inline __attribute__((always_inline))
+typedef float vector __attribute__((vector_size(32), aligned(4), may_alias));
+typedef int32_t whole __attribute__((vector_size(32), aligned(4), may_alias));
+typedef int16_t half __attribute__((vector_size(16), aligned(2), may_alias));
+
+#ifdef __wasm__
+#define FETCH(place) ((void)0)
+#else
+#define FETCH(place) __builtin_prefetch(place, 0, 3)
+#endif
+
+/* Adds the products of `depth` inputs with `panels` panels of weights to `rows` rows of sums. rows, panels
+   and storage are constants where this is called. x_step, w_step: from one row of inputs, or panel of
+   weights, to the next. */
+ALWAYS_INLINE void tile(const int rows, const int panels, const int storage, const void *weights,
+                        size_t w_step, const float *x, size_t x_step, int depth, float *sums,
+                        const size_t *slots) {
+    vector sum[TILE_ROWS][8];
+    for (int r = 0; r < rows; r++)
+        for (int p = 0; p < 2 * panels; p++) sum[r][p] = *(const vector *)(sums + slots[r] + 8 * p);
+    for (int k = 0; k < depth; k++) {
+        for (int p = 0; p < panels; p++) {
+            size_t at = w_step * (size_t)p + WIDTH * (size_t)k;
+            vector low, high;
+            if (storage == INT16) {
+                const int16_t *w = (const int16_t *)weights + at;
+                if (rows == 1) FETCH(w + WIDTH * AHEAD_IN_MEMORY);
+                low = __builtin_convertvector(__builtin_convertvector(*(const half *)w, whole), vector);
+                high =
+                    __builtin_convertvector(__builtin_convertvector(*(const half *)(w + 8), whole), vector);
+            } else {
+                const float *w = (const float *)weights + at;
+                if (rows == 1) FETCH(w + WIDTH * AHEAD_IN_MEMORY);
+                low = *(const vector *)w;
+                high = *(const vector *)(w + 8);
+            }
+            for (int r = 0; r < rows; r++) {
+                float input = x[x_step * (size_t)r + (size_t)k];
+                sum[r][2 * p] += input * low;
+                sum[r][2 * p + 1] += input * high;
+            }
+        }
+    }
+    for (int r = 0; r < rows; r++)
+        for (int p = 0; p < 2 * panels; p++) *(vector *)(sums + slots[r] + 8 * p) = sum[r][p];
+}
+#else /* a compiler without vectors */
+#define ALWAYS_INLINE static
+ALWAYS_INLINE void tile(const int rows, const int panels, const int storage, const void *weights,
+                        size_t w_step, const float *x, size_t x_step, int depth, float *sums,
+                        const size_t *slots) {
+    for (int p = 0; p < panels; p++)
+        for (int k = 0; k < depth; k++) {
+            size_t at = w_step * (size_t)p + WIDTH * (size_t)k;
+            for (int r = 0; r < rows; r++) {
+                float input = x[x_step * (size_t)r + (size_t)k], *sum = sums + slots[r] + WIDTH * p;
+                if (storage == INT16)
+                    for (int i = 0; i < WIDTH; i++)
+                        sum[i] += input * ((const int16_t *)weights)[at + (size_t)i];
+                else
+                    for (int i = 0; i < WIDTH; i++)
+                        sum[i] += input * ((const float *)weights)[at + (size_t)i];
+            }
+        }
+}
+#endif
+
+/* Calls `tile` with constants, so that the compiler keeps the sums in registers. */
+ALWAYS_INLINE void tile_of(const int storage, int rows, int panels, const void *weights, size_t w_step,
+                           const float *x, size_t x_step, int depth, float *sums, const size_t *slots) {
+#define TILE(R, P) tile(R, P, storage, weights, w_step, x, x_step, depth, sums, slots)
+    switch (8 * rows + panels) {
+        case 8 + 4: TILE(1, 4); break;
+        case 8 + 1: TILE(1, 1); break;
+        case 16 + 2: TILE(2, 2); break;
+        case 16 + 1: TILE(2, 1); break;
+        case 24 + 2: TILE(3, 2); break;
+        case 24 + 1: TILE(3, 1); break;
+        case 32 + 1: TILE(4, 1); break;
+        case 40 + 1: TILE(5, 1); break;
+        default: TILE(6, 1); break;
+    }
+#undef TILE
+}
+
+/* Adds W x to the sums of each row x of inputs. slots: index in `sums` where each row's sums begin. */
+ALWAYS_INLINE void multiply(const int storage, const void *weights, int panels, int inputs, const float *x,
+                            int rows, float *sums, const size_t *slots) {
+    int tiles = (rows + TILE_ROWS - 1) / TILE_ROWS, together = rows == 1 ? 4 : rows <= 3 ? 2 : 1;
+    /* Inputs are taken in stretches whose weights in a panel stay in the L1 cache. A single row uses each
+       weight once. */
+    int stretches = rows == 1 ? 1 : (inputs + DEPTH - 1) / DEPTH;
+    size_t bytes = storage == INT16 ? sizeof(int16_t) : sizeof(float);
+    for (int s = 0; s < stretches; s++) {
+        int first = inputs * s / stretches, depth = inputs * (s + 1) / stretches - first;
+        for (int panel = 0, count; panel < panels; panel += count) {
+            count = panel + together <= panels ? together : 1;
+            const char *from =
+                (const char *)weights + bytes * WIDTH * ((size_t)panel * (size_t)inputs + (size_t)first);
+            for (int t = 0; t < tiles; t++) {
+                int row = rows * t / tiles, own = rows * (t + 1) / tiles - row;
+                size_t at[TILE_ROWS];
+                for (int r = 0; r < own; r++) at[r] = slots[row + r] + WIDTH * (size_t)panel;
+                tile_of(storage, own, count, from, WIDTH * (size_t)inputs,
+                        x + (size_t)row * (size_t)inputs + first, (size_t)inputs, depth, sums, at);
+            }
+        }
+    }
+}
+
+static void multiply_floats(const void *weights, int panels, int inputs, const float *x, int rows,
+                            float *sums, const size_t *slots) {
+    multiply(FLOAT32, weights, panels, inputs, x, rows, sums, slots);
+}
+
+static void multiply_integers(const void *weights, int panels, int inputs, const float *x, int rows,
+                              float *sums, const size_t *slots) {
+    multiply(INT16, weights, panels, inputs, x, rows, sums, slots);
+}
+
+/* e^x for x <= 0, with a relative error of 2e-7, in a form that compilers vectorise: see `_exp_below_0` in
+   predict.py. */
+static inline float exp_below_0(float x) {
+    union {
+        uint32_t bits;
+        float value;
+    } power;
+    x = x > -87.0f ? x : -87.0f;
+    int n = (int)(x * 1.44269504f - 0.5f); /* rounds, because x is not above 0 */
+    float r = (x - (float)n * 0.693359375f) + (float)n * 2.12194440e-4f, p = 1.0f + r * (1.0f / 6);
+    p = 1.0f + r * (1.0f / 5) * p;
+    p = 1.0f + r * (1.0f / 4) * p;
+    p = 1.0f + r * (1.0f / 3) * p;
+    p = 1.0f + r * (1.0f / 2) * p;
+    p = 1.0f + r * p;
+    power.bits = (uint32_t)(n + 127) << 23;
+    return p * power.value;
+}
+
+static void elu(float *y, size_t count) {
+    for (size_t i = 0; i < count; i++) {
+        float below = exp_below_0(y[i] < 0 ? y[i] : 0) - 1;
+        y[i] = y[i] > 0 ? y[i] : below;
+    }
+}
+
+/* Writes the last layer's outputs of all characters, in raw units, into out (C, outputs). shares: (C, sets)
+   of each set; a set with the share 0 is not computed. in: (C, inputs) standardised. */
+static void run_stack(const hobble *h, const stack *s, const float *shares, const float *in, float *out) {
+    size_t count = (size_t)h->characters, sets = (size_t)s->sets, all = count * h->widest;
+    /* inputs, outputs: of a layer. own: the inputs of the characters that use a set; sums: their products
+       with it. */
+    float *inputs = h->room, *outputs = inputs + all, *own = outputs + all, *sums = own + all;
+    memcpy(inputs, in, count * (size_t)s->inputs[0] * sizeof *in);
+    for (int layer = 0; layer < s->layers; layer++) {
+        size_t ins = (size_t)s->inputs[layer], outs = (size_t)s->outputs[layer], panels = panels_of(outs),
+               padded = panels * WIDTH;
+        memset(outputs, 0, count * outs * sizeof *outputs);
+        for (size_t k = 0; k < sets; k++) {
+            int rows = 0;
+            for (size_t c = 0; c < count; c++)
+                if (shares[c * sets + k] != 0) {
+                    h->members[rows] = (int)c;
+                    h->slots[rows] = padded * (size_t)rows;
+                    rows++;
+                }
+            if (rows == 0) continue;
+            for (int i = 0; i < rows && rows < (int)count; i++)
+                memcpy(own + (size_t)i * ins, inputs + (size_t)h->members[i] * ins, ins * sizeof *own);
+            memset(sums, 0, (size_t)rows * padded * sizeof *sums);
+            uint64_t start = s->weights_at[layer] + k * padded * ins;
+            const float *x = rows == (int)count ? inputs : own;
+            if (s->storage == INT16)
+                multiply_integers((const int16_t *)s->weights + start, (int)panels, (int)ins, x, rows, sums,
+                                  h->slots);
+            else
+                multiply_floats((const float *)s->weights + start, (int)panels, (int)ins, x, rows, sums,
+                                h->slots);
+            const float *factors = s->factors[layer] + k * outs, *biases = s->biases[layer] + k * outs;
+            for (int i = 0; i < rows; i++) {
+                float share = shares[(size_t)h->members[i] * sets + k],
+                      *to = outputs + (size_t)h->members[i] * outs;
+                const float *sum = sums + (size_t)i * padded;
+                for (size_t o = 0; o < outs; o++) to[o] += share * (sum[o] * factors[o] + biases[o]);
+            }
+        }
+        if (layer < s->layers - 1) elu(outputs, count * outs);
+        float *swapped = inputs;
+        inputs = outputs;
+        outputs = swapped;
+    }
+    size_t outs = (size_t)s->outputs[s->layers - 1];
+    for (size_t c = 0; c < count; c++)
+        for (size_t o = 0; o < outs; o++) out[c * outs + o] = inputs[c * outs + o] * s->std[o] + s->mean[o];
+}
+
+/* Writes the shares (points) of the points around a phase; see `write_phase_shares` in predict.py. */
+static void phase_shares(int blended, int points, double phase, float *shares) {
+    double wrapped = phase == 1 ? phase : phase - floor(phase);
+    double scaled = blended == 1 ? (double)((float)wrapped * (float)points) : wrapped * points;
+    int first = (int)scaled < points - 1 ? (int)scaled : points - 1;
+    double t = scaled - first;
+    for (int k = 0; k < points; k++) shares[k] = 0;
+    if (blended == 1) {
+        shares[first] = 1;
+    } else if (blended == 2) {
+        shares[first] = (float)(1 - t);
+        shares[(first + 1) % points] = (float)t;
+    } else { /* the cubic spline of Catmull and Rom */
+        shares[(first - 1 + points) % points] = (float)(((2 - t) * t - 1) * t / 2);
+        shares[first] = (float)(((3 * t - 5) * t * t + 2) / 2);
+        shares[(first + 1) % points] = (float)(((4 - 3 * t) * t + 1) * t / 2);
+        shares[(first + 2) % points] = (float)((t - 1) * t * t / 2);
+    }
+}
+
+/* Turns logits (count) into shares in place, by a softmax; a negligible share becomes 0. */
+static void softmax(float *logits, int count) {
+    float most = logits[0], total = 0;
+    for (int k = 1; k < count; k++) most = logits[k] > most ? logits[k] : most;
+    for (int k = 0; k < count; k++) total += logits[k] = exp_below_0(logits[k] - most);
+    for (int k = 0; k < count; k++) {
+        float share = logits[k] / total;
+        logits[k] = share > NEGLIGIBLE_SHARE ? share : 0;
+    }
+}
+
+/* Standardises the columns of X that the network reads, and writes Y of all characters. */
+static void predict_blend(hobble *h) {
+    const model *m = &h->model;
+    size_t inputs = (size_t)m->size[INPUTS], extra = (size_t)m->size[EXTRA], sets = (size_t)m->size[SETS];
+    for (int c = 0; c < h->characters; c++) {
+        const float *x = h->x + (size_t)c * (size_t)m->size[X_SIZE];
+        float *z = h->z + (size_t)c * (inputs + extra);
+        for (size_t i = 0; i < inputs; i++) z[i] = (x[m->inputs[i]] - m->x_mean[i]) * m->x_inverse[i];
+        if (extra) {
+            z[inputs] = (float)sin(2 * PI * h->state[c].phase);
+            z[inputs + 1] = (float)cos(2 * PI * h->state[c].phase);
+        }
+        if (m->size[FORM] == FIXED) {
+            h->shares[c] = 1;
+        } else if (m->size[FORM] == PHASED) {
+            phase_shares(m->size[BLENDED], m->size[SETS], h->state[c].phase, h->shares + (size_t)c * sets);
+        } else {
+            float *gate = h->gate_inputs + (size_t)c * (size_t)m->size[GATE_INPUTS];
+            for (int i = 0; i < m->size[GATE_INPUTS]; i++) gate[i] = z[m->gate_columns[i]];
+            h->shares[c] = 1; /* of the gate's only set */
+        }
+    }
+    if (m->size[FORM] == GATED) {
+        /* The gate's own shares are overwritten by its outputs only at the end, so one array serves both. */
+        run_stack(h, &m->gate, h->shares, h->gate_inputs, h->shares);
+        for (int c = 0; c < h->characters; c++) softmax(h->shares + (size_t)c * sets, m->size[SETS]);
+    }
+    run_stack(h, &m->network, h->shares, h->z, h->y);
+}
+
+/* ---- 4. Motion matching ----------------------------------------------------------------------------------
+
+   Plays recorded frames; a search every few frames chooses where to go on. At a transition, the differences
+   in pose and velocity become offsets, which decay like a critically damped spring.
+   models/matching/network.py explains it. */
+
+/* Unpacks a recorded frame into y. */
+static void read_frame(const model *m, int64_t row, double *y) {
+    size_t width = (size_t)m->size[Y_SIZE], at = (size_t)row * width;
+    for (size_t i = 0; i < width; i++)
+        y[i] = m->size[STORAGE] == INT16 ? (float)((const int16_t *)m->frames)[at + i] * m->frame_scale[i]
+                                         : ((const float *)m->frames)[at + i] * m->frame_scale[i];
+}
+
+/* The squared distance of a frame's features from the query. Stops adding above `most`. */
+static double feature_distance(const model *m, const float *query, int64_t row, double most) {
+    const float *features = m->features + (size_t)row * (size_t)m->size[FEATURES];
+    double sum = 0;
+    for (int i = 0; i < m->size[FEATURES] && sum <= most; i++) {
+        double difference = (double)query[i] - features[i];
+        sum += difference * difference;
+    }
+    return sum;
+}
+
+/* Finds the smallest and largest features in each block of BLOCK frames, for nearest_row. */
+static void measure_blocks(hobble *h) {
+    const model *m = &h->model;
+    size_t n = (size_t)m->size[FEATURES], rows = (size_t)m->size[ROWS];
+    for (size_t row = 0; row < rows; row++) {
+        float *low = h->block_low + row / BLOCK * n, *high = h->block_high + row / BLOCK * n;
+        const float *features = m->features + row * n;
+        for (size_t i = 0; i < n; i++) {
+            if (row % BLOCK == 0 || features[i] < low[i]) low[i] = features[i];
+            if (row % BLOCK == 0 || features[i] > high[i]) high[i] = features[i];
+        }
+    }
+}
+
+/* The findable frame nearest to the query, or -1 if none is nearer than `most`, a squared distance. A block
+   of frames is skipped if even the box around its features is too far away. */
+static int64_t nearest_row(const hobble *h, double most) {
+    const model *m = &h->model;
+    int n = m->size[FEATURES], rows = m->size[ROWS];
+    int64_t best = -1;
+    for (int from = 0; from < rows; from += BLOCK) {
+        const float *low = h->block_low + (size_t)(from / BLOCK) * (size_t)n,
+                    *high = h->block_high + (size_t)(from / BLOCK) * (size_t)n;
+        double sum = 0;
+        for (int i = 0; i < n && sum <= most; i++) {
+            double outside = clamp(h->query[i], low[i], high[i]) - (double)h->query[i];
+            sum += outside * outside;
+        }
+        if (sum > most) continue;
+        for (int row = from; row < rows && row < from + BLOCK; row++) {
+            if (!m->findable[row]) continue;
+            double distance = feature_distance(m, h->query, row, most);
+            if (distance < most) {
+                most = distance;
+                best = row;
+            }
+        }
+    }
+    return best;
+}
+
+/* The frame to show for the input row x. following: the next frame of the run, or -1 if it ends. */
+static int64_t search_row(hobble *h, const float *x, int64_t following) {
+    const model *m = &h->model;
+    for (int i = 0; i < m->size[FEATURES]; i++)
+        h->query[i] = x[m->feature_columns[i]] * m->feature_weights[i];
+    int64_t found =
+        nearest_row(h, following < 0 ? INFINITY : feature_distance(m, h->query, following, INFINITY));
+    if (following >= 0
+        && (found < 0 || (found - following <= SURROUNDING && following - found <= SURROUNDING)))
+        return following;
+    for (int64_t row = 0; found < 0; row++) /* features that overflow: no distance was finite */
+        if (m->findable[row]) found = row;
+    return found;
+}
+
+/* The quaternion q of the rotation vector v (3), an axis times half the angle. */
+static void quaternion_of(const double *v, double *q) {
+    double half_angle = length3(v[0], v[1], v[2]),
+           scale = half_angle > 1e-8 ? sin(half_angle) / half_angle : 1;
+    q[0] = cos(half_angle);
+    for (int i = 0; i < 3; i++) q[i + 1] = v[i] * scale;
+}
+
+/* The rotation vector v of the product a b, the shorter way round. */
+static void vector_of_product(const double *a, const double *b, double *v) {
+    double w = a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3],
+           x = a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2];
+    double y = a[0] * b[2] - a[1] * b[3] + a[2] * b[0] + a[3] * b[1],
+           z = a[0] * b[3] + a[1] * b[2] - a[2] * b[1] + a[3] * b[0];
+    double sign = w < 0 ? -1 : 1, length = length3(x, y, z),
+           scale = sign * (length > 1e-8 ? atan2(length, sign * w) / length : 1);
+    v[0] = x * scale;
+    v[1] = y * scale;
+    v[2] = z * scale;
+}
+
+/* The rotation vector v that leads from the rotation vector `earlier` to `now`. */
+static void vector_between(const double *earlier, const double *now, double *v) {
+    double q[4], p[4];
+    quaternion_of(now, q);
+    quaternion_of(earlier, p);
+    for (int i = 1; i < 4; i++) p[i] = -p[i];
+    vector_of_product(q, p, v);
+}
+
+/* Adds to the offsets the difference between two poses: the one that would have come next, minus that of
+   `row`. If the run has ended, the last pose shown takes the place of the next one. */
+static void start_transition(hobble *h, double *offsets, int64_t before, int64_t following, int64_t row) {
+    const model *m = &h->model;
+    int joints = m->size[JOINTS];
+    size_t width = (size_t)m->size[Y_SIZE];
+    double *old = h->rows_old, *now = old + width, *before_old = now + width,
+           *before_now = before_old + width;
+    read_frame(m, following >= 0 ? following : before, old);
+    read_frame(m, row, now);
+    read_frame(m, before, before_old);
+    read_frame(m, row > 0 ? row - 1 : 0, before_now);
+    for (int j = 0; j < joints; j++) {
+        double *offset = offsets + OFFSETS_PER_JOINT * j, turn[3], q[4], p[4];
+        int position = m->y_joints + 3 * j, velocity = position + 3 * joints,
+            rotation = velocity + 3 * joints;
+        for (int i = 0; i < 3; i++) {
+            offset[i] += old[position + i] - now[position + i];
+            offset[3 + i] += old[velocity + i] - now[velocity + i];
+        }
+        vector_between(now + rotation, old + rotation, turn);
+        quaternion_of(offset + 6, p);
+        quaternion_of(turn, q);
+        vector_of_product(p, q, offset + 6);
+        if (following < 0) continue;
+        vector_between(before_old + rotation, old + rotation, turn);
+        for (int i = 0; i < 3; i++) offset[9 + i] += turn[i];
+        vector_between(before_now + rotation, now + rotation, turn);
+        for (int i = 0; i < 3; i++) offset[9 + i] -= turn[i];
+    }
+}
+
+/* Advances the offsets by a frame and adds them to the pose in y (Y). */
+static void add_offsets(const model *m, double *offsets, float *y) {
+    double damping = 2 * log(2.0) / m->number[HALFLIFE], fade = exp(-damping);
+    int joints = m->size[JOINTS];
+    for (int k = 0; k < OFFSETS_PER_JOINT * joints; k += 6) /* three offsets, then their three speeds */
+        for (int i = k; i < k + 3; i++) {
+            double j = offsets[i + 3] + offsets[i] * damping;
+            offsets[i] = fade * (offsets[i] + j);
+            offsets[i + 3] = fade * (offsets[i + 3] - j * damping);
+        }
+    for (int j = 0; j < joints; j++) {
+        const double *offset = offsets + OFFSETS_PER_JOINT * j;
+        float *position = y + m->y_joints + 3 * j, *velocity = position + 3 * joints,
+              *rotation = velocity + 3 * joints;
+        double q[4], p[4], turn[3] = {rotation[0], rotation[1], rotation[2]};
+        quaternion_of(offset + 6, q);
+        quaternion_of(turn, p);
+        vector_of_product(q, p, turn);
+        for (int i = 0; i < 3; i++) {
+            position[i] += (float)offset[i];
+            velocity[i] += (float)offset[3 + i];
+            rotation[i] = (float)turn[i];
+        }
+    }
+}
+
+/* Writes Y of all characters, and updates their memories. */
+static void predict_matching(hobble *h) {
+    const model *m = &h->model;
+    for (int c = 0; c < h->characters; c++) {
+        const float *x = h->x + (size_t)c * (size_t)m->size[X_SIZE];
+        float *y = h->y + (size_t)c * (size_t)m->size[Y_SIZE];
+        double *memory = h->state[c].memory, *unpacked = h->rows_old;
+        int valid = memory[ROW] >= 1 && memory[ROW] <= m->size[ROWS];
+        int64_t before = valid ? (int64_t)memory[ROW] - 1 : -1;
+        int64_t following = valid && m->remaining[before] > 0 ? before + 1 : -1;
+        int due = following < 0 || !(memory[SINCE] + 1 < m->size[EVERY]);
+        int64_t row = due ? search_row(h, x, following) : following;
+        if (before < 0) memset(memory, 0, (size_t)h->memory_size * sizeof *memory);
+        else if (row != following) start_transition(h, memory + OFFSETS, before, following, row);
+        read_frame(m, row, unpacked);
+        for (int i = 0; i < m->size[Y_SIZE]; i++) y[i] = (float)unpacked[i];
+        if (before >= 0) {
+            double lag = m->phases[row] - h->state[c].phase;
+            add_offsets(m, memory + OFFSETS, y);
+            lag -= floor(lag + 0.5); /* at most half a cycle, forwards or backwards */
+            y[3] += (float)clamp(lag, -FASTEST_PULL, FASTEST_PULL);
+        }
+        memory[ROW] = (double)(row + 1);
+        memory[SINCE] = due ? 0 : memory[SINCE] + 1;
+    }
+}
+
+/* ---- 5. The trajectory and the caller's target -----------------------------------------------------------
+
+   A trajectory has an entry for each frame; the first half is past, and entry `middle` is the present. */
+
+static double yaw_of(const double *direction) { return atan2(direction[0], direction[1]); }
+
+/* The highest speeds (GAITS) that the values of one channel allow, cm a frame; INFINITY if all are 0. */
+static void channel_speeds(const channel *one, const double *values, double *highest) {
+    for (int g = 0; g < GAITS; g++) {
+        const double *speeds = one->speeds + g * one->columns * one->levels;
+        double healthy = 0, lost = 0, lowest = INFINITY;
+        int above = 0;
+        for (int l = 0; l < one->columns; l++) healthy = larger(healthy, speeds[l * one->levels]);
+        for (int l = 0; l < one->columns; l++) {
+            double value = values[one->first + l];
+            if (!(value > 0)) continue;
+            int below = 0;
+            while (below < one->levels - 2 && one->level[below + 1] <= value) below++;
+            const double *speed = speeds + l * one->levels + below;
+            double weight = (value - one->level[below]) / (one->level[below + 1] - one->level[below]);
+            double limit = speed[0] + weight * (speed[1] - speed[0]);
+            lowest = smaller(lowest, limit);
+            lost += pow(1 - smaller(limit / healthy, 1), SUM_NORM);
+            above++;
+        }
+        highest[g] = above > 1 ? smaller(lowest, healthy * larger(1 - pow(lost, 1 / SUM_NORM), SLOWEST_SHARE))
+                               : lowest;
+    }
+}
+
+/* Limits the target's speed, and its gait, to what a body with these channel values can reach: see bounds.py.
+ */
+static void limit_target(const model *m, const double *values, goal *target) {
+    double allowed[GAITS], share[GAITS], of_channel[GAITS];
+    const channel *first = NULL;
+    for (int g = 0; g < GAITS; g++) allowed[g] = INFINITY, share[g] = 1;
+    for (int i = 0; i < m->size[CHANNELS]; i++) {
+        const channel *one = &m->channels[i];
+        if (!one->levels) continue;
+        if (!first) first = one;
+        channel_speeds(one, values, of_channel);
+        for (int g = 0; g < GAITS; g++) {
+            allowed[g] = smaller(allowed[g], of_channel[g]);
+            if (first->usual[g] > 0) share[g] *= smaller(1, of_channel[g] / first->usual[g]);
+        }
+    }
+    if (!first) return;
+    double total = 0, weighted = 0, hurry = 1;
+    for (int g = 0; g < GAITS; g++)
+        if (allowed[g] < first->usual[g]) allowed[g] = first->usual[g] * share[g];
+    if (allowed[m->jog] < LAME_BELOW) {
+        hurry += (HURRY_FACTOR - 1) * target->gait[m->jog];
+        target->gait[m->walk] += target->gait[m->jog];
+        target->gait[m->jog] = 0;
+    }
+    for (int g = 0; g < GAITS; g++)
+        if (g != m->stand && target->gait[g] > 0) {
+            total += target->gait[g];
+            weighted += target->gait[g] * allowed[g];
+        }
+    double highest = total > 0 ? hurry * weighted / larger(total, 1e-9) : INFINITY;
+    double held = smaller(1, highest / larger(length2(target->velocity[0], target->velocity[1]), 1e-9));
+    target->velocity[0] *= held;
+    target->velocity[1] *= held;
+}
+
+/* Whether a standing character that faces `heading` has to step on the spot to face `direction`. */
+static int steps_around(const double *heading, const double *direction) {
+    double across = direction[0] * heading[1] - direction[1] * heading[0],
+           along = direction[0] * heading[0] + direction[1] * heading[1];
+    return fabs(atan2(across, along)) > TURN_IN_PLACE;
+}
+
+/* Converts the caller's target into velocity, facing, strafe share and gait shares. Returns HOBBLE_OK or an
+   error. */
+static int read_target(const model *m, const character *c, const hobble_target *given, goal *target) {
+    double x = given->velocity[0], z = given->velocity[1], speed = length2(x, z), fx = given->facing[0],
+           fz = given->facing[1];
+    int gait = given->gait, moves = speed >= STILL;
+    if (!(speed <= FASTEST_TARGET) || !(fabs(fx) < INFINITY) || !(fabs(fz) < INFINITY))
+        return HOBBLE_BAD_TARGET;
+    if (gait < HOBBLE_SHARES || gait >= GAITS) return HOBBLE_BAD_TARGET;
+    target->velocity[0] = x;
+    target->velocity[1] = z;
+    if (fx == 0 && fz == 0) {
+        target->strafe = 0;
+        target->facing[0] = moves ? x : c->smoothed_direction[0];
+        target->facing[1] = moves ? z : c->smoothed_direction[1];
+    } else {
+        double aside = fabs(wrap(atan2(x, z) - atan2(fx, fz)));
+        target->strafe = moves ? smaller(1, aside / STRAFE_FROM) : 1;
+        target->facing[0] = fx;
+        target->facing[1] = fz;
+    }
+    for (int g = 0; g < GAITS; g++) {
+        target->gait[g] = gait == HOBBLE_SHARES ? given->shares[g] : 0;
+        if (!(target->gait[g] >= 0 && target->gait[g] <= 1)) return HOBBLE_BAD_TARGET;
+    }
+    if (gait == HOBBLE_SHARES) return HOBBLE_OK;
+    if (gait == HOBBLE_BY_SPEED) gait = speed >= JOG_FROM ? m->jog : m->walk;
+    if (!moves) {
+        int steps = steps_around(c->direction[m->length / 2], target->facing);
+        target->gait[steps ? m->walk : m->stand] = 1;
+        if (gait != m->crouch) return HOBBLE_OK;
+    }
+    target->gait[gait] = 1;
+    return HOBBLE_OK;
+}
+
+/* The velocity (x, z) to ask the network for, so that the character reaches the target (x, z): see
+   `_ask_velocity` in trajectory.py. A share of the present error is added, and a steady error is integrated
+   in `correction`. */
+static void ask_velocity(double steering, const double (*position)[2], int middle, double *correction,
+                         double *asked) {
+    int span = middle / 2;
+    double x = asked[0], z = asked[1], speed = length2(x, z);
+    double lack_x = x - (position[middle][0] - position[middle - span][0]) / span;
+    double lack_z = z - (position[middle][1] - position[middle - span][1]) / span;
+    double more_x = steering * lack_x, more_z = steering * lack_z;
+    if (speed < STILL) {
+        correction[0] = correction[1] = 0;
+    } else {
+        more_x += correction[0] * x + correction[1] * z;
+        more_z += correction[0] * z - correction[1] * x;
+        /* Do not integrate while the character turns or starts: that error goes away by itself. */
+        if (lack_x * lack_x + lack_z * lack_z < CORRECTION_WITHIN * speed * (CORRECTION_WITHIN * speed)) {
+            double rate = steering * CORRECTION_RATE / (speed * speed);
+            correction[0] =
+                clamp(correction[0] + rate * (lack_x * x + lack_z * z), -MOST_CORRECTION, MOST_CORRECTION);
+            correction[1] =
+                clamp(correction[1] + rate * (lack_x * z - lack_z * x), -MOST_CORRECTION, MOST_CORRECTION);
+        }
+    }
+    double limit = smaller(1, STEERING_LIMIT * speed / larger(length2(more_x, more_z), 1e-6));
+    asked[0] = x + more_x * limit;
+    asked[1] = z + more_z * limit;
+}
+
+/* Moves the smoothed target toward the caller's, and the present gait toward the target gait. */
+static void follow_target(const model *m, character *c, const goal *target) {
+    int middle = m->length / 2;
+    double steering = m->number[STEERING], asked[2] = {target->velocity[0], target->velocity[1]},
+           goal_yaw = yaw_of(target->facing);
+    if (steering > 0) {
+        if (length2(asked[0], asked[1]) >= STILL) {
+            double turn = wrap(goal_yaw - yaw_of(c->direction[middle])),
+                   room = larger(FURTHEST_TURN - fabs(turn), 0);
+            goal_yaw += clamp(0.5 * steering * turn, -room, room);
+        }
+        ask_velocity(steering, (const double (*)[2])c->position, middle, c->correction, asked);
+    }
+    for (int i = 0; i < 2; i++) c->smoothed_velocity[i] += TARGET_MIX * (asked[i] - c->smoothed_velocity[i]);
+    double yaw = yaw_of(c->smoothed_direction);
+    yaw += TARGET_MIX * wrap(goal_yaw - yaw);
+    c->smoothed_direction[0] = sin(yaw);
+    c->smoothed_direction[1] = cos(yaw);
+    c->strafe += TARGET_MIX * (target->strafe - c->strafe);
+    for (int g = 0; g < GAITS; g++) c->gait[middle][g] += GAIT_MIX * (target->gait[g] - c->gait[middle][g]);
+}
+
+/* Bends the predicted future toward the smoothed target, more at later times: see trajectory.py. */
+static void blend_future(hobble *h, character *c) {
+    int length = h->model.length, middle = length / 2;
+    double *shares = h->powers, *facing_shares = shares + length, goal_yaw = yaw_of(c->smoothed_direction);
+    if (c->strafe
+        != h->powers_strafe) { /* powers take long, and most characters have the same share of strafing */
+        h->powers_strafe = c->strafe;
+        for (int i = middle + 1; i < length; i++) {
+            double remaining = 1 - (double)(i - middle) / middle;
+            shares[i] = 1 - pow(remaining, 0.5 + 0.5 * c->strafe);
+            facing_shares[i] = 1 - pow(remaining, 2 - 1.5 * c->strafe);
+        }
+    }
+    double old[2] = {c->position[middle][0], c->position[middle][1]};
+    for (int i = middle + 1; i < length; i++) {
+        for (int k = 0; k < 2; k++) {
+            double step = c->position[i][k] - old[k];
+            old[k] = c->position[i][k];
+            c->position[i][k] = c->position[i - 1][k] + step + shares[i] * (c->smoothed_velocity[k] - step);
+        }
+        double yaw = yaw_of(c->direction[i]);
+        yaw += facing_shares[i] * wrap(goal_yaw - yaw);
+        c->direction[i][0] = sin(yaw);
+        c->direction[i][1] = cos(yaw);
+        memcpy(c->gait[i], c->gait[middle], sizeof c->gait[i]);
+    }
+}
+
+/* Writes the points (samples, 3, 2) where the ground is looked up: left of the path, on it, right of it. */
+static void sample_points(const model *m, const character *c, double *points) {
+    double side = m->number[SIDE];
+    for (int s = 0; s < m->samples; s++, points += 6) {
+        const double *at = c->position[s * m->size[STEP]], *facing = c->direction[s * m->size[STEP]];
+        for (int k = 0; k < 3; k++) {
+            points[2 * k] = at[0] + (1 - k) * side * facing[1];
+            points[2 * k + 1] = at[1] - (1 - k) * side * facing[0];
+        }
+    }
+}
+
+/* ---- 6. Rows of the network ------------------------------------------------------------------------------
+ */
+
+/* Writes the state into the input row x: trajectory, gait, ground, the last pose, and the channel values. */
+static void write_inputs(const model *m, const character *c, float *x) {
+    int middle = m->length / 2, samples = m->samples;
+    const int32_t *first = m->x_first;
+    const double *origin = c->position[middle]; /* the trajectory is relative to the present root */
+    double cosine = c->direction[middle][1], sine = c->direction[middle][0];
+    for (int s = 0; s < samples; s++) {
+        int i = s * m->size[STEP];
+        double dx = c->position[i][0] - origin[0], dz = c->position[i][1] - origin[1];
+        x[first[X_POSITION] + s] = (float)(dx * cosine - dz * sine);
+        x[first[X_POSITION] + samples + s] = (float)(dx * sine + dz * cosine);
+        dx = c->direction[i][0];
+        dz = c->direction[i][1];
+        x[first[X_DIRECTION] + s] = (float)(dx * cosine - dz * sine);
+        x[first[X_DIRECTION] + samples + s] = (float)(dx * sine + dz * cosine);
+        for (int g = 0; g < GAITS; g++) x[first[X_GAIT] + g * samples + s] = (float)c->gait[i][g];
+        for (int side = 0; side < 3; side++)
+            x[first[X_TERRAIN] + side * samples + s] = (float)(c->ground[s][side] - c->root_height);
+    }
+    origin =
+        c->position[middle - 1]; /* the pose is still that of the frame before, and relative to its root */
+    cosine = c->direction[middle - 1][1];
+    sine = c->direction[middle - 1][0];
+    for (int j = 0; j < m->size[JOINTS]; j++) {
+        float *position = x + first[X_JOINTS] + 3 * j, *velocity = x + first[X_VELOCITIES] + 3 * j;
+        double dx = c->joint_position[j][0] - origin[0], dz = c->joint_position[j][2] - origin[1];
+        position[0] = (float)(dx * cosine - dz * sine);
+        position[1] = (float)(c->joint_position[j][1] - c->root_height);
+        position[2] = (float)(dx * sine + dz * cosine);
+        dx = c->joint_velocity[j][0];
+        dz = c->joint_velocity[j][2];
+        velocity[0] = (float)(dx * cosine - dz * sine);
+        velocity[1] = (float)c->joint_velocity[j][1];
+        velocity[2] = (float)(dx * sine + dz * cosine);
+    }
+    for (int k = 0; k < m->size[COLUMNS]; k++) x[m->x_channels[k]] = (float)c->values[k];
+}
+
+/* Limits a row to the range of the training data. An unsound number becomes the middle of its range. */
+static void limit_row(float *row, const float *low, const float *high, int count) {
+    for (int k = 0; k < count; k++) {
+        float value = fabsf(row[k]) < (float)LARGEST_SOUND ? row[k] : 0.5f * (low[k] + high[k]);
+        value = value > low[k] ? value : low[k];
+        row[k] = value < high[k] ? value : high[k];
+    }
+}
+
+/* Moves a joint toward the predicted position `to`, by at most `fastest` cm. The mean of the predicted
+   position and the old position plus the predicted velocity is taken. climbed: change of the ground's height,
+   which does not count. */
+static void move_joint(double *place, const double *velocity, const double *to, double climbed,
+                       double fastest) {
+    double step[3];
+    for (int i = 0; i < 3; i++) step[i] = CARRIED_SHARE * (place[i] + velocity[i] + to[i]) - place[i];
+    double moved = length3(step[0], step[1] - climbed, step[2]);
+    if (moved > fastest) {
+        step[0] *= fastest / moved;
+        step[1] = climbed + (step[1] - climbed) * fastest / moved;
+        step[2] *= fastest / moved;
+    }
+    for (int i = 0; i < 3; i++) place[i] += step[i];
+}
+
+/* Turns a joint's world rotation to the predicted one, by at most FASTEST_TURN. v: the predicted axis times
+   half the angle, relative to the root. half_cos, half_sin: of half the root's yaw. */
+static void turn_joint(double *rotation, const float *v, double half_cos, double half_sin) {
+    double half = length3(v[0], v[1], v[2]), scale = half > 1e-8 ? sin(half) / half : 1;
+    double w = cos(half), x = v[0] * scale, y = v[1] * scale, z = v[2] * scale;
+    double to[4] = {half_cos * w - half_sin * y, half_cos * x + half_sin * z, half_cos * y + half_sin * w,
+                    half_cos * z - half_sin * x};
+    double dot = rotation[0] * to[0] + rotation[1] * to[1] + rotation[2] * to[2] + rotation[3] * to[3],
+           keep = 0, take = 1;
+    if (fabs(dot) < cos(FASTEST_TURN / 2)) { /* along the shorter way (slerp) */
+        half = acos(fabs(dot));
+        keep = sin(half - FASTEST_TURN / 2) / sin(half);
+        take = sin(FASTEST_TURN / 2) / sin(half) * (dot >= 0 ? 1 : -1);
+    }
+    for (int i = 0; i < 4; i++) rotation[i] = keep * rotation[i] + take * to[i];
+}
+
+/* Turns the prediction y into the pose before foot placement, and into the pose to draw. */
+static void write_pose(const model *m, character *c, const float *y) {
+    int middle = m->length / 2, joints = m->size[JOINTS];
+    double sine = c->direction[middle][0], cosine = c->direction[middle][1],
+           climbed = c->root_height - c->root[1];
+    c->body_lift += clamp(climbed, -MOST_CLIMB, MOST_CLIMB) - climbed;
+    c->root[0] = c->position[middle][0];
+    c->root[1] = c->root_height;
+    c->root[2] = c->position[middle][1];
+    c->yaw = atan2(sine, cosine);
+    double half_cos = cos(c->yaw / 2), half_sin = sin(c->yaw / 2);
+    for (int j = 0; j < joints; j++) {
+        const float *p = y + m->y_joints + 3 * j, *v = p + 3 * joints, *r = v + 3 * joints;
+        double *velocity = c->joint_velocity[j];
+        velocity[0] = v[0] * cosine + v[2] * sine;
+        velocity[1] = v[1];
+        velocity[2] = v[2] * cosine - v[0] * sine;
+        double to[3] = {p[0] * cosine + p[2] * sine + c->root[0], p[1] + c->root[1],
+                        p[2] * cosine - p[0] * sine + c->root[2]};
+        move_joint(c->joint_position[j], velocity, to, climbed, m->number[FASTEST]);
+        turn_joint(c->joint_rotation[j], r, half_cos, half_sin);
+    }
+    memcpy(c->pose_position, c->joint_position, (size_t)joints * sizeof *c->pose_position);
+    memcpy(c->pose_rotation, c->joint_rotation, (size_t)joints * sizeof *c->pose_rotation);
+}
+
+/* The root's movement after a share of its part against the target is removed: see controller.py. */
+static void remove_backward(double loss, const double *target, double *move) {
+    double squared = target[0] * target[0] + target[1] * target[1];
+    if (squared < STILL * STILL) {
+        move[0] *= 1 - loss;
+        move[1] *= 1 - loss;
+        return;
+    }
+    double against = loss * smaller(0, move[0] * target[0] + move[1] * target[1]) / squared;
+    move[0] -= against * target[0];
+    move[1] -= against * target[1];
+}
+
+/* The root's movement brought nearer to the target's, by a limited share of its length: see controller.py. */
+static void pull_to_target(double share, const double *target, double *move) {
+    double most = share * length2(move[0], move[1]), size = length2(target[0], target[1]);
+    double ahead[2] = {size >= STILL ? target[0] / size : 0, size >= STILL ? target[1] / size : 0};
+    double lack[2] = {target[0] - move[0], target[1] - move[1]},
+           along = lack[0] * ahead[0] + lack[1] * ahead[1];
+    for (int k = 0; k < 2; k++) lack[k] -= along * ahead[k]; /* what is left is across the target */
+    along = clamp(along, -PULL_AHEAD * most, PULL_AHEAD * most);
+    double across = smaller(1, most / larger(length2(lack[0], lack[1]), 1e-9));
+    for (int k = 0; k < 2; k++) move[k] += along * ahead[k] + across * lack[k];
+}
+
+/* Advances trajectory and phase by a frame, as the prediction y says. */
+static void advance(const model *m, character *c, const float *y, const double *target) {
+    int middle = m->length / 2, future = m->future, recorded = m->size[FORM] == RECORDED,
+        steered = m->number[STEERING] > 0;
+    memmove(c->position, c->position + 1, (size_t)middle * sizeof *c->position);
+    memmove(c->direction, c->direction + 1, (size_t)middle * sizeof *c->direction);
+    memmove(c->gait, c->gait + 1, (size_t)middle * sizeof *c->gait);
+    double moving = recorded ? 1 : pow(larger(0, 1 - c->gait[middle][0]), 0.25),
+           yaw = yaw_of(c->direction[middle]);
+    double sine = sin(yaw), cosine = cos(yaw);
+    double move[2] = {moving * (y[0] * cosine + y[1] * sine), moving * (y[1] * cosine - y[0] * sine)};
+    remove_backward(steered && !recorded ? BACKWARD_LOSS : 0, target, move);
+    pull_to_target(steered && recorded ? PULL : 0, target, move);
+    double *root = c->position[middle];
+    root[0] += move[0];
+    root[1] += move[1];
+    yaw -= moving * y[2]; /* the network predicts the turn of the world seen from the root */
+    sine = c->direction[middle][0] = sin(yaw);
+    cosine = c->direction[middle][1] = cos(yaw);
+    for (int i = middle + 1; i < m->length; i++) {
+        double place = (double)(i - middle) / m->size[STEP];
+        int k = (int)place < future - 2 ? (int)place : future - 2; /* beyond the last sample, extrapolate */
+        double t = place - k;
+        const float *p = y + m->y_position + k, *d = y + m->y_direction + k;
+        double x = (1 - t) * p[0] + t * p[1], z = (1 - t) * p[future] + t * p[future + 1];
+        c->position[i][0] = root[0] + x * cosine + z * sine;
+        c->position[i][1] = root[1] + z * cosine - x * sine;
+        x = (1 - t) * d[0] + t * d[1];
+        z = (1 - t) * d[future] + t * d[future + 1];
+        double norm = larger(length2(x, z), 1e-6);
+        c->direction[i][0] = (x * cosine + z * sine) / norm;
+        c->direction[i][1] = (z * cosine - x * sine) / norm;
+    }
+    c->phase += ((1 - STANDING_SHARE) * moving + STANDING_SHARE) * y[3];
+    c->phase -= floor(c->phase);
+}
+
+/* ---- 7. Feet ---------------------------------------------------------------------------------------------
+
+   Holds a foot in contact where it landed, and bends the leg so that the foot gets there; feet.py and
+   leg_reach.py explain the rules. "The network's foot" is the foot where the network predicts it. */
+
+typedef struct { /* a leg in the last frame, as it was drawn; heights are above `base`, the height of the body
+                  */
+    double (*shown)[3];
+    double base, fastest;
+} last_frame;
+
+/* The smallest rotation q from direction a to b; the identity if they are opposite. */
+static void rotation_between(const double *a, const double *b, double *q) {
+    double w = sqrt((a[0] * a[0] + a[1] * a[1] + a[2] * a[2]) * (b[0] * b[0] + b[1] * b[1] + b[2] * b[2]));
+    w += a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+    double x = a[1] * b[2] - a[2] * b[1], y = a[2] * b[0] - a[0] * b[2], z = a[0] * b[1] - a[1] * b[0];
+    double norm = sqrt(w * w + x * x + y * y + z * z);
+    int opposite = norm < 1e-9;
+    q[0] = opposite ? 1 : w / norm;
+    q[1] = opposite ? 0 : x / norm;
+    q[2] = opposite ? 0 : y / norm;
+    q[3] = opposite ? 0 : z / norm;
+}
+
+/* Turns a rotation toward another, by at most MOST_ADDED. Returns whether it does not get there. */
+static int turn_toward(double *rotation, const double *to) {
+    double dot = rotation[0] * to[0] + rotation[1] * to[1] + rotation[2] * to[2] + rotation[3] * to[3],
+           sign = dot < 0 ? -1 : 1;
+    double half = acos(smaller(sign * dot, 1)), keep = 0, take = sign;
+    int limited = half > 0.5 * MOST_ADDED;
+    if (limited) {
+        keep = sin(half - 0.5 * MOST_ADDED) / sin(half);
+        take = sign * sin(0.5 * MOST_ADDED) / sin(half);
+    }
+    for (int i = 0; i < 4; i++) rotation[i] = keep * rotation[i] + take * to[i];
+    return limited;
+}
+
+/* Turns a vector by the rotation `by`. */
+static void turn_vector(const double *by, const double *v, double *out) {
+    double w = by[0], a = by[1], b = by[2], c = by[3], x = v[0], y = v[1], z = v[2];
+    double p = 2 * (b * z - c * y), q = 2 * (c * x - a * z), r = 2 * (a * y - b * x);
+    out[0] = x + w * p + b * r - c * q;
+    out[1] = y + w * q + c * p - a * r;
+    out[2] = z + w * r + a * q - b * p;
+}
+
+/* Turns a rotation by the rotation `by`. */
+static void turn_rotation(const double *by, double *rotation) {
+    double w = by[0], x = by[1], y = by[2], z = by[3], a = rotation[0], b = rotation[1], c = rotation[2],
+           d = rotation[3];
+    rotation[0] = w * a - x * b - y * c - z * d;
+    rotation[1] = w * b + x * a + y * d - z * c;
+    rotation[2] = w * c - x * d + y * a + z * b;
+    rotation[3] = w * d + x * c - y * b + z * a;
+}
+
+static void minus(const double *a, const double *b, double *out) {
+    for (int i = 0; i < 3; i++) out[i] = a[i] - b[i];
+}
+
+static double dot3(const double *a, const double *b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+
+/* Moves the heel by `shift`, by bending the knee; bones keep their lengths. ahead: where a straight knee
+   bends to. */
+static void move_heel(const double *hip, double *knee, double *heel, const double *shift,
+                      const double *ahead) {
+    /* thigh, shank: from hip to knee and from knee to heel. line: from hip to heel. to: from hip to the
+       shifted heel. */
+    double thigh[3], shank[3], line[3], to[3], out[3], forward[3];
+    minus(knee, hip, thigh);
+    minus(heel, knee, shank);
+    for (int i = 0; i < 3; i++) line[i] = thigh[i] + shank[i], to[i] = line[i] + shift[i];
+    double upper = sqrt(dot3(thigh, thigh)), lower = sqrt(dot3(shank, shank)),
+           before = sqrt(dot3(line, line)), distance = sqrt(dot3(to, to));
+    if (smaller(smaller(before, distance), smaller(upper, lower)) < 1e-6) return;
+    for (int i = 0; i < 3; i++) line[i] /= before, to[i] /= distance;
+    distance = smaller(larger(distance, fabs(upper - lower) * 1.001 + 1e-6), (upper + lower) * 0.999);
+    double cosine =
+        clamp((upper * upper + distance * distance - lower * lower) / (2 * upper * distance), -1, 1);
+    /* out: from the line between hip and heel to the knee. forward: the part of `ahead` across this line. */
+    double along = dot3(thigh, line), along_ahead = dot3(ahead, line);
+    for (int i = 0; i < 3; i++)
+        out[i] = thigh[i] - along * line[i], forward[i] = ahead[i] - along_ahead * line[i];
+    double size = larger(sqrt(dot3(forward, forward)), 1e-6),
+           more = larger(KNEE_AHEAD - dot3(out, forward) / size, 0);
+    if (more == 0 && fabs(shift[0]) + fabs(shift[1]) + fabs(shift[2]) < 1e-9) return;
+    for (int i = 0; i < 3; i++) out[i] += more * forward[i] / size;
+    /* Turn `out` by the smallest rotation from the old line to the new one. */
+    double factor = dot3(out, to) / larger(1 + dot3(line, to), 1e-6);
+    for (int i = 0; i < 3; i++) out[i] -= factor * (line[i] + to[i]);
+    size = sqrt(dot3(out, out));
+    if (size < 1e-6) return;
+    double sine = sqrt(1 - cosine * cosine) / size;
+    for (int i = 0; i < 3; i++) {
+        knee[i] = hip[i] + upper * (to[i] * cosine + out[i] * sine);
+        heel[i] = hip[i] + to[i] * distance;
+    }
+}
+
+/* Moves a point until it is at most `fastest` from where it was drawn, at `shown` above `base`. Returns
+   whether. */
+static int hold_back(double *at, const double *shown, double base, double fastest) {
+    double away[3] = {at[0] - shown[0], at[1] - shown[1] - base, at[2] - shown[2]},
+           far = length3(away[0], away[1], away[2]);
+    if (far <= fastest) return 0;
+    for (int i = 0; i < 3; i++) at[i] -= (1 - fastest / far) * away[i];
+    return 1;
+}
+
+/* Moves the heel by `shift`, but changes the rotations `added` to thigh and shank by at most MOST_ADDED in a
+   frame. */
+static void bend_leg(character *c, const int32_t *leg, const double *shift, const double *ahead,
+                     double (*added)[4], const last_frame *last) {
+    double *hip = c->pose_position[leg[HIP]], *knee = c->pose_position[leg[KNEE]],
+           *heel = c->pose_position[leg[HEEL]];
+    double thigh[3], shank[3], now[3], to[4], bends[3];
+    minus(knee, hip, thigh);
+    minus(heel, knee, shank);
+    turn_vector(c->pose_rotation[leg[HIP]], ahead, bends);
+    move_heel(hip, knee, heel, shift, bends);
+    minus(knee, hip, now);
+    rotation_between(thigh, now, to);
+    int limited = turn_toward(added[0], to);
+    minus(heel, knee, now);
+    rotation_between(shank, now, to);
+    limited |= turn_toward(added[1], to);
+    if (limited) {
+        turn_vector(added[0], thigh, now);
+        for (int i = 0; i < 3; i++) knee[i] = hip[i] + now[i];
+        turn_vector(added[1], shank, now);
+        for (int i = 0; i < 3; i++) heel[i] = knee[i] + now[i];
+    }
+    limited = hold_back(knee, last->shown[0], last->base, last->fastest);
+    limited |= hold_back(heel, last->shown[1], last->base, last->fastest);
+    if (limited) { /* the rotations that fit the limited positions */
+        minus(knee, hip, now);
+        rotation_between(thigh, now, added[0]);
+        minus(heel, knee, now);
+        rotation_between(shank, now, added[1]);
+    }
+    turn_rotation(added[0], c->pose_rotation[leg[HIP]]);
+    turn_rotation(added[1], c->pose_rotation[leg[KNEE]]);
+}
+
+/* The shift of a toe at x, z, changed if the toe would get farther than `fastest` from where it was drawn. */
+static void limit_shift(double *shift, double x, double z, const double *shown, double fastest) {
+    double to_x = x + shift[0] - shown[0], to_z = z + shift[1] - shown[2], far = length2(to_x, to_z);
+    if (far <= fastest) return;
+    shift[0] = shown[0] + to_x * fastest / far - x;
+    shift[1] = shown[2] + to_z * fastest / far - z;
+}
+
+/* Decides whether foot `f` is held, let go, or steps. Writes how far to move the network's toe into shift (x,
+   z). */
+static void hold_foot(const model *m, character *c, int f, double contact, double *shift) {
+    const double *toe = c->pose_position[m->legs[4 * f + TOE]], *shown = c->leg_shown[f][2];
+    double x = toe[0], z = toe[2], fastest = m->number[FASTEST], *lock = &c->foot_lock[f],
+           *step = &c->foot_step[f], *hold = c->foot_hold[f];
+    double away[2] = {hold[0] - x, hold[1] - z}, far = length2(away[0], away[1]);
+    shift[0] = shift[1] = 0;
+    if (!(m->number[LOCKING] > 0)) {
+        *lock = *step = 0;
+        return;
+    }
+    if (*lock < 1 && far > TOO_FAR_ALONE) { /* in the air, the hold follows the network's foot */
+        for (int k = 0; k < 2; k++) away[k] *= TOO_FAR_ALONE / far;
+        hold[0] = x + away[0];
+        hold[1] = z + away[1];
+    }
+    if (*step > 0) {
+        *step += 1.0 / STEP_FRAMES;
+        if (*step > 1 - 1e-6) *step = *lock = 0;
+    }
+    if (*step == 0) {
+        if (contact < LOCK_AT) {
+            *lock = larger(0, *lock - RELEASE);
+        } else if (*lock < 1) { /* hold the foot where it is shown now */
+            for (int k = 0; k < 2; k++) away[k] *= *lock;
+            limit_shift(away, x, z, shown, fastest);
+            hold[0] = x + away[0];
+            hold[1] = z + away[1];
+            *lock = 1;
+        } else {
+            int other = c->foot_lock[1 - f] == 1;
+            if (far >= (other ? TOO_FAR : TOO_FAR_ALONE)
+                || c->foot_missed[f] > (other ? MISSED : MISSED_ALONE))
+                *step = 1.0 / STEP_FRAMES;
+        }
+    }
+    if (*step > 0) *lock = 1 - *step * *step * (3 - 2 * *step); /* from 1 to 0, slowly at both ends */
+    shift[0] = *lock * away[0];
+    shift[1] = *lock * away[1];
+    limit_shift(shift, x, z, shown, fastest);
+}
+
+/* Raises the heel of a foot that `shift` moves behind the hip, so that the leg is not stretched: see feet.py.
+   The foot turns about its toe by the rotation `roll`, and the heel's movement is added to `shift`. */
+static void raise_heel(const double *hip, const double *knee, const double *heel, const double *toe,
+                       double *shift, double *roll) {
+    double upper = 0, lower = 0, before = 0,
+           needed = 0; /* squares of lengths and of distances from hip to heel */
+    for (int i = 0; i < 3; i++) {
+        upper += (knee[i] - hip[i]) * (knee[i] - hip[i]);
+        lower += (heel[i] - knee[i]) * (heel[i] - knee[i]);
+        before += (heel[i] - hip[i]) * (heel[i] - hip[i]);
+        needed += (heel[i] + shift[i] - hip[i]) * (heel[i] + shift[i] - hip[i]);
+    }
+    double longest = STRETCH * (sqrt(upper) + sqrt(lower)), most = larger(before, longest * longest);
+    double fx = toe[0] - heel[0], fz = toe[2] - heel[2], along = length2(fx, fz), high = heel[1] - toe[1];
+    if (needed <= most || along < 1e-6) return;
+    fx /= along;
+    fz /= along;
+    /* The shifted toe is at (wx, up, wz) from the hip, and `ahead` of it in the direction of the foot. */
+    double wx = toe[0] + shift[0] - hip[0], wz = toe[2] + shift[2] - hip[2], ahead = wx * fx + wz * fz,
+           up = toe[1] + shift[1] - hip[1];
+    if (ahead >= 0) return;
+    most += larger(1 + ahead / BEHIND, 0) * (needed - most);
+    /* The angle of the turn about the toe after which the squared distance from hip to heel is `most`. */
+    double cosine = up * high - ahead * along, sine = ahead * high + up * along, size = length2(cosine, sine);
+    double right = 0.5 * (most - wx * wx - up * up - wz * wz - along * along - high * high);
+    if (!(size > 0)) return;
+    double angle = clamp(atan2(sine, cosine) + acos(clamp(right / size, -1, 1)), 0, MOST_ADDED);
+    double forward = along * (1 - cos(angle)) + high * sin(angle);
+    shift[0] += forward * fx;
+    shift[1] += along * sin(angle) - high * (1 - cos(angle));
+    shift[2] += forward * fz;
+    roll[0] = cos(angle / 2);
+    roll[1] = sin(angle / 2) * fz;
+    roll[3] = -sin(angle / 2) * fx;
+}
+
+/* Moves a foot along with its heel, which was at `old`, and turns it by `roll`. The toes move, but do not
+   turn. */
+static void carry_foot(const model *m, character *c, int f, const double *old, const double *roll) {
+    const uint8_t *parts = m->parts + f * m->size[JOINTS];
+    const double *heel = c->pose_position[m->legs[4 * f + HEEL]],
+                 *toe = c->pose_position[m->legs[4 * f + TOE]];
+    double from[3], move[3], turned[3];
+    minus(toe, old, from);
+    turn_vector(roll, from, move);
+    for (int i = 0; i < 3; i++) move[i] += heel[i] - toe[i];
+    turn_rotation(roll, c->pose_rotation[m->legs[4 * f + HEEL]]);
+    for (int j = 0; j < m->size[JOINTS]; j++) {
+        double *place = c->pose_position[j];
+        if (parts[j] == TOES) {
+            for (int i = 0; i < 3; i++) place[i] += move[i];
+        } else if (parts[j] == FOOT) {
+            minus(place, old, from);
+            turn_vector(roll, from, turned);
+            for (int i = 0; i < 3; i++) place[i] = heel[i] + turned[i];
+            turn_rotation(roll, c->pose_rotation[j]);
+        }
+    }
+}
+
+/* Limits how far the toe moves in a frame, and moves the joints below it along. */
+static void hold_toes_back(const model *m, character *c, int f, const last_frame *last) {
+    int toe = m->legs[4 * f + TOE];
+    double old[3], *at = c->pose_position[toe];
+    memcpy(old, at, sizeof old);
+    if (!hold_back(at, last->shown[2], last->base, last->fastest)) return;
+    for (int j = 0; j < m->size[JOINTS]; j++)
+        if (m->parts[f * m->size[JOINTS] + j] == TOES && j != toe)
+            for (int i = 0; i < 3; i++) c->pose_position[j][i] += at[i] - old[i];
+}
+
+/* How deep foot `f` is in the ground, cm; negative above it. ground: heights under its heel and toe. */
+static double sole_depth(const model *m, const character *c, int f, const double *ground) {
+    const int32_t *leg = m->legs + 4 * f;
+    return larger(ground[0] + m->sole[0] - c->pose_position[leg[HEEL]][1],
+                  ground[1] + m->sole[1] - c->pose_position[leg[TOE]][1]);
+}
+
+/* Raises or lowers the whole body, so that it stands on the ground under its feet. ground: (5) heights under
+   left heel, left toe, right heel, right toe and hips. */
+static void carry_body(const model *m, character *c, const float *contacts, const double *ground) {
+    double rises = 0, weight = 0;
+    for (int f = 0; f < 2; f++) {
+        double rise = sole_depth(m, c, f, ground + 2 * f);
+        double stands = clamp(larger(contacts[2 * f], contacts[2 * f + 1]), 0, 1);
+        rises += stands * (larger(rise - BODY_FREE, 0) + smaller(rise + BODY_FREE, 0));
+        weight += stands;
+    }
+    if (weight > BODY_MIN_CONTACT) c->body_lift += BODY_MIX * (rises / weight - c->body_lift);
+    double above = c->pose_position[m->size[HIPS]][1] - ground[4];
+    c->body_lift = clamp(c->body_lift, m->number[HIPS_LOW] - above, m->number[HIPS_HIGH] - above);
+    for (int j = 0; j < m->size[JOINTS]; j++) c->pose_position[j][1] += c->body_lift;
+}
+
+/* Holds foot `f` if it is in contact, and keeps it out of the ground. Writes contact 0 for a foot that steps.
+ */
+static void place_foot(const model *m, character *c, int f, float *contacts, const double *ground) {
+    const int32_t *leg = m->legs + 4 * f;
+    double shift[3], horizontal[2], roll[4] = {1, 0, 0, 0}, old[3], *heel = c->pose_position[leg[HEEL]];
+    hold_foot(m, c, f, contacts[2 * f + 1], horizontal);
+    double depth = sole_depth(m, c, f, ground + 2 * f), rise = larger(depth, 0), done = c->foot_step[f];
+    if (done == 0) rise += c->foot_lock[f] * smaller(depth + FLOATING, 0);
+    c->foot_lift[f] += clamp(HEIGHT_MIX * (rise - c->foot_lift[f]), -FASTEST_LIFT, FASTEST_LIFT);
+    shift[0] = horizontal[0];
+    shift[1] = c->foot_lift[f];
+    shift[2] = horizontal[1];
+    if (done > 0) { /* the height over a step is a parabola */
+        shift[1] += larger(4 * STEP_HEIGHT * done * (1 - done) - larger(-depth, 0), 0);
+        contacts[2 * f] = contacts[2 * f + 1] = 0;
+    }
+    if (c->foot_lock[f] > 0)
+        raise_heel(c->pose_position[leg[HIP]], c->pose_position[leg[KNEE]], heel, c->pose_position[leg[TOE]],
+                   shift, roll);
+    memcpy(old, heel, sizeof old);
+    last_frame last = {c->leg_shown[f], c->root_height + c->body_lift, m->number[FASTEST]};
+    bend_leg(c, leg, shift, m->ahead, c->foot_added[f], &last);
+    carry_foot(m, c, f, old, roll);
+    hold_toes_back(m, c, f, &last);
+    const double *toe = c->pose_position[leg[TOE]];
+    c->foot_missed[f] =
+        c->foot_lock[f] == 1 ? length2(c->foot_hold[f][0] - toe[0], c->foot_hold[f][1] - toe[2]) : 0;
+    for (int i = 0; i < 3; i++) {
+        memcpy(c->leg_shown[f][i], c->pose_position[leg[i + 1]], sizeof c->leg_shown[f][i]);
+        c->leg_shown[f][i][1] -= last.base;
+    }
+}
+
+/* ---- 8. A frame, and the functions of hobble.h -----------------------------------------------------------
+ */
+
+/* Puts a character at x, z, facing `yaw`, in the start pose. Its channel targets stay. */
+static void start_character(const hobble *h, character *c, double x, double z, double yaw) {
+    const model *m = &h->model;
+    double sine = sin(yaw), cosine = cos(yaw), facing[4] = {cos(yaw / 2), 0, sin(yaw / 2), 0};
+    character fresh = {0};
+    fresh.position = c->position, fresh.direction = c->direction, fresh.gait = c->gait,
+    fresh.ground = c->ground;
+    fresh.joint_position = c->joint_position, fresh.joint_velocity = c->joint_velocity,
+    fresh.joint_rotation = c->joint_rotation;
+    fresh.pose_position = c->pose_position, fresh.pose_rotation = c->pose_rotation;
+    fresh.values = c->values, fresh.targets = c->targets, fresh.memory = c->memory;
+    *c = fresh;
+    for (int i = 0; i < m->length; i++) {
+        const double *p = m->start_path + 2 * i, *d = m->start_direction + 2 * i;
+        c->position[i][0] = p[0] * cosine + p[1] * sine + x;
+        c->position[i][1] = p[1] * cosine - p[0] * sine + z;
+        c->direction[i][0] = d[0] * cosine + d[1] * sine;
+        c->direction[i][1] = d[1] * cosine - d[0] * sine;
+    }
+    memcpy(c->gait, m->start_gait, (size_t)m->length * sizeof *c->gait);
+    memset(c->ground, 0, (size_t)m->samples * sizeof *c->ground);
+    for (int j = 0; j < m->size[JOINTS]; j++) {
+        const double *p = m->start_joints + 3 * j, *v = m->start_velocities + 3 * j;
+        c->joint_position[j][0] = p[0] * cosine + p[2] * sine + x;
+        c->joint_position[j][1] = p[1];
+        c->joint_position[j][2] = p[2] * cosine - p[0] * sine + z;
+        c->joint_velocity[j][0] = v[0] * cosine + v[2] * sine;
+        c->joint_velocity[j][1] = v[1];
+        c->joint_velocity[j][2] = v[2] * cosine - v[0] * sine;
+        memcpy(c->joint_rotation[j], m->start_rotations + 4 * j, sizeof c->joint_rotation[j]);
+        turn_rotation(facing, c->joint_rotation[j]);
+    }
+    memcpy(c->pose_position, c->joint_position, (size_t)m->size[JOINTS] * sizeof *c->pose_position);
+    memcpy(c->pose_rotation, c->joint_rotation, (size_t)m->size[JOINTS] * sizeof *c->pose_rotation);
+    memset(c->values, 0, (size_t)m->size[COLUMNS] * sizeof *c->values);
+    memset(c->memory, 0, (size_t)h->memory_size * sizeof *c->memory);
+    c->phase = m->number[START_PHASE];
+    c->smoothed_direction[0] = sine;
+    c->smoothed_direction[1] = cosine;
+    for (int f = 0; f < 2; f++) {
+        c->foot_added[f][0][0] = c->foot_added[f][1][0] = 1;
+        for (int i = 0; i < 3; i++)
+            memcpy(c->leg_shown[f][i], c->joint_position[m->legs[4 * f + i + 1]], sizeof c->leg_shown[f][i]);
+    }
+    c->root[0] = x;
+    c->root[2] = z;
+    c->report[0] = c->yaw = yaw;
+    c->report[1] = c->phase;
+}
+
+/* Whether `count` numbers are finite and not too large. */
+static int sound(const void *numbers, size_t count) {
+    const double *values = numbers;
+    double total = 0;
+    for (size_t i = 0; i < count; i++) total += fabs(values[i]);
+    return total <= LARGEST_SOUND * (double)count; /* false for a sum that is not finite */
+}
+
+static int sound_character(const hobble *h, const character *c) {
+    size_t length = (size_t)h->model.length, joints = (size_t)h->model.size[JOINTS];
+    return sound(c->position, 2 * length) && sound(c->direction, 2 * length) && sound(c->gait, GAITS * length)
+           && sound(c->joint_position, 3 * joints) && sound(c->joint_velocity, 3 * joints)
+           && sound(c->joint_rotation, 4 * joints) && sound(c->values, (size_t)h->model.size[COLUMNS])
+           && sound(c->memory, (size_t)h->memory_size) && sound(&c->phase, 1)
+           && sound(c->smoothed_velocity, 2) && sound(c->smoothed_direction, 2) && sound(c->correction, 2)
+           && sound(c->foot_hold, 4) && sound(c->foot_lift, 2) && sound(c->foot_added, 16)
+           && sound(c->leg_shown, 18) && sound(&c->body_lift, 1);
+}
+
+/* The height of a grid of heights at x, z, bilinear. */
+static double grid_height(const hobble_ground *ground, double x, double z) {
+    int rows = ground->rows, columns = ground->columns;
+    double u = clamp((x - ground->centre[0]) / ground->cell + (columns - 1) / 2.0, 0, columns - 1);
+    double v = clamp((z - ground->centre[1]) / ground->cell + (rows - 1) / 2.0, 0, rows - 1);
+    int i = (int)u < columns - 2 ? (int)u : columns - 2, j = (int)v < rows - 2 ? (int)v : rows - 2;
+    const float *low = ground->heights + (size_t)j * (size_t)columns + i, *high = low + columns;
+    u -= i;
+    v -= j;
+    return (low[0] * (1 - u) + low[1] * u) * (1 - v) + (high[0] * (1 - u) + high[1] * u) * v;
+}
+
+/* Looks up the heights of `count` points of h->points. Returns HOBBLE_OK or an error. */
+static int look_up(hobble *h, const hobble_ground *ground, int count) {
+    if (!ground) {
+        memset(h->heights, 0, (size_t)count * sizeof *h->heights);
+        return HOBBLE_OK;
+    }
+    if (ground->function) ground->function(ground->user, count, h->points, h->heights);
+    else
+        for (int i = 0; i < count; i++)
+            h->heights[i] = grid_height(ground, h->points[2 * i], h->points[2 * i + 1]);
+    for (int i = 0; i < count; i++)
+        if (!(fabs(h->heights[i]) <= HIGHEST_GROUND)) return HOBBLE_BAD_GROUND;
+    return HOBBLE_OK;
+}
+
+/* Bends the paths toward the targets, looks up the ground along them, and moves the channel values. */
+static int prepare(hobble *h, const hobble_ground *ground) {
+    const model *m = &h->model;
+    int samples = 3 * m->samples;
+    for (int i = 0; i < h->characters; i++) {
+        character *c = &h->state[i];
+        follow_target(m, c, &h->goals[i]);
+        blend_future(h, c);
+        sample_points(m, c, h->points + 2 * (size_t)samples * (size_t)i);
+        for (int k = 0; k < m->size[COLUMNS]; k++)
+            c->values[k] += clamp(c->targets[k] - c->values[k], -m->rates[k], m->rates[k]);
+    }
+    int error = look_up(h, ground, samples * h->characters);
+    for (int i = 0; !error && i < h->characters; i++) {
+        character *c = &h->state[i];
+        double total = 0;
+        memcpy(c->ground, h->heights + (size_t)samples * (size_t)i, (size_t)samples * sizeof(double));
+        for (int s = 0; s < m->samples; s++) total += c->ground[s][1];
+        c->root_height = total / m->samples;
+        if (c->placed) continue;
+        c->placed = 1; /* once, at the start: lift the joints to the ground, which may have any height */
+        c->root[1] = c->root_height;
+        for (int j = 0; j < m->size[JOINTS]; j++) c->joint_position[j][1] += c->root_height;
+    }
+    return error;
+}
+
+/* Turns the predictions into poses on the ground. */
+static int place(hobble *h, const hobble_ground *ground) {
+    const model *m = &h->model;
+    for (int i = 0; i < h->characters; i++) {
+        character *c = &h->state[i];
+        const int32_t *l = m->legs;
+        const int under[5] = {l[HEEL], l[TOE], l[4 + HEEL], l[4 + TOE], m->size[HIPS]};
+        write_pose(m, c, h->y + (size_t)i * (size_t)m->size[Y_SIZE]);
+        for (int k = 0; k < 5; k++) {
+            h->points[10 * i + 2 * k] = c->pose_position[under[k]][0];
+            h->points[10 * i + 2 * k + 1] = c->pose_position[under[k]][2];
+        }
+    }
+    int error = look_up(h, ground, 5 * h->characters);
+    for (int i = 0; !error && i < h->characters; i++) {
+        character *c = &h->state[i];
+        float *contacts = h->y + (size_t)i * (size_t)m->size[Y_SIZE] + m->y_contacts;
+        carry_body(m, c, contacts, h->heights + 5 * i);
+        for (int f = 0; f < 2; f++) place_foot(m, c, f, contacts, h->heights + 5 * i);
+        for (int k = 0; k < 4; k++) c->report[2 + k] = clamp(contacts[k], 0, 1);
+    }
+    return error;
+}
+
+/* Runs a frame whose targets are in h->goals. */
+static int run_frame(hobble *h, const hobble_ground *ground) {
+    const model *m = &h->model;
+    int error = prepare(h, ground);
+    if (error) return error;
+    for (int i = 0; i < h->characters; i++) {
+        float *x = h->x + (size_t)i * (size_t)m->size[X_SIZE];
+        write_inputs(m, &h->state[i], x);
+        limit_row(x, m->x_low, m->x_high, m->size[X_SIZE]);
+    }
+    if (m->size[FORM] == RECORDED) predict_matching(h);
+    else predict_blend(h);
+    for (int i = 0; i < h->characters; i++)
+        limit_row(h->y + (size_t)i * (size_t)m->size[Y_SIZE], m->y_low, m->y_high, m->size[Y_SIZE]);
+    error = place(h, ground);
+    if (error) return error;
+    for (int i = 0; i < h->characters; i++) {
+        character *c = &h->state[i];
+        advance(m, c, h->y + (size_t)i * (size_t)m->size[Y_SIZE], h->goals[i].velocity);
+        c->report[0] = c->yaw;
+        c->report[1] = c->phase;
+    }
+    return HOBBLE_OK;
+}
+
+int hobble_frame(hobble *h, const hobble_target *targets, const hobble_ground *ground) {
+    size_t count = (size_t)h->characters;
+    int error = HOBBLE_OK;
+    if (ground && !ground->function
+        && (!ground->heights || ground->rows < 2 || ground->columns < 2 || !(ground->cell > 0)))
+        return HOBBLE_BAD_GROUND;
+    if (ground) { /* only a ground can fail in the middle of a frame */
+        memcpy(h->saved_state, h->state, count * sizeof *h->state);
+        memcpy(h->saved_numbers, h->numbers, count * h->number_count * sizeof *h->numbers);
+    }
+    for (size_t i = 0; i < count; i++) {
+        error = read_target(&h->model, &h->state[i], &targets[i], &h->goals[i]);
+        if (error) return error;
+        limit_target(&h->model, h->state[i].values, &h->goals[i]);
+    }
+    for (size_t i = 0; i < count; i++) {
+        character *c = &h->state[i];
+        if (!sound_character(h, c)) start_character(h, c, c->root[0], c->root[2], c->yaw);
+    }
+    error = run_frame(h, ground);
+    if (error) {
+        memcpy(h->state, h->saved_state, count * sizeof *h->state);
+        memcpy(h->numbers, h->saved_numbers, count * h->number_count * sizeof *h->numbers);
+    }
+    return error;
+}
+
+/* Hands out pieces of the caller's memory; without memory, it only adds up their sizes. */
+typedef struct {
+    unsigned char *base;
+    uint64_t used;
+} arena;
+
+static void *take(arena *a, uint64_t count, size_t bytes) {
+    uint64_t at = (a->used + 7) / 8 * 8;
+    a->used = at + count * bytes;
+    return a->base ? a->base + at : NULL;
+}
+
+/* The numbers of one character, from `at` on: sets the pointers of its state, and returns how many there are.
+ */
+static size_t lay_out(const hobble *h, character *c, double *at) {
+    const model *m = &h->model;
+    size_t length = (size_t)m->length, joints = (size_t)m->size[JOINTS], columns = (size_t)m->size[COLUMNS];
+    const size_t counts[12] = {2 * length, 2 * length, GAITS * length, 3 * (size_t)m->samples,
+                               3 * joints, 3 * joints, 4 * joints,     3 * joints,
+                               4 * joints, columns,    columns,        (size_t)h->memory_size};
+    double *starts[12];
+    size_t used = 0;
+    for (int i = 0; i < 12; i++) {
+        starts[i] = at ? at + used : NULL;
+        used += counts[i];
+    }
+    c->position = (double (*)[2])starts[0];
+    c->direction = (double (*)[2])starts[1];
+    c->gait = (double (*)[GAITS])starts[2];
+    c->ground = (double (*)[3])starts[3];
+    c->joint_position = (double (*)[3])starts[4];
+    c->joint_velocity = (double (*)[3])starts[5];
+    c->joint_rotation = (double (*)[4])starts[6];
+    c->pose_position = (double (*)[3])starts[7];
+    c->pose_rotation = (double (*)[4])starts[8];
+    c->values = starts[9];
+    c->targets = starts[10];
+    c->memory = starts[11];
+    return used;
+}
+
+static size_t widest_layer(const stack *s) {
+    size_t widest = 0;
+    for (int i = 0; i < s->layers; i++) {
+        size_t padded = (size_t)panels_of((uint64_t)s->outputs[i]) * WIDTH, inputs = (size_t)s->inputs[i];
+        widest = padded > widest ? padded : widest;
+        widest = inputs > widest ? inputs : widest;
+    }
+    return widest;
+}
+
+/* Distributes the memory. h: filled except for its pointers; of the memory's beginning, or a copy to measure.
+ */
+static void distribute(hobble *h, arena *a) {
+    const model *m = &h->model;
+    uint64_t count = (uint64_t)h->characters,
+             look_ups = (uint64_t)m->samples * 3 > 5 ? (uint64_t)m->samples * 3 : 5;
+    uint64_t blocks = ((uint64_t)m->size[ROWS] + BLOCK - 1) / BLOCK * (uint64_t)m->size[FEATURES];
+    size_t gate = widest_layer(&m->gate);
+    character one;
+    h->widest = widest_layer(&m->network);
+    h->widest = gate > h->widest ? gate : h->widest;
+    h->memory_size = m->size[FORM] == RECORDED ? OFFSETS + OFFSETS_PER_JOINT * m->size[JOINTS] : 0;
+    h->number_count = lay_out(h, &one, NULL);
+    h->names = take(a, (uint64_t)name_count(m), sizeof *h->names);
+    h->state = take(a, count, sizeof *h->state);
+    h->saved_state = take(a, count, sizeof *h->state);
+    h->numbers = take(a, count * h->number_count, sizeof(double));
+    h->saved_numbers = take(a, count * h->number_count, sizeof(double));
+    h->goals = take(a, count, sizeof *h->goals);
+    h->points = take(a, count * look_ups * 2, sizeof(double));
+    h->heights = take(a, count * look_ups, sizeof(double));
+    h->powers = take(a, 2 * (uint64_t)m->length, sizeof(double));
+    h->rows_old = take(a, m->size[FORM] == RECORDED ? 4 * (uint64_t)m->size[Y_SIZE] : 0, sizeof(double));
+    h->slots = take(a, count, sizeof *h->slots);
+    h->members = take(a, count, sizeof *h->members);
+    h->x = take(a, count * (uint64_t)m->size[X_SIZE], sizeof(float));
+    h->z = take(a, count * ((uint64_t)m->size[INPUTS] + 2), sizeof(float));
+    h->y = take(a, count * (uint64_t)m->size[Y_SIZE], sizeof(float));
+    h->shares = take(a, count * ((uint64_t)m->size[SETS] + 1), sizeof(float));
+    h->gate_inputs = take(a, count * (uint64_t)m->size[GATE_INPUTS], sizeof(float));
+    h->room = take(a, 4 * count * h->widest, sizeof(float));
+    h->query = take(a, (uint64_t)m->size[FEATURES], sizeof(float));
+    h->block_low = take(a, blocks, sizeof(float));
+    h->block_high = take(a, blocks, sizeof(float));
+}
+
+size_t hobble_size(const void *file, size_t bytes, int characters, char *why) {
+    hobble h = {0};
+    arena measured = {NULL, sizeof h};
+    if (why) why[0] = 0;
+    if (characters < 1 || characters > MOST_CHARACTERS) {
+        if (why) snprintf(why, HOBBLE_WHY, "%d characters: 1 to %d are allowed", characters, MOST_CHARACTERS);
+        return 0;
+    }
+    if (!read_model(file, bytes, &h.model, NULL, why)) return 0;
+    h.characters = characters;
+    distribute(&h, &measured);
+    if (measured.used > SIZE_MAX / 2) {
+        if (why) snprintf(why, HOBBLE_WHY, "%d characters need more memory than there can be", characters);
+        return 0;
+    }
+    return (size_t)measured.used;
+}
+
+hobble *hobble_create(const void *file, size_t bytes, int characters, void *memory, size_t size, char *why) {
+    size_t needed = hobble_size(file, bytes, characters, why);
+    if (!needed) return NULL;
+    if (!memory || size < needed || (uintptr_t)memory % 8) {
+        if (why) snprintf(why, HOBBLE_WHY, "the memory is too small or not aligned to 8 bytes");
+        return NULL;
+    }
+    hobble *h = memory;
+    arena a = {memory, sizeof *h};
+    memset(memory, 0, needed);
+    read_model(file, bytes, &h->model, NULL, NULL);
+    h->characters = characters;
+    distribute(h, &a);
+    read_model(file, bytes, &h->model, h->names, NULL);
+    h->powers_strafe = -1; /* no share of strafing */
+    if (h->model.size[FORM] == RECORDED) measure_blocks(h);
+    for (int i = 0; i < characters; i++) {
+        lay_out(h, &h->state[i], h->numbers + (size_t)i * h->number_count);
+        start_character(h, &h->state[i], 0, 0, 0);
+    }
+    return h;
+}
+
+const char *hobble_error(int code) {
+    switch (code) {
+        case HOBBLE_OK: return "no error";
+        case HOBBLE_NO_SUCH: return "there is no such character, joint, gait or column";
+        case HOBBLE_BAD_VALUE: return "the value is not a number in the allowed range";
+        case HOBBLE_BAD_TARGET:
+            return "the target is not finite, is faster than 30 cm a frame, or has no such gait";
+        case HOBBLE_BAD_GROUND:
+            return "the ground has no heights, or heights that are not finite or above 100 km";
+        default: return "unknown error";
+    }
+}
+
+static int has_character(const hobble *h, int i) { return i >= 0 && i < h->characters; }
+
+int hobble_reset(hobble *h, int i, double x, double z, double yaw) {
+    if (!has_character(h, i)) return HOBBLE_NO_SUCH;
+    if (!(fabs(x) <= FARTHEST) || !(fabs(z) <= FARTHEST) || !(fabs(yaw) <= 1e6)) return HOBBLE_BAD_VALUE;
+    memset(h->state[i].targets, 0, (size_t)h->model.size[COLUMNS] * sizeof(double));
+    start_character(h, &h->state[i], x, z, yaw);
+    return HOBBLE_OK;
+}
+
+int hobble_copy(hobble *h, int to, const hobble *other, int from, double x, double z) {
+    if (!has_character(h, to) || !has_character(other, from)) return HOBBLE_NO_SUCH;
+    if (!(fabs(x) <= FARTHEST) || !(fabs(z) <= FARTHEST)
+        || memcmp(h->model.size, other->model.size, sizeof h->model.size))
+        return HOBBLE_BAD_VALUE;
+    character *c = &h->state[to];
+    double *numbers = h->numbers + (size_t)to * h->number_count;
+    memmove(numbers, other->numbers + (size_t)from * h->number_count, h->number_count * sizeof *numbers);
+    *c = other->state[from];
+    lay_out(h, c, numbers);
+    for (int i = 0; i < h->model.length; i++) c->position[i][0] += x, c->position[i][1] += z;
+    for (int j = 0; j < h->model.size[JOINTS]; j++) {
+        c->joint_position[j][0] += x, c->joint_position[j][2] += z;
+        c->pose_position[j][0] += x, c->pose_position[j][2] += z;
+    }
+    for (int f = 0; f < 2; f++) {
+        c->foot_hold[f][0] += x, c->foot_hold[f][1] += z;
+        for (int i = 0; i < 3; i++) c->leg_shown[f][i][0] += x, c->leg_shown[f][i][2] += z;
+    }
+    c->root[0] += x;
+    c->root[2] += z;
+    return HOBBLE_OK;
+}
+
+/* Name number `at` of the names that begin with number `first`; NULL unless 0 <= at < count. */
+static const char *name_at(const hobble *h, int first, int at, int count) {
+    return at >= 0 && at < count ? h->names[first + at] : NULL;
+}
+
+/* The number of the name among `count` names that begin with number `first`. */
+static int number_of(const hobble *h, int first, int count, const char *name) {
+    for (int i = 0; name && i < count; i++)
+        if (!strcmp(h->names[first + i], name)) return i;
+    return HOBBLE_NO_SUCH;
+}
+
+static int first_gait(const hobble *h) { return h->model.size[JOINTS]; }
+static int first_channel(const hobble *h) { return first_gait(h) + GAITS; }
+static int first_column(const hobble *h) { return first_channel(h) + h->model.size[CHANNELS]; }
+
+int hobble_characters(const hobble *h) { return h->characters; }
+int hobble_joints(const hobble *h) { return h->model.size[JOINTS]; }
+int hobble_joint(const hobble *h, const char *name) { return number_of(h, 0, h->model.size[JOINTS], name); }
+const char *hobble_joint_name(const hobble *h, int joint) {
+    return name_at(h, 0, joint, h->model.size[JOINTS]);
+}
+int hobble_joint_parent(const hobble *h, int joint) {
+    return hobble_joint_name(h, joint) ? h->model.parents[joint] : HOBBLE_NO_SUCH;
+}
+const double *hobble_joint_offset(const hobble *h, int joint) {
+    return hobble_joint_name(h, joint) ? h->model.offsets + 3 * joint : NULL;
+}
+int hobble_gait(const hobble *h, const char *name) { return number_of(h, first_gait(h), GAITS, name); }
+const char *hobble_gait_name(const hobble *h, int gait) { return name_at(h, first_gait(h), gait, GAITS); }
+
+int hobble_columns(const hobble *h) { return h->model.size[COLUMNS]; }
+const char *hobble_column_label(const hobble *h, int column) {
+    return name_at(h, first_column(h), column, hobble_columns(h));
+}
+const char *hobble_column_part(const hobble *h, int column) {
+    return name_at(h, first_column(h) + hobble_columns(h), column, hobble_columns(h));
+}
+double hobble_highest(const hobble *h, int column) {
+    return hobble_column_label(h, column) ? h->model.highest[column] : HOBBLE_NO_SUCH;
+}
+
+const char *hobble_column_channel(const hobble *h, int column) {
+    return hobble_column_label(h, column) ? h->names[first_channel(h) + h->model.channel_of[column]] : NULL;
+}
+
+int hobble_column(const hobble *h, const char *channel_name, const char *name) {
+    for (int k = 0; name && k < hobble_columns(h); k++) {
+        if (channel_name && strcmp(channel_name, hobble_column_channel(h, k))) continue;
+        if (!strcmp(name, hobble_column_label(h, k)) || !strcmp(name, hobble_column_part(h, k))) return k;
+    }
+    return HOBBLE_NO_SUCH;
+}
+
+int hobble_set(hobble *h, int i, int column, double value) {
+    if (!has_character(h, i) || !hobble_column_label(h, column)) return HOBBLE_NO_SUCH;
+    if (!(value >= 0 && value <= h->model.highest[column])) return HOBBLE_BAD_VALUE;
+    h->state[i].targets[column] = value / h->model.scales[column];
+    return HOBBLE_OK;
+}
+
+const double *hobble_positions(const hobble *h, int i) {
+    return has_character(h, i) ? h->state[i].pose_position[0] : NULL;
+}
+const double *hobble_rotations(const hobble *h, int i) {
+    return has_character(h, i) ? h->state[i].pose_rotation[0] : NULL;
+}
+const double *hobble_root(const hobble *h, int i) { return has_character(h, i) ? h->state[i].root : NULL; }
+const double *hobble_state(const hobble *h, int i) { return has_character(h, i) ? h->state[i].report : NULL; }
+int hobble_path_frames(const hobble *h) { return h->model.length; }
+const double *hobble_path(const hobble *h, int i) {
+    return has_character(h, i) ? h->state[i].position[0] : NULL;
+}
+const double *hobble_path_directions(const hobble *h, int i) {
+    return has_character(h, i) ? h->state[i].direction[0] : NULL;
+}
+const double *hobble_ground_samples(const hobble *h, int i) {
+    return has_character(h, i) ? h->state[i].ground[0] : NULL;
+}
+const double *hobble_joint_velocities(const hobble *h, int i) {
+    return has_character(h, i) ? h->state[i].joint_velocity[0] : NULL;
+}
+const double *hobble_values(const hobble *h, int i) {
+    return has_character(h, i) ? h->state[i].values : NULL;
+}
+const double *hobble_feet(const hobble *h, int i) {
+    return has_character(h, i) ? h->state[i].foot_lock : NULL;
+}

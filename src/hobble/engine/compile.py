@@ -1,0 +1,25 @@
+"""Compiles the runtime in C with zig, a compiler that is a Python package, so that every machine has one."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from hobble.core.errors import HobbleError
+from hobble.core.files import atomic_path
+from hobble.engine.export import SOURCES
+
+# For WebAssembly: a module without a main function, with vectors of 128 bits.
+WASM_OPTIONS = ("-target", "wasm32-wasi", "-mexec-model=reactor", "-O3", "-msimd128", "-Wl,--export-dynamic")
+
+
+def compile_c(sources: Sequence[str | Path], target: str | Path, options: Sequence[str]) -> None:
+    """Compile C files into the file `target`. Raises HobbleError with what the compiler says."""
+    with atomic_path(target) as temporary:
+        arguments = [*options, *map(str, sources), "-o", str(temporary), "-lm"]
+        command = [sys.executable, "-m", "ziglang", "cc", f"-I{SOURCES}", *arguments]
+        process = subprocess.run(command, capture_output=True, text=True, check=False)
+        if process.returncode:
+            raise HobbleError(f"{target}: the compiler says: {process.stderr.strip()[:1000]}")

@@ -1,0 +1,165 @@
+"""Writes character.hob: a network, its skeleton and the runtime's options in one file, for the runtime in C.
+
+The file begins with a header of 64 bytes: the magic bytes, uint32 version, uint32 byte-order mark, uint64
+size of the file, uint32 Adler-32 checksum of all that follows the header, uint32 number of sections. Then
+comes a table with 40 bytes for each section: its name in 16 bytes, uint64 type (see `TYPES`), offset and
+number of values. The sections follow, each at a multiple of 64 bytes. All numbers are little-endian.
+`c/hobble.c` reads and checks the file; sections and the numbers in "sizes" and "numbers" have the same names
+there.
+"""
+
+from __future__ import annotations
+
+import struct
+import zlib
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from hobble.channels import channel
+from hobble.channels.shown import channel_display
+from hobble.core.errors import HobbleError
+from hobble.core.files import atomic_path
+from hobble.core.quat import Array
+from hobble.models.network import STORAGES, Network, inverse_or_0
+from hobble.rows.layout import BODY
+from hobble.runtime.bounds import Bounds
+from hobble.runtime.character import start_characters
+from hobble.runtime.controller import FPS
+from hobble.runtime.feet import foot_parts, leg_joints, rest_facing, sole_heights
+from hobble.runtime.options import Runtime
+
+MAGIC, VERSION, ORDER_MARK = b"HOBBLE\r\n", 1, 0x01020304
+HEADER, ENTRY, ALIGNMENT = 64, 40, 64
+TYPES = {"int32": 1, "float32": 2, "float64": 3, "int16": 4, "uint8": 5}
+# Standardised inputs are multiplied by 1 / standard deviation. With a smaller factor an input has no effect,
+# and the file leaves it out.
+NO_EFFECT = 1e-7
+
+Sections = dict[str, np.ndarray]
+
+
+def character_bytes(network: Network, runtime: Runtime, storage: str | None = None) -> bytes:
+    """The character file of a network.
+
+    runtime: how the character runs; its mode is that of the weights in the file. storage: "float32" or
+    "int16", how the weights are stored; the default depends on the kind of network. Raises HobbleError for a
+    network without a skeleton.
+    """
+    if network.skeleton is None:
+        raise HobbleError("the network has no skeleton: pass `load_network` a file of config/skeletons")
+    storage = storage or network.default_storage
+    inputs = np.flatnonzero(inverse_or_0(network.x_std) > NO_EFFECT)
+    sizes, sections = network.engine_data(network.resolve_mode(runtime.mode), storage, inputs)
+    layout = network.layout
+    sizes |= {
+        "joints": layout.joints, "window": layout.window, "step": layout.step,
+        "columns": sum(columns for _, columns in layout.channels), "channels": len(layout.channels),
+        "x_size": layout.x_size, "y_size": layout.y_size, "inputs": len(inputs),
+        "hips": network.skeleton.role("hips"), "storage": STORAGES.index(storage),
+    }  # fmt: skip
+    bounds = Bounds.of(network)
+    facts = network.training_facts
+    numbers = (
+        network.terrain_side, runtime.steering, runtime.foot_locking, bounds.fastest, *bounds.hips,
+        0.0 if facts is None else facts.start_phase, getattr(network, "halflife", 1.0),
+    )  # fmt: skip
+    sections |= {
+        "sizes": np.array([sizes.get(name, 0) for name in SIZES], np.int32),
+        "numbers": np.array(numbers, float),
+        "inputs": inputs.astype(np.int32),
+        "x_mean": network.x_mean[inputs],
+        "x_inverse": inverse_or_0(network.x_std)[inputs].astype(np.float32),
+        "x_low": bounds.x_low,
+        "x_high": bounds.x_high,
+        "y_low": bounds.y_low,
+        "y_high": bounds.y_high,
+    }
+    sections |= _body_sections(network) | _channel_sections(network, runtime)
+    return _packed(sections)
+
+
+# The numbers of the section "sizes", in their order; those from "form" on depend on the kind of network, see
+# `Network.engine_data`.
+SIZES = (
+    *("joints", "window", "step", "columns", "channels", "x_size", "y_size", "inputs", "hips"),
+    *("form", "storage", "extra", "layers", "sets", "blended", "gate_layers", "gate_inputs"),
+    *("rows", "features", "every"),
+)
+
+
+def write_character(path: str | Path, network: Network, runtime: Runtime, storage: str | None = None) -> None:
+    """Write the character file; the arguments are those of `character_bytes`."""
+    data = character_bytes(network, runtime, storage)
+    with atomic_path(path) as temporary:
+        temporary.write_bytes(data)
+
+
+def _packed(sections: Mapping[str, np.ndarray]) -> bytes:
+    table, body = b"", b""
+    start = HEADER + ENTRY * len(sections)
+    for name, array in sections.items():
+        body += bytes(-(start + len(body)) % ALIGNMENT)
+        entry = name.encode().ljust(16, b"\0"), TYPES[array.dtype.name], start + len(body), array.size
+        table += struct.pack("<16sQQQ", *entry)
+        body += np.ascontiguousarray(array, array.dtype.newbyteorder("<")).tobytes()
+    content = table + body
+    size = HEADER + len(content)
+    header = struct.pack("<8sIIQII", MAGIC, VERSION, ORDER_MARK, size, zlib.adler32(content), len(sections))
+    return header.ljust(HEADER, b"\0") + content
+
+
+def _body_sections(network: Network) -> Sections:
+    """The skeleton, the columns of X, and the state in which a character starts."""
+    skeleton, layout = network.skeleton, network.layout
+    assert skeleton is not None
+    legs = leg_joints(skeleton)
+    state = start_characters(network, 1, np.zeros((1, 2)), np.zeros(1))
+    starts = {
+        "start_path": state.position, "start_facing": state.direction, "start_gait": state.gait,
+        "start_joints": state.joint_position, "start_speeds": state.joint_velocity,
+        "start_turns": state.joint_rotation,
+    }  # fmt: skip
+    columns = [np.arange(layout.x_size)[layout.x_channel(name)] for name, _ in layout.channels]
+    return {
+        "x_first": np.array([layout.blocks("x")[name].start for name in BODY], np.int32),
+        "x_channels": np.concatenate([np.zeros(0, int), *columns]).astype(np.int32),
+        "parents": np.array(skeleton.parents, np.int32),
+        "offsets": np.asarray(skeleton.offsets, float).ravel(),
+        "legs": legs.ravel().astype(np.int32),
+        "parts": foot_parts(skeleton, legs).ravel().astype(np.uint8),
+        "sole": np.asarray(sole_heights(network, legs), float),
+        "ahead": rest_facing(skeleton),
+        **{name: np.asarray(array[0], float).ravel() for name, array in starts.items()},
+    }
+
+
+def _channel_sections(network: Network, runtime: Runtime) -> Sections:
+    """The channels with their names and limits, and the names of joints and gaits."""
+    skeleton = network.skeleton
+    assert skeleton is not None
+    parts: list[str] = []
+    limits: list[Array] = [np.zeros(0)]
+    of_column: dict[str, list[Array]] = {"channel_of": [], "rates": [], "scales": [], "highest": []}
+    levels = np.zeros(len(network.channels), np.int32)
+    for number, (name, labels) in enumerate(network.channels.items()):
+        parts += list(channel_display(name, skeleton, labels, network.trained_labels(name)).spoken_names)
+        rate = runtime.rates.get(name, channel(name).rate) / FPS
+        entries = number, rate, runtime.scales.get(name, 1.0), channel(name).highest
+        for values, entry in zip(of_column.values(), entries, strict=True):
+            values.append(np.full(len(labels), entry))
+        limit = network.limits.get(name) if runtime.limits else None
+        if limit is not None:
+            levels[number] = len(limit.levels)
+            limits += [limit.levels, limit.usual, limit.speeds.ravel()]
+    columns = [label for of_channel in network.channels.values() for label in of_channel]
+    names = [*skeleton.joints, *network.gaits, *network.channels, *columns, *parts]
+    joined = {key: np.concatenate([np.zeros(0), *values]).astype(float) for key, values in of_column.items()}
+    return {
+        **joined,
+        "channel_of": joined["channel_of"].astype(np.int32),
+        "limit_levels": levels,
+        "limits": np.concatenate(limits).astype(float),
+        "names": np.frombuffer("".join(f"{name}\0" for name in names).encode(), np.uint8),
+    }

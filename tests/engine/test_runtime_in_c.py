@@ -1,0 +1,259 @@
+"""The runtime in C moves characters as the one in Python does, and refuses what it cannot use."""
+
+from __future__ import annotations
+
+import importlib.util
+import re
+import shutil
+import subprocess
+import zlib
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import pytest
+
+from hobble.core.errors import HobbleError
+from hobble.core.skeleton import Skeleton
+from hobble.engine.compile import compile_c
+from hobble.engine.export import EXAMPLES, SOURCES, export_engine
+from hobble.engine.hob import character_bytes
+from hobble.engine.traces import SITUATIONS, trace
+from hobble.runtime.animation import ProceduralAnimation
+from hobble.runtime.options import Runtime
+from tests.engine.networks import network_of
+
+WARNINGS = ("-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic")
+RUNTIME_C = SOURCES / "hobble.c"
+KINDS = ("pfnn", "plain", "mann", "matching")
+
+
+@pytest.fixture(scope="module")
+def built_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The runtime as a shared library, and the program that checks traces, compiled by clang (as zig)."""
+    folder = tmp_path_factory.mktemp("engine")
+    compile_c([RUNTIME_C], folder / "libhobble.so", [*WARNINGS, "-O2", "-shared", "-fPIC"])
+    compile_c([RUNTIME_C, EXAMPLES / "check_traces.c"], folder / "check_traces", [*WARNINGS, "-O2"])
+    return folder
+
+
+@pytest.fixture(scope="module")
+def binding() -> ModuleType:
+    """The example in Python."""
+    spec = importlib.util.spec_from_file_location("hobble_ctypes", EXAMPLES / "hobble_ctypes.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.fixture(scope="module")
+def start(
+    built_folder: Path, binding: ModuleType, holden31: Skeleton, tmp_path_factory: pytest.TempPathFactory
+) -> Callable[..., Any]:
+    """start(count): characters of a network of kind pfnn."""
+    file = character_bytes(network_of("pfnn", holden31, tmp_path_factory.mktemp("pfnn")), Runtime())
+    return lambda count=1: binding.Characters(built_folder / "libhobble.so", file, count)
+
+
+@pytest.mark.parametrize(
+    ("kind", "mode", "storage", "options"),
+    [
+        ("pfnn", "cubic", "float32", {}),
+        ("pfnn", "linear", "int16", {"steering": 0.0}),
+        ("pfnn", "constant", "float32", {"foot_locking": False, "limits": False}),
+        ("plain", "cubic", "float32", {"scales": {"injury": 2.0}, "rates": {"mood": 0.3}}),
+        ("mann", "cubic", "int16", {}),
+        ("matching", "cubic", "float32", {}),
+        ("matching", "cubic", "int16", {"steering": 0.0}),
+    ],
+)
+def test_c_moves_a_character_as_python_does(
+    kind: str,
+    mode: Any,
+    storage: str,
+    options: dict[str, Any],
+    built_folder: Path,
+    holden31: Skeleton,
+    tmp_path: Path,
+) -> None:
+    """Within 1e-3 cm after 60 frames, and .5 cm after 3,600: `check_traces` knows the limits.
+
+    In the mode constant, the made-up weights jump from one phase to the next. A frame that falls on the other
+    side of a jump, by rounding, makes another walk.
+    """
+    network, runtime = network_of(kind, holden31, tmp_path), Runtime(mode=mode, **options)
+    (tmp_path / "character.hob").write_bytes(character_bytes(network, runtime, storage))
+    for name, situation in SITUATIONS.items():
+        frames = 3600 if name == "hills" and mode != "constant" else 60
+        (tmp_path / f"{name}.trace").write_bytes(trace(network, runtime, situation, frames, storage))
+    command = [built_folder / "check_traces", tmp_path / "character.hob", *tmp_path.glob("*.trace")]
+    found = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert found.returncode == 0, found.stdout + found.stderr
+    assert len(found.stdout.splitlines()) == len(SITUATIONS)
+
+
+def test_the_made_up_networks_use_the_whole_runtime(holden31: Skeleton, tmp_path: Path) -> None:
+    """Feet are held, step and are lifted, so that the comparison means something."""
+    animation = ProceduralAnimation(network_of("pfnn", holden31, tmp_path))
+    seen = np.zeros(3, int)
+    for frame in range(600):
+        animation.next_pose((0, 2.5 * (frame % 200 < 150)), injury={"Hips-LHipJoint": 4}, mood={"sad": 0.5})
+        state = animation.state
+        seen += (state.foot_lock == 1).any(), (state.foot_step > 0).any(), (state.foot_lift > 1).any()
+    assert (seen > 10).all(), seen
+
+
+def test_a_crowd_moves_as_single_characters_do(start: Callable[..., Any]) -> None:
+    crowd, targets = start(9), [(2.5 * np.sin(i), 2.5 * np.cos(i)) for i in range(9)]
+    alone = [start() for _ in range(9)]
+    for frame in range(90):
+        for i, target in enumerate(targets):
+            crowd.aim(i, target, gait="walk" if i % 2 else None)
+            alone[i].aim(0, target, gait="walk" if i % 2 else None)
+            if frame == 30:
+                crowd.set(i, "injury", "left thigh", i)
+                alone[i].set(0, "injury", "left thigh", i)
+        crowd.frame()
+        for each in alone:
+            each.frame()
+    places = np.array([crowd.array("positions", i, 93) for i in range(9)])
+    np.testing.assert_allclose(places, [each.array("positions", 0, 93) for each in alone], atol=1e-3)
+
+
+def test_names_values_and_errors(start: Callable[..., Any]) -> None:
+    characters = start()
+    by_label = characters.library.hobble_column(characters.handle, None, b"LeftUpLeg-LeftLeg")
+    assert characters.library.hobble_column(characters.handle, b"injury", b"left thigh") == by_label >= 0
+    assert characters.library.hobble_column(characters.handle, b"mood", b"left thigh") == -1
+    for channel, name, value in (
+        ("injury", "left ear", 1),
+        ("injury", "left thigh", 10.1),
+        ("mood", "sad", np.nan),
+    ):
+        with pytest.raises(ValueError, match=r"there is no such|not a number"):
+            characters.set(0, channel, name, value)
+    characters.set(0, "mood", "sad", 1)
+    for target in ((0, 31), (np.nan, 0), (np.inf, 0)):
+        characters.aim(0, target)
+        with pytest.raises(ValueError, match="the target is not finite"):
+            characters.frame()
+    with pytest.raises(ValueError, match="no such"):
+        characters.reset(1, 0, 0, 0)
+    with pytest.raises(ValueError, match="no such"):
+        characters.aim(0, (0, 0), gait="moonwalk")
+
+
+def test_a_ground_that_fails_leaves_the_characters_as_they_were(
+    start: Callable[..., Any], binding: ModuleType
+) -> None:
+    characters, other = start(2), start(2)
+    for each in (characters, other):
+        for i in range(2):
+            each.aim(i, (0, 2.5))
+    for frame in range(40):
+        for height in (np.nan, 1e8) if frame % 10 == 5 else ():
+            with pytest.raises(ValueError, match="the ground"):
+                characters.frame(binding.ground_from(lambda x, z, height=height: height if x < 20 else 0))
+        slope = binding.ground_from(lambda x, z: 0.1 * z)
+        characters.frame(slope)
+        other.frame(slope)
+    for name, size in (("positions", 93), ("rotations", 124), ("state", 6)):
+        assert list(characters.array(name, 1, size)) == list(other.array(name, 1, size))
+
+
+def test_a_copied_character_goes_on_as_its_original(start: Callable[..., Any], binding: ModuleType) -> None:
+    characters = start(2)
+    for frame in range(60):
+        for i in range(2):
+            characters.aim(i, (0.5, 2.5))
+        if frame == 30:
+            shift = map(binding.ctypes.c_double, (100.0, -40.0))
+            assert characters.library.hobble_copy(characters.handle, 1, characters.handle, 0, *shift) == 0
+        characters.frame()
+    first, second = (np.reshape(characters.array("positions", i, 93), (-1, 3)) for i in range(2))
+    np.testing.assert_allclose(second - first, np.tile([100, 0, -40], (31, 1)), atol=1e-3)
+
+
+def test_damaged_files_are_refused_with_a_reason(
+    built_folder: Path, binding: ModuleType, holden31: Skeleton, tmp_path: Path
+) -> None:
+    network = network_of("pfnn", holden31, tmp_path)
+    whole = character_bytes(network, Runtime())
+
+    def reason(file: bytes) -> str:
+        with pytest.raises(ValueError, match="the character file") as caught:
+            binding.Characters(built_folder / "libhobble.so", file)
+        return str(caught.value)
+
+    def signed(file: bytearray) -> bytes:
+        file[24:28] = zlib.adler32(file[64:]).to_bytes(4, "little")
+        return bytes(file)
+
+    assert "shorter" in reason(whole[:63])
+    assert "does not begin" in reason(b"HOBBLE\n\n" + whole[8:])
+    assert "another version" in reason(whole[:8] + b"\2" + whole[9:])
+    assert "another size" in reason(whole[:-1])
+    assert "damaged" in reason(whole[:5000] + bytes([whole[5000] ^ 1]) + whole[5001:])
+    changed = bytearray(whole)
+    at = whole.index(b"parents\0")
+    place = int.from_bytes(whole[at + 24 : at + 32], "little")
+    changed[place + 8 : place + 12] = (40).to_bytes(4, "little")
+    assert "parents" in reason(signed(changed))
+    with pytest.raises(HobbleError, match="no skeleton"):
+        character_bytes(replace(network, skeleton=None), Runtime())
+
+
+@pytest.mark.parametrize("count", [160, pytest.param(3000, marks=pytest.mark.slow)])
+def test_mutated_files_are_refused_or_make_finite_poses(
+    count: int, holden31: Skeleton, tmp_path: Path
+) -> None:
+    """Under AddressSanitizer and UBSan, with gcc; with zig's clang and only UBSan where there is no gcc."""
+    sources = [RUNTIME_C, Path(__file__).with_name("mutate.c")]
+    sanitizers = "-fsanitize=address,undefined" if shutil.which("gcc") else "-fsanitize=undefined"
+    options = ["-g", "-O1", *WARNINGS, f"-I{SOURCES}", sanitizers, "-fno-sanitize-recover=all"]
+    if shutil.which("gcc"):
+        subprocess.run(["gcc", *options, *sources, "-o", tmp_path / "mutate", "-lm"], check=True)
+    else:
+        compile_c(sources, tmp_path / "mutate", options)
+    for kind in KINDS:
+        file = tmp_path / f"{kind}.hob"
+        file.write_bytes(character_bytes(network_of(kind, holden31, tmp_path), Runtime()))
+        command = [tmp_path / "mutate", file, str(count // 4), "11"]
+        found = subprocess.run(command, capture_output=True, text=True, check=False)
+        assert found.returncode == 0, found.stdout + found.stderr
+        refused = int(re.findall(r"(\d+) of", found.stdout)[0])
+        assert 0.3 * count / 4 < refused < 0.95 * count / 4
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("target", ["x86_64-windows-gnu", "aarch64-macos", "aarch64-linux-gnu"])
+def test_the_runtime_compiles_for_other_machines(target: str, tmp_path: Path) -> None:
+    compile_c([RUNTIME_C], tmp_path / "hobble.o", [*WARNINGS, "-O3", "-target", target, "-c"])
+    compile_c(
+        [RUNTIME_C, EXAMPLES / "example.c"], tmp_path / "example", [*WARNINGS, "-O3", "-target", target]
+    )
+
+
+def test_the_exported_folder_is_complete(
+    holden31: Skeleton, tmp_path: Path, built_folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its examples compile in it, and its traces agree with its character."""
+    monkeypatch.setattr("hobble.engine.traces.FRAMES", 40)
+    export_engine(tmp_path / "engine", network_of("matching", holden31, tmp_path), Runtime())
+    folder = tmp_path / "engine"
+    assert (folder / "README.md").stat().st_size > 1000
+    assert not list(folder.rglob("__pycache__"))
+    traces = sorted((folder / "traces").iterdir())
+    assert len(traces) == 8
+    command = [built_folder / "check_traces", folder / "character.hob", *traces]
+    assert subprocess.run(command, check=False).returncode == 0
+    compile_c([folder / "hobble.c", folder / "examples/example.c"], folder / "example", WARNINGS)
+    said = subprocess.run(
+        [folder / "example", folder / "character.hob"], capture_output=True, text=True, check=True
+    )
+    assert len(said.stdout.splitlines()) == 5

@@ -1,0 +1,11 @@
+"""Creates results/<configuration>/export/engine/: the character for game engines."""
+
+from hobble.engine.export import export_engine
+from hobble.models.load import load_network
+from hobble.runtime.options import Runtime
+from hobble.workflow.job import job
+
+with job(snakemake) as log:
+    network = load_network(snakemake.input.weights)
+    export_engine(snakemake.output.folder, network, Runtime.model_validate(snakemake.params.runtime))
+    log.info("wrote %s", snakemake.output.folder)
