@@ -24,7 +24,7 @@ HIDDEN = (24, 20)
 def shared_fields(skeleton: Skeleton) -> dict[str, Any]:
     """The fields of all kinds: two channels with limits, and outputs in which feet land and lift."""
     links = skeleton.link_names
-    layout = RowLayout(len(skeleton.joints), channels=(("injury", len(links)), ("mood", 3)))
+    layout = RowLayout(len(skeleton.joints), channels=(("injury", len(links)), ("mood", 3), ("guarding", 1)))
     rng = np.random.default_rng(5)
     y, spread = np.zeros(layout.y_size, np.float32), np.zeros(layout.y_size, np.float32)
     rest = np.tile([1.0, 0, 0, 0], (1, layout.joints, 1))
@@ -50,12 +50,13 @@ def shared_fields(skeleton: Skeleton) -> dict[str, Any]:
         name: Limits(
             np.array([0, 0.4, 1]) * highest, speed[:, :columns], speed[:, :columns, 0].max(axis=1) / 1.3
         )
-        for (name, columns), highest, speed in zip(layout.channels, (10.0, 1.0), speeds, strict=True)
+        for (name, columns), highest, speed in zip(layout.channels, (10.0, 1.0), speeds, strict=False)
     }
     return {
         "x_mean": x_mean, "x_std": x_std, "y_mean": y, "y_std": spread, "layout": layout,
-        "skeleton": skeleton, "channels": {"injury": links, "mood": ("happy", "sad", "angry")},
-        "limits": limits, "training_facts": facts,
+        "skeleton": skeleton, "limits": limits,
+        "channels": {"injury": links, "mood": ("happy", "sad", "angry"), "guarding": ("guarding",)},
+        "training_facts": facts,
     }  # fmt: skip
 
 

@@ -141,12 +141,15 @@ def _channel_sections(network: Network, runtime: Runtime) -> Sections:
     assert skeleton is not None
     parts: list[str] = []
     limits: list[Array] = [np.zeros(0)]
-    of_column: dict[str, list[Array]] = {"channel_of": [], "rates": [], "scales": [], "highest": []}
+    of_column: dict[str, list[Array]] = {
+        name: [] for name in ("channel_of", "rates", "scales", "highest", "defaults")
+    }
     levels = np.zeros(len(network.channels), np.int32)
     for number, (name, labels) in enumerate(network.channels.items()):
         parts += list(channel_display(name, skeleton, labels, network.trained_labels(name)).spoken_names)
-        rate = runtime.rates.get(name, channel(name).rate) / FPS
-        entries = number, rate, runtime.scales.get(name, 1.0), channel(name).highest
+        definition, scale = channel(name), runtime.scales.get(name, 1.0)
+        rate = runtime.rates.get(name, definition.rate) / FPS
+        entries = number, rate, scale, definition.highest, definition.default / scale
         for values, entry in zip(of_column.values(), entries, strict=True):
             values.append(np.full(len(labels), entry))
         limit = network.limits.get(name) if runtime.limits else None

@@ -107,7 +107,7 @@ def trace(
         }
         pose = animation.next_pose(velocity, facing, situation.gait, terrain=terrain, **values)
         given = [
-            values.get(name, {}).get(label, 0.0)
+            values.get(name, {}).get(label, channel(name).default)
             for name, labels in network.channels.items()
             for label in labels
         ]

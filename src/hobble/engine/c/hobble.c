@@ -48,7 +48,7 @@ enum {
 #define FASTEST_TARGET 30.0
 #define TURN_IN_PLACE RADIANS(20)
 #define JOG_FROM 5.0
-#define LAME_BELOW 4.5
+#define LAME_BELOW 2.2
 #define HURRY_FACTOR 1.25
 #define SUM_NORM 3.0
 #define SLOWEST_SHARE 0.1
@@ -162,7 +162,7 @@ typedef struct { /* a character file, read only */
     const int32_t *inputs, *x_first, *x_channels, *parents, *legs, *channel_of;
     const uint8_t *parts;
     const float *x_mean, *x_inverse, *x_low, *x_high, *y_low, *y_high;
-    const double *offsets, *sole, *ahead, *rates, *scales, *highest;
+    const double *offsets, *sole, *ahead, *rates, *scales, *highest, *defaults;
     const double *start_path, *start_direction, *start_gait, *start_joints, *start_velocities,
         *start_rotations;
     channel channels[MOST_CHANNELS];
@@ -422,6 +422,7 @@ static void read_channels(reader *r, model *m) {
     m->rates = doubles(r, "rates", columns, 0, 1e9);
     m->scales = doubles(r, "scales", columns, 1e-9, 1e9);
     m->highest = doubles(r, "highest", columns, 0, 1e6);
+    m->defaults = doubles(r, "defaults", columns, 0, 1e6);
     const int32_t *levels = indices(r, "limit_levels", channels, 0, MOST_LEVELS);
     if (r->failed) return;
     for (uint64_t k = 1; k < columns; k++) require(r, m->channel_of[k - 1] <= m->channel_of[k], "channel_of");
@@ -1075,7 +1076,7 @@ static void limit_target(const model *m, const double *values, goal *target) {
         }
     }
     if (!first) return;
-    double total = 0, weighted = 0, hurry = 1;
+    double total = 0, weighted = 0, usual = 0, hurry = 1;
     for (int g = 0; g < GAITS; g++)
         if (allowed[g] < first->usual[g]) allowed[g] = first->usual[g] * share[g];
     if (allowed[m->jog] < LAME_BELOW) {
@@ -1087,9 +1088,12 @@ static void limit_target(const model *m, const double *values, goal *target) {
         if (g != m->stand && target->gait[g] > 0) {
             total += target->gait[g];
             weighted += target->gait[g] * allowed[g];
+            usual += target->gait[g] * first->usual[g];
         }
     double highest = total > 0 ? hurry * weighted / larger(total, 1e-9) : INFINITY;
-    double held = smaller(1, highest / larger(length2(target->velocity[0], target->velocity[1]), 1e-9));
+    /* A target below the usual speed is slowed by the same share as the usual speed would be. */
+    double asked = length2(target->velocity[0], target->velocity[1]), usual_speed = usual / larger(total, 1e-9);
+    double held = smaller(1, highest / larger(larger(asked, usual_speed), 1e-9));
     target->velocity[0] *= held;
     target->velocity[1] *= held;
 }
@@ -1759,7 +1763,7 @@ static void start_character(const hobble *h, character *c, double x, double z, d
     }
     memcpy(c->pose_position, c->joint_position, (size_t)m->size[JOINTS] * sizeof *c->pose_position);
     memcpy(c->pose_rotation, c->joint_rotation, (size_t)m->size[JOINTS] * sizeof *c->pose_rotation);
-    memset(c->values, 0, (size_t)m->size[COLUMNS] * sizeof *c->values);
+    memcpy(c->values, m->defaults, (size_t)m->size[COLUMNS] * sizeof *c->values);
     memset(c->memory, 0, (size_t)h->memory_size * sizeof *c->memory);
     c->phase = m->number[START_PHASE];
     c->smoothed_direction[0] = sine;
@@ -2047,7 +2051,7 @@ hobble *hobble_create(const void *file, size_t bytes, int characters, void *memo
     if (h->model.size[FORM] == RECORDED) measure_blocks(h);
     for (int i = 0; i < characters; i++) {
         lay_out(h, &h->state[i], h->numbers + (size_t)i * h->number_count);
-        start_character(h, &h->state[i], 0, 0, 0);
+        hobble_reset(h, i, 0, 0, 0);
     }
     return h;
 }
@@ -2070,7 +2074,7 @@ static int has_character(const hobble *h, int i) { return i >= 0 && i < h->chara
 int hobble_reset(hobble *h, int i, double x, double z, double yaw) {
     if (!has_character(h, i)) return HOBBLE_NO_SUCH;
     if (!(fabs(x) <= FARTHEST) || !(fabs(z) <= FARTHEST) || !(fabs(yaw) <= 1e6)) return HOBBLE_BAD_VALUE;
-    memset(h->state[i].targets, 0, (size_t)h->model.size[COLUMNS] * sizeof(double));
+    memcpy(h->state[i].targets, h->model.defaults, (size_t)h->model.size[COLUMNS] * sizeof(double));
     start_character(h, &h->state[i], x, z, yaw);
     return HOBBLE_OK;
 }
