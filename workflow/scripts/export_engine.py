@@ -7,5 +7,6 @@ from hobble.workflow.job import job
 
 with job(snakemake) as log:
     network = load_network(snakemake.input.weights)
-    export_engine(snakemake.output.folder, network, Runtime.model_validate(snakemake.params.runtime))
+    runtime = Runtime.model_validate(snakemake.params.runtime)
+    export_engine(snakemake.output.folder, network, runtime, snakemake.input.wasm)
     log.info("wrote %s", snakemake.output.folder)

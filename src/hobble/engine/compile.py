@@ -11,8 +11,11 @@ from hobble.core.errors import HobbleError
 from hobble.core.files import atomic_path
 from hobble.engine.export import SOURCES
 
-# For WebAssembly: a module without a main function, with vectors of 128 bits.
-WASM_OPTIONS = ("-target", "wasm32-wasi", "-mexec-model=reactor", "-O3", "-msimd128", "-Wl,--export-dynamic")
+# A module without a main function, with vectors of 128 bits, without debug information.
+WASM_OPTIONS = (
+    *("-target", "wasm32-wasi", "-mexec-model=reactor", "-O3", "-msimd128", "-s"),
+    *("-Wl,--export-dynamic", "-Wl,--export=__heap_base"),
+)
 
 
 def compile_c(sources: Sequence[str | Path], target: str | Path, options: Sequence[str]) -> None:
@@ -23,3 +26,8 @@ def compile_c(sources: Sequence[str | Path], target: str | Path, options: Sequen
         process = subprocess.run(command, capture_output=True, text=True, check=False)
         if process.returncode:
             raise HobbleError(f"{target}: the compiler says: {process.stderr.strip()[:1000]}")
+
+
+def compile_wasm(target: str | Path) -> None:
+    """Compile the runtime to WebAssembly. The first time takes half a minute: zig builds its C library."""
+    compile_c([SOURCES / "hobble.c", SOURCES / "hobble_web.c"], target, WASM_OPTIONS)

@@ -15,16 +15,18 @@ SOURCES = Path(__file__).parent / "c"
 EXAMPLES = Path(__file__).parent / "examples"
 
 
-def export_engine(folder: str | Path, network: Network, runtime: Runtime) -> None:
+def export_engine(folder: str | Path, network: Network, runtime: Runtime, wasm: str | Path) -> None:
     """Write the runtime in C, character.hob, README.md, examples and golden traces into a folder.
 
-    Raises HobbleError for a network without a skeleton.
+    wasm: the runtime in WebAssembly (`hobble.engine.compile.compile_wasm`), which is copied. Raises
+    HobbleError for a network without a skeleton.
     """
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
     write_character(folder / "character.hob", network, runtime)
     write_traces(folder / "traces", network, runtime)
     copies = {source: folder / source.name for source in SOURCES.iterdir()}
+    copies[Path(wasm)] = folder / "hobble.wasm"
     for source in filter(Path.is_file, EXAMPLES.rglob("*")):
         copies[source] = folder / "examples" / source.relative_to(EXAMPLES)
     for source, target in copies.items():

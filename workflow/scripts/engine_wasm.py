@@ -1,0 +1,7 @@
+"""Creates results/page/hobble.wasm: the runtime in C, compiled to WebAssembly."""
+
+from hobble.engine.compile import compile_wasm
+from hobble.workflow.job import job
+
+with job(snakemake):
+    compile_wasm(snakemake.output.wasm)
