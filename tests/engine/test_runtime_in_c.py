@@ -236,13 +236,13 @@ def test_mutated_files_are_refused_or_make_finite_poses(
 def test_webassembly_moves_a_character_as_python_does(holden31: Skeleton, tmp_path: Path) -> None:
     """In Node, on a slope."""
     network = network_of("pfnn", holden31, tmp_path)
-    compile_wasm(tmp_path / "hobble.wasm")
+    compile_wasm(tmp_path / "engine.wasm")
     (tmp_path / "character.hob").write_bytes(character_bytes(network, Runtime()))
     shutil.copyfile(EXAMPLES / "hobble.mjs", tmp_path / "example.mjs")
     (tmp_path / "check.mjs").write_text("""
       import { Characters } from "./example.mjs";
       import { readFileSync } from "node:fs";
-      const c = new Characters(...["hobble.wasm", "character.hob"].map((name) => readFileSync(name)));
+      const c = new Characters(...["engine.wasm", "character.hob"].map((name) => readFileSync(name)));
       c.aim(0, [0, 2.5]);
       c.set(0, "left thigh", 7);
       for (let f = 0; f < 60; f++) c.frame((x, z) => .05 * z);
@@ -259,7 +259,7 @@ def test_webassembly_moves_a_character_as_python_does(holden31: Skeleton, tmp_pa
 @pytest.mark.slow
 @pytest.mark.parametrize("target", ["x86_64-windows-gnu", "aarch64-macos", "aarch64-linux-gnu"])
 def test_the_runtime_compiles_for_other_machines(target: str, tmp_path: Path) -> None:
-    compile_c([RUNTIME_C], tmp_path / "hobble.o", [*WARNINGS, "-O3", "-target", target, "-c"])
+    compile_c([RUNTIME_C], tmp_path / "runtime.o", [*WARNINGS, "-O3", "-target", target, "-c"])
     compile_c(
         [RUNTIME_C, EXAMPLES / "example.c"], tmp_path / "example", [*WARNINGS, "-O3", "-target", target]
     )

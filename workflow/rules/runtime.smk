@@ -95,7 +95,7 @@ rule engine_wasm:
     input:
         sources=keep_local(package.engine_files()),
     output:
-        wasm="results/page/hobble.wasm",
+        wasm="results/page/engine.wasm",
     log:
         "results/page/logs/runtime/engine_wasm.log",
     resources:

@@ -1,4 +1,4 @@
-"""Creates results/page/hobble.wasm: the runtime in C, compiled to WebAssembly."""
+"""Creates results/page/engine.wasm: the runtime in C, compiled to WebAssembly."""
 
 from hobble.engine.compile import compile_wasm
 from hobble.workflow.job import job

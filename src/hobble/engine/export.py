@@ -26,7 +26,7 @@ def export_engine(folder: str | Path, network: Network, runtime: Runtime, wasm: 
     write_character(folder / "character.hob", network, runtime)
     write_traces(folder / "traces", network, runtime)
     copies = {source: folder / source.name for source in SOURCES.iterdir()}
-    copies[Path(wasm)] = folder / "hobble.wasm"
+    copies[Path(wasm)] = folder / "engine.wasm"
     for source in filter(Path.is_file, EXAMPLES.rglob("*")):
         copies[source] = folder / "examples" / source.relative_to(EXAMPLES)
     for source, target in copies.items():

@@ -1,6 +1,6 @@
-// Hobble in JavaScript, in a browser or in Node, by WebAssembly. hobble.wasm and character.hob are bytes (Uint8Array).
+// Hobble in JavaScript, in a browser or in Node, by WebAssembly. engine.wasm and character.hob are bytes (Uint8Array).
 //
-// node hobble.mjs ../hobble.wasm ../character.hob
+// node hobble.mjs ../engine.wasm ../character.hob
 //
 // In a page: const bytes = async (url) => new Uint8Array(await (await fetch(url)).arrayBuffer());
 //            const { Characters } = await import("./hobble.mjs");
