@@ -14,7 +14,7 @@ x, but it would take several times the memory traffic.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numba
 import numpy as np
@@ -24,9 +24,6 @@ from torch.nn.functional import elu
 
 from hobble.core.compiled import njit
 from hobble.models.model import ALL_ROWS
-
-if TYPE_CHECKING:
-    from hobble.models.blend import TrainableBlend
 
 # oneDNN's product of float32 matrices has 512-bit kernels for all processors. PyTorch's default, MKL, has
 # them only for Intel's. For products with fewer multiplications and additions than this, calling it takes
@@ -47,7 +44,7 @@ def product(a: Tensor, b: Tensor) -> Tensor:
 
 
 def evaluate(
-    network: TrainableBlend,
+    network: Any,
     layers: list[Tensor],
     x: Tensor,
     p: Tensor,
@@ -56,8 +53,8 @@ def evaluate(
 ) -> Tensor:
     """Standardised outputs (B, Y) of x (B, X) at phases p (B,), in PyTorch.
 
-    layers: the network's layers, or copies of them. masks: see `AutogradStep.masks`; None without dropout.
-    half: round the factors of the products to bfloat16.
+    network: a `TrainableBlend`. layers: its layers, or copies of them. masks: see `AutogradStep.masks`; None
+    without dropout. half: round the factors of the products to bfloat16.
     """
     gates = network.gate_layers
     c = network.shares(layers[:gates], x, p, masks and masks[:gates])
@@ -76,11 +73,12 @@ def evaluate(
 class AutogradStep:
     """A `TrainingStep` on any device, whose gradient PyTorch finds.
 
-    dropout: share of units dropped before each layer, inputs included. The other units are scaled up. half:
-    round the factors of the products to bfloat16. Sums and everything else stay float32.
+    network: a `TrainableBlend`. dropout: share of units dropped before each layer, inputs included. The other
+    units are scaled up. half: round the factors of the products to bfloat16. Sums and everything else stay
+    float32.
     """
 
-    def __init__(self, network: TrainableBlend, dropout: float, half: bool = False) -> None:
+    def __init__(self, network: Any, dropout: float, half: bool = False) -> None:
         self.network, self.keep, self.half = network, 1.0 - dropout, half
         self.generator = torch.Generator(network.flat.device)
         self.gradients: list[Tensor] = []
