@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import resource
 from pathlib import Path
 
 import numpy as np
@@ -83,11 +82,7 @@ def test_lines_without_end_take_neither_memory_nor_time(tmp_path: Path, what: st
     text, says = ENDLESS[what]
     path = write(tmp_path / "a.bvh", text + "}\nMOTION\n" if "header" in what else text)
 
-    def read() -> None:
-        resource.setrlimit(resource.RLIMIT_CPU, (30, 30))
-        bvh.read_bvh(path)
-
-    refused(read, "a.bvh", says)
+    refused(lambda: bvh.read_bvh(path), "a.bvh", says)
 
 
 def test_a_frame_may_still_run_over_many_lines(tmp_path: Path) -> None:

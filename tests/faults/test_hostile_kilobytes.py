@@ -20,7 +20,7 @@ from hobble.motion.options import ClipMotion
 from .refusals import HEADER, refused, write
 from .texts import SKELETON
 
-STUDY = Study("s", "limp", ("a", "b"), tuple(ShownFilm(i, "one part", ("a",)) for i in range(1, 6)))
+STUDY = Study("s", "limp", ("a", "b"), tuple(ShownFilm(i, "one part", ("a",), (5.0,)) for i in range(1, 6)))
 
 
 def star(joints: int) -> str:
@@ -45,9 +45,14 @@ def answers(path: Path) -> list[FilmAnswer]:
     return read_answers(path, STUDY)
 
 
+def answer(film: int) -> dict[str, Any]:
+    marks = dict.fromkeys(("fluidity", "progress", "realism"), "fair")
+    return {"film": film, "noticed": "yes", **marks, "parts": ["a"]}
+
+
 def saved(**changes: Any) -> str:
     """A file of answers, of which the second is changed."""
-    rows = [{"film": film, "parts": ["a"], "fluid": 3} for film in range(1, 6)]
+    rows = list(map(answer, range(1, 6)))
     rows[1] |= changes
     return json.dumps({"study": "s", "answers": rows})
 
@@ -59,7 +64,7 @@ def films(**changes: Any) -> str:
 
 
 BLANKS = " " * 6000
-MANY = json.dumps({"study": "s", "answers": [{"film": 1, "parts": [], "fluid": 1}] * 50_000})
+MANY = json.dumps({"study": "s", "answers": [answer(1)] * 50_000})
 FILES: dict[str, tuple[str, str, Callable[[Path], Any], str]] = {
     "blanks before a link": ("a.txt", f"frames:10\n1-10 {BLANKS}x\n", status, "line 2: 'x' does not read as"),
     "blanks after a link": ("a.txt", f"frames:10\n1-10 A{BLANKS}[\n", status, "line 2: 'A "),
@@ -71,7 +76,7 @@ FILES: dict[str, tuple[str, str, Callable[[Path], Any], str]] = {
         status,
         "line 102: more than 100 ranges share frame 1",
     ),
-    "a star of 300 joints": ("a.bvh", star(300), clip, "the parts of this rig are in doubt"),
+    "a star of 300 joints": ("a.bvh", star(300), clip, "it is in doubt which joints are which parts"),
     "HIERARCHY 2,000 times": (
         "a.bvh",
         "HIERARCHY " * 2000 + star(1)[9:],
@@ -89,7 +94,7 @@ FILES: dict[str, tuple[str, str, Callable[[Path], Any], str]] = {
     "a film that is true": ("a.json", saved(film=True), answers, "answer 2: film: "),
     "parts that are a number": ("a.json", saved(parts=1), answers, "answer 2: parts: "),
     "a part that is a list": ("a.json", saved(parts=[["a"]]), answers, "answer 2: parts.0: "),
-    "a mark that is NaN": ("a.json", saved(fluid=float("nan")), answers, "not valid JSON: NaN"),
+    "a mark that is NaN": ("a.json", saved(fluidity=float("nan")), answers, "not valid JSON: NaN"),
     "a kind that is a list": ("films.json", films(kind=["one part"]), read_study, "films.0.kind: "),
     "a film without a number": ("films.json", films(film=None), read_study, "films.0.film: "),
     "films in a list": ("films.json", "[1]", read_study, "the questionnaire: "),

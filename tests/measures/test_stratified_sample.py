@@ -171,6 +171,11 @@ def clips(tmp_path: Path) -> dict[str, Path]:
     return files
 
 
+def flat(clip):
+    """The measures of a clip without those of its first positions, which a sample does not have."""
+    return {key: value for key, value in clip.items() if key != "as_published"}
+
+
 def test_accuracy_and_roll_outs_count_each_clip_for_its_kind(tmp_path, clips):
     weights = tmp_path / "w.npz"
     np.savez(weights, **make_network())
@@ -181,7 +186,7 @@ def test_accuracy_and_roll_outs_count_each_clip_for_its_kind(tmp_path, clips):
     found = measure_accuracy(weights, clips, splits, "holden", sample=sample)
     means = {clip["clip"]: clip["mean"] for clip in everything["clips"]}
     assert [clip["clip"] for clip in found["clips"]] == list("abcde")
-    assert found["clips"] == [pytest.approx(clip) for clip in everything["clips"][:5]]
+    assert list(map(flat, found["clips"])) == [pytest.approx(flat(clip)) for clip in everything["clips"][:5]]
     first = np.average([means[n] for n in "abc"], weights=[20, 25, 30])
     second = np.average([means[n] for n in "de"], weights=[35, 40])
     assert found["train"]["mean"] == pytest.approx((300 * first + 165 * second) / 465)
@@ -219,7 +224,7 @@ def test_all_excerpts_of_a_clip_together_measure_what_the_clip_does(tmp_path):
     sample = Sample((Stratum("train", 3, 120, tuple(parts)),), 1)
     given = weights, {"a": file}, {"a": "train"}, "holden"
     cut, uncut = measure_accuracy(*given, sample=sample), measure_accuracy(*given)
-    assert cut["clips"] == [pytest.approx(uncut["clips"][0])]
+    assert list(map(flat, cut["clips"])) == [pytest.approx(flat(uncut["clips"][0]))]
     assert cut["train"]["mean_of_clips"] == pytest.approx(uncut["train"]["mean_of_clips"])
     assert [(e["first_frame"], e["last_frame"]) for e in cut["excerpts"]] == [(0, 39), (40, 79), (80, 119)]
     rolled = measure_roll_outs(*given, lengths=(1, 20), sample=sample)
@@ -243,8 +248,8 @@ def test_facts_of_a_clip_survive_their_file(tmp_path):
     save_summary(tmp_path / "a.json", found)
     assert load_summary(tmp_path / "a.json") == found
     (tmp_path / "a.json").write_text('{"clip": "a"}')
-    with pytest.raises(InputError, match="not the summary of a clip"):
+    with pytest.raises(InputError, match=r"a\.json: the summary: "):
         load_summary(tmp_path / "a.json")
     save_summary(tmp_path / "a.json", RowsSummary("a", 30, ()))
-    with pytest.raises(InputError, match="not the summary of a clip"):
+    with pytest.raises(InputError, match="has not one kind for each excerpt"):
         load_summary(tmp_path / "a.json")

@@ -245,4 +245,6 @@ def test_real_clips_stand_on_the_fitted_ground(shared: Path, root: Path, made: S
         assert fits.foot_error[..., 0].max() < 1, file
         assert fits.foot_below.max() <= 1, file
         if file.startswith("pfnn") and kind == "flat":
-            assert np.all(fits.heights == 0)
+            # Its left leg is 2 % shorter than its right one. On equal legs, the feet stand 1.5 cm apart in
+            # height, and the ground meets them.
+            assert np.abs(fits.heights).max() < 3.5
