@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from hobble.channels import channel
 from hobble.core import quat
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton, local_rotations
@@ -208,7 +209,9 @@ def _commands_of(part: ClipPart, skeleton: Skeleton) -> Iterator[Command]:
     rows = part.load().rows
     layout = rows.layout
     for captured in captured_stretches(rows):
-        if any(np.any(values) for values in captured.channels.values()):
+        # Guarding, whose default is not 0, shows in a hurt body only.
+        told = [values for name, values in captured.channels.items() if channel(name).default == 0]
+        if any(map(np.any, told)):
             continue
         yaw = headings(rows.y[captured.rows][:, layout.y_turn][:, 0].astype(float))
         turns = rows.y[captured.rows][:, layout.y_joint_rotation].reshape(len(captured), -1, 3)
