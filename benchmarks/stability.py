@@ -19,7 +19,8 @@ import numpy as np
 
 from hobble.core.errors import HobbleError
 from hobble.core.quat import Array
-from hobble.measures.walks import feet_in_stance, foot_slide, largest_turn, skating
+from hobble.measures.motion_quality import skating
+from hobble.measures.walks import feet_in_stance, foot_slide, largest_turn
 from hobble.models.load import load_network
 from hobble.models.network import Network
 from hobble.models.pfnn import OPTIONS
@@ -105,7 +106,7 @@ def stability(
     smallest and largest height of the hips above the ground. `largest_turn_degrees`: largest turn of a joint
     in one frame, in the world. `foot_slide_cm`: mean slide of a toe in a stance. `steps`: number of stances.
     `foot_down_share`: share of the frames in which at least one foot stands. `skating_cm`: how far a toe
-    skates in a frame (`motion_measures.skating`), mean over feet and frames. `stable`: whether all values are
+    skates in a frame (`motion_quality.skating`), mean over feet and frames. `stable`: whether all values are
     within LIMITS.
     """
     animation = ProceduralAnimation(network, **dict(runtime or Runtime()))

@@ -7,6 +7,7 @@ import pytest
 
 from hobble.core import quat
 from hobble.core.skeleton import Skeleton, forward_kinematics
+from hobble.measures.motion_quality import skating
 from hobble.measures.walks import (
     asymmetry,
     bend,
@@ -16,7 +17,6 @@ from hobble.measures.walks import (
     in_root_coordinates,
     largest_turn,
     runs_of_true,
-    skating,
 )
 
 

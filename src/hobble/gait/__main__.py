@@ -1,8 +1,8 @@
 """An earlier name of `hobble gait`, kept for a version."""
 
+import runpy
 import sys
 
-from hobble.cli.__main__ import main
-
 if __name__ == "__main__":
-    sys.exit(main(["gait", *sys.argv[1:]]))
+    sys.argv.insert(1, "gait")
+    runpy.run_module("hobble.cli", run_name="__main__")

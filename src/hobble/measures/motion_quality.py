@@ -100,8 +100,7 @@ def joint_update(rotations: Array) -> float:
 
     rotations: (F, J, 4) quaternions relative to the parent.
     """
-    dot = np.abs(np.sum(rotations[1:] * rotations[:-1], axis=-1, dtype=float))
-    return float(np.degrees(2 * np.arccos(np.minimum(dot, 1.0))).mean())
+    return float(np.degrees(quat.angle(rotations[:-1], rotations[1:])).mean())
 
 
 def contact_speed(feet: Array, standing: Array) -> float:

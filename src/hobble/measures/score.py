@@ -8,6 +8,7 @@ import math
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -44,7 +45,7 @@ from hobble.motion.edit import resample
 from hobble.motion.make import load_source
 from hobble.motion.options import ClipMotion
 from hobble.motion.read import read_bvh
-from hobble.motion.skeleton_file import find_skeleton, load_skeleton, skeleton_folder
+from hobble.motion.skeleton_file import KnownSkeleton, find_skeleton, load_skeleton, skeleton_folder
 
 SKELETON = "holden31"  # its roles, such as hips and left heel, are looked for in each file
 SHORTEST = 1.0  # seconds; shorter clips are left out
@@ -76,6 +77,11 @@ class Take:
     clip: Clip
     rig: tuple[Any, ...] = field(repr=False)
     feet: Array = field(repr=False)
+
+    @cached_property
+    def standing(self) -> Array:
+        """(4,) heights at which the points of its feet stand, cm."""
+        return standing_heights(self.feet)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -118,11 +124,11 @@ def load_takes(folder: Path, source_fps: float | None) -> tuple[list[Take], dict
 
     Raises InputError if no clip is left.
     """
-    takes, failed = [], dict[str, str]()
+    takes, failed, roles = [], dict[str, str](), load_skeleton(find_skeleton(SKELETON))
     files = tqdm(clips_in(folder).items(), unit=" clips", disable=None, file=sys.stderr, leave=False)
     for name, file in files:
         try:
-            takes.append(load_take(name, file, source_fps))
+            takes.append(load_take(name, file, roles, source_fps))
         except HobbleError as error:
             failed[str(file)] = str(error)
             files.write(str(error), file=sys.stderr)
@@ -131,11 +137,14 @@ def load_takes(folder: Path, source_fps: float | None) -> tuple[list[Take], dict
     return takes, failed
 
 
-def load_take(name: str, file: Path, source_fps: float | None) -> Take:
-    """A clip as it is, in cm, Y up, at 60 frames a second, on its own rig. InputError for a bad file."""
+def load_take(name: str, file: Path, roles: KnownSkeleton, source_fps: float | None) -> Take:
+    """A clip as it is, in cm, Y up, at 60 frames a second, on its own rig. InputError for a bad file.
+
+    roles: a skeleton whose roles are looked for in the file.
+    """
     # `leave` and `rocky`: what is wrong with the motion and with its height must not be mended.
     options = ClipMotion(source_fps=source_fps, defects="leave", ground="rocky", accept_doubt=True)
-    source = load_source(read_bvh(file), load_skeleton(find_skeleton(SKELETON)), skeleton_folder(), options)
+    source = load_source(read_bvh(file), roles, skeleton_folder(), options)
     clip = resample(source.clip, FPS)
     if len(clip) < SHORTEST * FPS:
         raise InputError(
@@ -175,13 +184,13 @@ def _standing(takes: Sequence[Take]) -> dict[tuple[Any, ...], Array]:
     """Rig -> (4,) heights of its standing feet, the median over its clips."""
     of_rig: dict[tuple[Any, ...], list[Array]] = {}
     for take in takes:
-        of_rig.setdefault(take.rig, []).append(standing_heights(take.feet))
+        of_rig.setdefault(take.rig, []).append(take.standing)
     return {rig: np.median(heights, axis=0) for rig, heights in of_rig.items()}
 
 
 def _of_clip(take: Take, ground: Array) -> dict[str, float]:
     """The measures OF_CLIP of one clip, and its seconds. ground: (4,) heights of standing feet of its rig."""
-    body, standing = joints_with(take.clip.skeleton, BODY), standing_heights(take.feet)
+    body, standing = joints_with(take.clip.skeleton, BODY), take.standing
     depth, deep_share = penetration(take.feet, standing)
     return {
         "seconds": len(take.clip) / FPS,

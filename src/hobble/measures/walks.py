@@ -20,8 +20,6 @@ from hobble.runtime.options import Runtime
 
 STANCE = 0.5  # a foot counts as standing if its predicted contact is at least this
 SHORTEST_STANCE = 4  # frames; a shorter contact is neither a stance nor a step
-# A toe skates if it moves less than this many cm above the height of a standing toe (Zhang et al. 2018).
-SKATING_BELOW = 2.5
 
 
 def runs_of_true(on: np.ndarray) -> np.ndarray:
@@ -52,20 +50,6 @@ def foot_slide(toes: Array, contacts: Array) -> Array:
             if end - start >= SHORTEST_STANCE:
                 out.append(moved[start : end - 1].sum())
     return np.array(out)
-
-
-def skating(toes: Array, standing_height: float) -> Array:
-    """(F - 1, 2) how far each toe skates over the ground from one frame to the next, cm.
-
-    Predicted contacts are not used. After Zhang, Starke, Komura, Saito (2018), a horizontal movement v counts
-    as v (2 - 2^(h / SKATING_BELOW)): all of it on the ground, none of it at SKATING_BELOW. h is the toe's
-    height above `standing_height`, clipped to 0 .. SKATING_BELOW. Of the heights before and after the
-    movement, the larger is taken. toes: (F, 2, 3) positions of the left and right toe, cm, heights above the
-    ground. standing_height: height of the toe joint of a standing foot, cm.
-    """
-    moved = np.linalg.norm(np.diff(toes[..., ::2], axis=0), axis=-1)
-    height = np.maximum(toes[1:, :, 1], toes[:-1, :, 1]) - standing_height
-    return np.asarray(moved * (2.0 - 2.0 ** (np.clip(height, 0.0, SKATING_BELOW) / SKATING_BELOW)))
 
 
 def largest_turn(rotations: Array) -> float:

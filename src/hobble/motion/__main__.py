@@ -1,8 +1,6 @@
 """An earlier name of `hobble look` and `hobble rig`, kept for a version."""
 
-import sys
-
-from hobble.cli.__main__ import main
+import runpy
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+    runpy.run_module("hobble.cli", run_name="__main__")

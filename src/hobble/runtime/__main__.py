@@ -1,8 +1,8 @@
 """An earlier name of `hobble export`, kept for a version."""
 
+import runpy
 import sys
 
-from hobble.cli.__main__ import main
-
 if __name__ == "__main__":
-    sys.exit(main(["export", *sys.argv[1:]]))
+    sys.argv.insert(1, "export")
+    runpy.run_module("hobble.cli", run_name="__main__")

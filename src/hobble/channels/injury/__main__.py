@@ -1,8 +1,8 @@
 """An earlier name of `hobble injury`, kept for a version."""
 
+import runpy
 import sys
 
-from hobble.cli.__main__ import main
-
 if __name__ == "__main__":
-    sys.exit(main(["injury", *sys.argv[1:]]))
+    sys.argv.insert(1, "injury")
+    runpy.run_module("hobble.cli", run_name="__main__")
