@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hobble.channels import channel
-from hobble.core import quat
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton, local_rotations
 from hobble.measures.measure import MeasureInputs, Outcome
@@ -34,6 +33,7 @@ from hobble.models.network import Network
 from hobble.rows.clip_rows import captured_stretches, headings, rotate_by_yaw
 from hobble.runtime.animation import ProceduralAnimation
 from hobble.runtime.options import Runtime
+from hobble.runtime.pose import world_rotations
 
 if TYPE_CHECKING:
     from hobble.measures.field import Options
@@ -215,10 +215,9 @@ def _commands_of(part: ClipPart, skeleton: Skeleton) -> Iterator[Command]:
             continue
         yaw = headings(rows.y[captured.rows][:, layout.y_turn][:, 0].astype(float))
         turns = rows.y[captured.rows][:, layout.y_joint_rotation].reshape(len(captured), -1, 3)
-        world = quat.mul(quat.yaw(yaw)[:, None], quat.exp(turns.astype(float)))
         positions = captured.local.copy()
         positions[..., ::2] = rotate_by_yaw(positions[..., ::2], yaw[:, None]) + captured.root[:, None, ::2]
-        motion = Motion(positions, local_rotations(skeleton, world))
+        motion = Motion(positions, local_rotations(skeleton, world_rotations(turns, yaw)))
         ahead = np.column_stack([np.sin(yaw), np.cos(yaw)])
         velocity = rotate_by_yaw(captured.velocity, yaw)
         for first in range(0, len(captured) - SHORTEST + 1, LONGEST):
