@@ -22,8 +22,6 @@ from hobble.core.processors import processor_name
 from hobble.motion.make import make_clip
 from hobble.motion.options import ClipMotion
 from hobble.motion.read import read_bvh
-from hobble.motion.retarget import plan, retarget_pose
-from hobble.motion.rig import joint_pairs
 from hobble.motion.skeleton_file import load_skeleton
 
 SKELETONS = Path(__file__).resolve().parents[1] / "config/skeletons"
@@ -85,21 +83,7 @@ def main() -> None:
             )
             rate = size / making
             print(f"make clips, {name:9s} {rate:8.0f} MB/s, {making / reading:.1f} times the reading")
-    figure_at_run_time()
     print(f"peak memory           {resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024:8.0f} MB")
-
-
-def figure_at_run_time() -> None:
-    """The time to retarget the pose of 31 joints to other figures, frame by frame."""
-    small = load_skeleton(SKELETONS / "holden31.yaml")
-    rest = np.tile(quat.IDENTITY, (1, 31, 1))
-    pose = Clip("rest", small.skeleton, 60.0, rest, np.array([[0.0, 90.0, 0.0]]))
-    positions, rotations = pose.positions[0], pose.global_rotations[0]
-    for name in ("mixamo55", "ava191"):
-        figure = load_skeleton(SKELETONS / f"{name}.yaml")
-        how = plan(small.skeleton, figure.skeleton, joint_pairs(small, figure))
-        spent = seconds(lambda how=how: [retarget_pose(how, positions, rotations) for _ in range(200)])
-        print(f"31 joints drive {name:9s}{spent / 200 * 1e3:6.2f} ms a frame")
 
 
 if __name__ == "__main__":

@@ -71,9 +71,9 @@ ENDLESS = {
     "a header of line ends": (HEADER + "\n" * bvh.MOST_HEADER, "MOTION comes after more than 16 MB"),
     "a header of one line": (HEADER + "x " * bvh.MOST_HEADER, "MOTION comes after more than 16 MB"),
     "MOTION again and again": ("HIERARCHY\n" + "MOTIONx " * 4 * MB + "\n", "there is no MOTION section"),
-    "a frame of one line": (BODY + "1 " * 8 * MB, "line 10: a line of more than 4 MB"),
+    "a frame of one line": (BODY + "1 " * 8 * MB, "declares 9 frames and has 8388608"),
     "a number of one line": (BODY + "1" * 9 * MB + "\n1\n", "line 10: a line of more than 4 MB"),
-    "a body of line ends": (BODY + "1\n" + "\n" * (bvh.MOST_LINES + 1), "more than 50000000 lines"),
+    "a body of line ends": (BODY + "1\n" + "\n" * 50_000_000, "declares 9 frames and has 1"),
 }
 
 

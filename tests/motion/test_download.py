@@ -31,7 +31,7 @@ def fetch(server, tmp_path: Path) -> Callable[..., Path]:
 
     waits: list[float] = []
     run.waits = waits
-    run.part = tmp_path / "kept/.walk.bvh.part"
+    run.folder = tmp_path / "kept"
     return run
 
 
@@ -39,41 +39,28 @@ def test_a_downloaded_file_is_complete_and_no_partial_file_is_left(server, fetch
     path = fetch()
     assert path.read_bytes() == CONTENT
     assert [p.name for p in path.parent.iterdir()] == ["walk.bvh"]  # no part is left
-    assert (server.requests, fetch.waits) == ([None], [])
+    assert (server.requests, fetch.waits) == (1, [])
 
 
 @pytest.mark.parametrize(
-    ("faults", "server_is", "requests", "waits"),
+    ("faults", "announces", "waits"),
     [
-        ([503, 500], {}, [None, None, None], [1, 2]),
-        ([70_000, 50_000], {}, [None, "bytes=70000-", "bytes=120000-"], None),
-        ([70_000], {"ranges": False}, [None, "bytes=70000-"], None),  # the download starts over
-        ([70_000, "other part"], {}, [None, "bytes=70000-", None], None),  # a wrong range is discarded
-        ([70_000], {"announces": False}, [None, None], None),  # its checksum shows that it was cut
+        ([503, 500], True, [1, 2]),
+        ([70_000, 50_000], True, [1, 2]),
+        ([70_000], False, [1]),  # its checksum shows that it was cut
     ],
 )
-def test_a_download_with_faults_becomes_complete(server, fetch, faults, server_is, requests, waits):
-    vars(server).update(server_is, faults=faults)
+def test_a_download_with_faults_becomes_complete(server, fetch, faults, announces, waits):
+    server.faults, server.announces = faults, announces
     assert fetch().read_bytes() == CONTENT
-    assert server.requests == requests
-    assert waits is None or fetch.waits == waits
+    assert fetch.waits == waits
 
 
-def test_a_later_run_continues_an_interrupted_download(server, fetch):
+def test_a_file_that_is_always_cut_short_is_refused(server, fetch):
     server.faults = [90_000]
     with pytest.raises(InputError, match=f"cut short after 90000 of {len(CONTENT)} bytes"):
         fetch(attempts=1)
-    assert fetch.part.stat().st_size == 90_000
-    assert fetch().read_bytes() == CONTENT
-    assert server.requests[1:] == ["bytes=90000-"]
-
-
-@pytest.mark.parametrize("left", [b"not how it begins", CONTENT, CONTENT + b"more"])
-def test_a_partial_file_that_does_not_fit_is_downloaded_again(server, fetch, left):
-    fetch.part.parent.mkdir()
-    fetch.part.write_bytes(left)
-    assert fetch().read_bytes() == CONTENT
-    assert len(server.requests) == (1 if left == CONTENT else 2)
+    assert list(fetch.folder.iterdir()) == []
 
 
 def test_checksum_lists_may_have_either_line_ending(server, fetch):
@@ -91,8 +78,8 @@ def test_a_wrong_checksum_is_refused_and_the_file_is_deleted(server, fetch):
         f"manifest it is {SHA256}, 2 times. Run the same command again later, or "
         "put walk.bvh into data/mine yourself."
     )
-    assert list(fetch.part.parent.iterdir()) == []
-    assert server.requests == [None, None]
+    assert list(fetch.folder.iterdir()) == []
+    assert server.requests == 2
 
 
 @pytest.mark.parametrize(
@@ -106,7 +93,7 @@ def test_a_file_that_is_not_served_is_refused(server, fetch, status, said, reque
     server.faults = [status] * 9
     with pytest.raises(InputError, match=said):
         fetch()
-    assert (len(server.requests), fetch.waits) == (requests, waits)
+    assert (server.requests, fetch.waits) == (requests, waits)
 
 
 def test_without_a_network_the_message_says_so(tmp_path):
@@ -176,8 +163,8 @@ def test_a_file_that_is_too_large_is_refused_and_deleted(server, fetch, announce
     server.announces = announces
     with pytest.raises(InputError, match=r"larger than 0\.05 MB, which is the most that a clip may be"):
         fetch(most=50_000)
-    assert list(fetch.part.parent.iterdir()) == []
-    assert len(server.requests) == 1
+    assert list(fetch.folder.iterdir()) == []
+    assert server.requests == 1
 
 
 def test_control_characters_from_a_server_are_not_printed(tmp_path):

@@ -7,38 +7,22 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hobble.motion.look import step_count, summarise_clips
+from hobble.motion.look import summarise_clips
 from hobble.motion.options import ClipMotion
-from hobble.motion.physics import measure_accelerations, times_too_fast
+from hobble.motion.physics import step_count, times_too_fast
 
 
-def test_accelerations_grow_with_the_square_of_the_frame_rate(walker, holden31):
+def test_a_clip_at_twice_its_rate_plays_twice_too_fast(walker, holden31):
     clip = walker(holden31, 601, 120.0)
-    once, twice = (measure_accelerations(replace(clip, fps=fps), 10) for fps in (120.0, 240.0))
-    assert once is not None
-    assert twice is not None
-    for name in ("level", "vertical", "falling", "pendulum"):
-        assert getattr(twice, name) == pytest.approx(4 * getattr(once, name), rel=1e-9), name
-    assert twice.step == once.step
-    assert twice.step == pytest.approx(50.0 / holden31.leg_length, rel=0.1)  # 1 m/s, two steps a second
-    assert not once.runs
-
-
-def test_hips_that_are_lowest_over_the_standing_foot_run(walker, holden31):
-    clip = walker(holden31, 601, 120.0)
-    root = clip.root.copy()
-    time = np.arange(len(clip)) / clip.fps
-    root[:, 1] -= 3 * np.cos(4 * np.pi * time)
-    assert measure_accelerations(replace(clip, root=root), 10).runs
+    once, twice = (times_too_fast(replace(clip, fps=fps), 10) for fps in (120.0, 240.0))
+    assert once == pytest.approx((1.0, 1.0), rel=0.3)
+    assert twice[1] == pytest.approx(2 * once[1], rel=1e-9)
 
 
 def test_a_child_on_an_adult_skeleton_does_not_play_too_fast(walker, holden31, scaled):
     clip = walker(holden31, 601, 120.0)
     large = scaled(clip, 2.0)
     assert times_too_fast(large, 10, scale=2.0)[1] == pytest.approx(times_too_fast(clip, 10)[1], rel=1e-9)
-    assert measure_accelerations(large, 10).level == pytest.approx(
-        2 * measure_accelerations(clip, 10).level, rel=1e-9
-    )
 
 
 def test_few_steps_and_short_clips_show_nothing(walker, holden31):

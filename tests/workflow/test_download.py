@@ -28,7 +28,7 @@ def test_a_clip_that_the_folder_lacks_is_downloaded_once(workflow, clips, server
     kept = workflow.checkout / "data/downloaded/far/walk.bvh"
 
     assert workflow.planned(TARGET) == {"download_clip": 1, "motion_clips": 1, "clip_file": 1}
-    assert server.requests == []
+    assert server.requests == 0
     text = workflow.run("-c1", TARGET, ok=False)
     assert f"cannot be downloaded: the server has another file: its SHA-256 is {sha256}" in text
     assert "data/far yourself" in text
@@ -36,10 +36,10 @@ def test_a_clip_that_the_folder_lacks_is_downloaded_once(workflow, clips, server
     assert list(kept.parent.glob("*")) == []
 
     (config / "far.sha256").write_text(f"{sha256}  walk.bvh\n")
-    server.requests.clear()
+    server.requests = 0
     server.faults = [503, len(server.content) // 3]
     workflow.run("-c1", TARGET)
     assert kept.read_bytes() == server.content
-    assert server.requests == [None, None, f"bytes={len(server.content) // 3}-"]
+    assert server.requests == 3
     assert json.loads((workflow.folder / TARGET).read_text())["sha256"] == sha256
     assert workflow.planned(TARGET) == {}

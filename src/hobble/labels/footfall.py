@@ -144,8 +144,11 @@ def swing_peaks(relative: Array) -> np.ndarray:
     Between two of these frames, the speed has a clear dip (see DIP_OF_SWING). relative: (F,) speed of the
     foot, a column of `relative_speeds`.
     """
+    from scipy.signal import find_peaks  # imported here because most jobs do not need it
+
     peaks: list[int] = []
-    for peak in _local_maxima(relative, 2 * REST_SPEED):
+    # Local maxima, also in the first and last frame. A plateau gives its middle.
+    for peak in find_peaks(np.pad(relative, 1), height=2 * REST_SPEED)[0] - 1:
         # Without a clear dip after the last peak, both belong to one swing, and only the higher one stays.
         while peaks:
             lower = min(relative[peaks[-1]], relative[peak])
@@ -158,15 +161,6 @@ def swing_peaks(relative: Array) -> np.ndarray:
         else:
             peaks.append(peak)
     return np.array(peaks, int)
-
-
-def _local_maxima(values: Array, least: float) -> np.ndarray:
-    """Frames of the local maxima of `values` (F,) that are at least `least`. A plateau gives its middle."""
-    steps = np.diff(np.concatenate([[0.0], values, [0.0]]))
-    changes = np.flatnonzero(steps)  # places where the values rise or fall
-    tops = np.flatnonzero((steps[changes[:-1]] > 0) & (steps[changes[1:]] < 0))
-    frames = (changes[tops] + changes[tops + 1] - 1) // 2
-    return frames[values[frames] >= least]
 
 
 def _rest_limit(relative: Array, peaks: np.ndarray, valley_factor: float) -> Array:

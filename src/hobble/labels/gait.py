@@ -161,11 +161,9 @@ def _relative_heights(clip: Clip) -> tuple[Array, Array]:
     skeleton, y = clip.skeleton, clip.positions[..., 1]
     toes = y[:, [skeleton.role("left_toe"), skeleton.role("right_toe")]]
     floor = lowest(toes, 61).mean(axis=1)
-    lengths = np.linalg.norm(skeleton.offsets, axis=1)
-    leg = skeleton.leg_length
-    trunk, joint = 0.0, skeleton.role("head")
+    leg, trunk, joint = skeleton.leg_length, 0.0, skeleton.role("head")
     while joint != skeleton.role("hips") and skeleton.parents[joint] >= 0:
-        trunk += lengths[joint]
+        trunk += np.linalg.norm(skeleton.offsets[joint])
         joint = skeleton.parents[joint]
     head = (y[:, skeleton.role("head")] - floor) / (leg + trunk)
     return head, (y[:, skeleton.role("hips")] - floor) / leg

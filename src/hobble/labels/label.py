@@ -12,7 +12,7 @@ import numpy as np
 from hobble.core.clip import Clip
 from hobble.core.files import write_json
 from hobble.core.quat import Array
-from hobble.labels.clip_labels import GAITS, LabelReport, Labels, make_label_picture
+from hobble.labels.clip_labels import GAITS, LabelReport, Labels, label_curves
 from hobble.labels.contacts import find_contacts, find_stance_contacts
 from hobble.labels.footfall import Swing, find_landings, find_swings
 from hobble.labels.gait import automatic_gait, overwrite_crouch
@@ -30,6 +30,8 @@ from hobble.labels.phase import (
 
 # A clip gets a warning if the shares of time in which its left and its right heel are down differ by more.
 UNLIKE_HEELS = 0.3
+# How the name of a label file ends -> its kind.
+KINDS = {".phase": "phase", ".gait": "gait", "_footsteps.txt": "footsteps", "_gait.txt": "gait_keys"}
 
 
 def label_clip(
@@ -52,7 +54,9 @@ def label_clip(
     label_files = _files_by_kind(files) if options.files else {}
     warnings: list[str] = []
     if label_files and motion.get("loops", 1) > 1:
-        warnings.append(_unused_files_warning(label_files))
+        names = ", ".join(path.name for path in label_files.values())
+        cycle = "their frame numbers are those of one cycle, but the clip repeats this cycle"
+        warnings.append(f"{names} not used: {cycle}")
         label_files = {}
     time = SourceTime(motion["source_frames"], motion["source_fps"], motion.get("source_start", 0))
     swings = find_swings(clip, options)
@@ -64,7 +68,11 @@ def label_clip(
     zero = options.phase_zero
     cycles, dropped = find_cycles(footsteps, len(clip), zero, options.margins)
     if not len(cycles):
-        warnings.append(_no_cycle_warning(options.margins))
+        margin = MARGINS[options.margins]
+        where = f" with {margin} frames of the clip before and {margin + 1} after it" * (
+            options.margins == "drop"
+        )
+        warnings.append(f"no whole gait cycle{where}, so no frame of the clip is trained on")
     contacts = find_contacts(clip, options)
     left, right = contacts[:, 0].mean(), contacts[:, 2].mean()
     if abs(left - right) > UNLIKE_HEELS:
@@ -92,16 +100,6 @@ def label_clip(
     return labels, report
 
 
-def _unused_files_warning(label_files: Mapping[str, Path]) -> str:
-    names = ", ".join(path.name for path in label_files.values())
-    return f"{names} not used: their frame numbers are those of one cycle, but the clip repeats this cycle"
-
-
-def _no_cycle_warning(margins: str) -> str:
-    where = f" with {MARGINS[margins]} frames of the clip before and {MARGINS[margins] + 1} after it"
-    return f"no whole gait cycle{where if margins == 'drop' else ''}, so no frame of the clip is trained on"
-
-
 def mirror_labels(labels: Labels, report: LabelReport, clip: Clip) -> tuple[Labels, LabelReport]:
     """The labels of a mirrored clip, and their report.
 
@@ -127,35 +125,18 @@ def write_report(path: str | Path, report: LabelReport, labels: Labels, clip: Cl
     """Write the JSON file beside the labels.
 
     It holds the report; the seconds of each gait; the number of cycles; and the curves of a picture of the
-    labels (see `make_label_picture`).
+    labels (see `label_curves`).
     """
     main_gait = np.argmax(labels.gait, axis=1)
     seconds = {name: float(np.sum(main_gait == i) / clip.fps) for i, name in enumerate(GAITS)}
-    write_json(
-        path,
-        {
-            **asdict(report),
-            "seconds": seconds,
-            "cycles": len(labels.cycles),
-            "curves": make_label_picture(labels, clip),
-        },
-    )
+    found = {"seconds": seconds, "cycles": len(labels.cycles), "curves": label_curves(labels, clip)}
+    write_json(path, {**asdict(report), **found})
 
 
 def _files_by_kind(files: Iterable[str | Path]) -> dict[str, Path]:
     """Kind of a label file (phase, gait, footsteps, gait_keys) -> file. Other files are ignored."""
-    suffixes = {
-        ".phase": "phase",
-        ".gait": "gait",
-        "_footsteps.txt": "footsteps",
-        "_gait.txt": "gait_keys",
-    }
-    out = {}
-    for file in files:
-        for suffix, kind in suffixes.items():
-            if str(file).endswith(suffix):
-                out[kind] = Path(file)
-    return out
+    paths = [Path(file) for file in files]
+    return {kind: path for path in paths for end, kind in KINDS.items() if path.name.endswith(end)}
 
 
 def _find_phase(
@@ -169,14 +150,13 @@ def _find_phase(
     frames = len(clip)
     if "footsteps" in files:
         footsteps = read_footsteps(files["footsteps"], time)
-    if "phase" in files:
-        phase = read_phase(files["phase"], time, frames)
-        from_phase, known = footsteps_of_phase(phase)
-        return phase, known, footsteps if "footsteps" in files else from_phase
-    if "footsteps" not in files:
+    else:
         footsteps = rows_of_landings(find_landings(swings, frames, shortest_step))
-    phase, known = phase_of_footsteps(footsteps, frames)
-    return phase, known, footsteps
+    if "phase" not in files:
+        return *phase_of_footsteps(footsteps, frames), footsteps
+    phase = read_phase(files["phase"], time, frames)
+    from_phase, known = footsteps_of_phase(phase)
+    return phase, known, footsteps if "footsteps" in files else from_phase
 
 
 def _find_gait(

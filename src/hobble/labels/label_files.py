@@ -21,11 +21,8 @@ from hobble.core.untrusted import MAX_TEXT_BYTES, read_text
 from hobble.labels.clip_labels import GAITS, Labels
 
 FILE_GAITS = ("stand", "walk", "jog", "run", "crouch", "jump", "crawl", "unknown")  # columns of `.gait`
-GAIT_OF_FILE_GAIT = {
-    "run": "jog",
-    "crawl": "crouch",
-    "unknown": "bump",
-}  # gait that only files name -> gait of GAITS
+# Gait that only files name -> gait of GAITS.
+GAIT_OF_FILE_GAIT = {"run": "jog", "crawl": "crouch", "unknown": "bump"}
 LONGEST_LINE = 1024  # bytes; a line of eight shares with all their digits has about 200
 
 
@@ -79,7 +76,9 @@ def read_gait(path: Path, time: SourceTime, frames: int) -> Array:
     """(frames, 6) gait shares from a file with the 8 columns FILE_GAITS. Raises like `read_phase`."""
     rows = _read_matrix(path, time, len(FILE_GAITS))
     before, after, share = _neighbouring_rows(rows, time, frames)
-    return _shares_of_gaits(before + share[:, None] * (after - before))
+    # (8, 6): which of GAITS each column adds to.
+    added = np.eye(len(GAITS))[[GAITS.index(GAIT_OF_FILE_GAIT.get(name, name)) for name in FILE_GAITS]]
+    return (before + share[:, None] * (after - before)) @ added
 
 
 def read_footsteps(path: Path, time: SourceTime) -> Array:
@@ -96,39 +95,34 @@ def read_footsteps(path: Path, time: SourceTime) -> Array:
     short_line = 0  # number of the line that holds only one frame; 0: none yet
     for number, words in _read_lines(path, time):
         if short_line:
-            raise InputError(
-                path,
-                "only the last line may hold one frame instead of two",
-                line=short_line,
-                fix="Write `right left`: the frames in which the right and the left foot land.",
-            )
+            fix = "Write `right left`: the frames in which the right and the left foot land."
+            problem = "only the last line may hold one frame instead of two"
+            raise InputError(path, problem, line=short_line, fix=fix)
         marked = words[-1] == "*"
-        landings = [_parse_number(path, number, w) for w in (words[:-1] if marked else words)]
-        if not 1 <= len(landings) <= 2:
-            raise InputError(
-                path,
-                f"has {len(landings)} frame numbers, but a line holds `right left` or `right left *`",
-                line=number,
-                fix="Write the frames in which the right and the left foot land, such as `120 151`.",
-            )
-        if len(landings) == 1:
-            short_line = number
-        for landing in landings:
-            if landing <= last:
-                raise InputError(
-                    path,
-                    f"frame {landing:g} does not come after {last:g}",
-                    line=number,
-                    fix="Write the frames in rising order, beginning with 1 or more.",
-                )
-            if landing > time.frames + 1:
-                raise InputError(
-                    path, f"frame {landing:g} lies past the clip's last frame, {time.frames}", line=number
-                )
-            last = landing
+        texts = words[:-1] if marked else words
+        if not 1 <= len(texts) <= 2:
+            fix = "Write the frames in which the right and the left foot land, such as `120 151`."
+            problem = f"has {len(texts)} frame numbers, but a line holds `right left` or `right left *`"
+            raise InputError(path, problem, line=number, fix=fix)
+        landings = []
+        for text in texts:
+            landings.append(last := _later_frame(path, number, text, last, time))
+        short_line = number if len(landings) == 1 else 0
         right, left = (time.to_clip_frame(x) for x in (*landings, math.nan)[:2])
         steps.append((right, left, float(marked or short_line > 0)))
     return np.array(steps, float).reshape(-1, 3)
+
+
+def _later_frame(path: Path, line: int, word: str, last: float, time: SourceTime) -> float:
+    """The frame that a word stands for. Raises InputError if it does not follow `last` or is past the end."""
+    frame = _parse_number(path, line, word)
+    if frame <= last:
+        fix = "Write the frames in rising order, beginning with 1 or more."
+        raise InputError(path, f"frame {frame:g} does not come after {last:g}", line=line, fix=fix)
+    if frame > time.frames + 1:
+        problem = f"frame {frame:g} lies past the clip's last frame, {time.frames}"
+        raise InputError(path, problem, line=line)
+    return frame
 
 
 def read_gait_keys(path: Path, time: SourceTime, frames: int) -> Array:
@@ -142,32 +136,16 @@ def read_gait_keys(path: Path, time: SourceTime, frames: int) -> Array:
     keys: list[tuple[float, int]] = []
     for number, words in _read_lines(path, time):
         if len(words) != 2:
-            raise InputError(
-                path,
-                f"has {len(words)} words, but a line holds `frame gait`, such as `120 walk`",
-                line=number,
-            )
-        frame = _parse_number(path, number, words[0])
+            problem = f"has {len(words)} words, but a line holds `frame gait`, such as `120 walk`"
+            raise InputError(path, problem, line=number)
+        frame = _later_frame(path, number, words[0], keys[-1][0] if keys else -math.inf, time)
         if words[1] not in names:
-            raise InputError(
-                path, f"no such gait: {words[1]!r}", line=number, fix=f"There are {', '.join(names)}."
-            )
-        if keys and frame <= keys[-1][0]:
-            raise InputError(
-                path,
-                f"frame {frame:g} does not come after {keys[-1][0]:g}",
-                line=number,
-                fix="Write the lines in the order of their frames.",
-            )
-        if frame > time.frames + 1:
-            raise InputError(
-                path, f"frame {frame:g} lies past the clip's last frame, {time.frames}", line=number
-            )
+            fix = f"There are {', '.join(names)}."
+            raise InputError(path, f"no such gait: {words[1]!r}", line=number, fix=fix)
         keys.append((frame, GAITS.index(GAIT_OF_FILE_GAIT.get(words[1], words[1]))))
     if not keys:
-        raise InputError(
-            path, "holds no keys", fix="Write lines of `frame gait`, such as `1 walk`, or remove the file."
-        )
+        fix = "Write lines of `frame gait`, such as `1 walk`, or remove the file."
+        raise InputError(path, "holds no keys", fix=fix)
     key_frames, gait = np.array(keys).T
     when = time.source_frames_of_clip(frames) + 1
     following = np.clip(np.searchsorted(key_frames, when, side="right"), 1, max(len(key_frames) - 1, 1))
@@ -217,11 +195,9 @@ def _read_matrix(path: Path, time: SourceTime, columns: int) -> Array:
         if len(rows) > time.frames + 1:
             break
     if abs(len(rows) - time.frames) > 1:
-        raise InputError(
-            path,
-            f"has {len(rows)} rows, but the clip's file has {time.frames} frames",
-            fix="Write one row for each frame, or remove the file to label the clip automatically.",
-        )
+        fix = "Write one row for each frame, or remove the file to label the clip automatically."
+        problem = f"has {len(rows)} rows, but the clip's file has {time.frames} frames"
+        raise InputError(path, problem, fix=fix)
     return np.array(rows, float)
 
 
@@ -236,14 +212,6 @@ def _neighbouring_rows(rows: Array, time: SourceTime, frames: int) -> tuple[Arra
     when = np.where(np.abs(when - nearest) < 1e-6, nearest, when)
     before = np.floor(when).astype(int)
     return rows[before], rows[np.minimum(before + 1, len(rows) - 1)], when - before
-
-
-def _shares_of_gaits(file_shares: Array) -> Array:
-    """(n, 6) shares of GAITS, added up from (n, 8) shares of FILE_GAITS."""
-    out = np.zeros((len(file_shares), len(GAITS)))
-    for column, name in enumerate(FILE_GAITS):
-        out[:, GAITS.index(GAIT_OF_FILE_GAIT.get(name, name))] += file_shares[:, column]
-    return out
 
 
 # Writes automatic labels as files that people can correct: `_footsteps.txt`, `_gait.txt`, `.phase`.

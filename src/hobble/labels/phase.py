@@ -36,11 +36,10 @@ def phase_of_footsteps(footsteps: Array, frames: int) -> tuple[Array, np.ndarray
     IDLE_RATE. Between two bouts this rate is adjusted, so that the phase has the right value at the next
     landing.
     """
-    when, phases, joined = _list_landings(footsteps)
+    when, unwrapped, joined = _unwrapped_landings(footsteps)
     frame = np.arange(frames)
     if not len(when):
         return (frame * IDLE_RATE) % 1.0, np.zeros(frames, bool)
-    unwrapped = _unwrap(when, phases, joined)
     phase = np.interp(frame, when, unwrapped)
     phase = np.where(frame < when[0], unwrapped[0] - (when[0] - frame) * IDLE_RATE, phase)
     phase = np.where(frame > when[-1], unwrapped[-1] + (frame - when[-1]) * IDLE_RATE, phase)
@@ -138,57 +137,39 @@ def mirrored_footsteps(footsteps: Array) -> Array:
     right landing, gets the mark of the original row with this left landing.
     """
     landings: list[tuple[float, int]] = []
-    marks: list[float] = []
-    for right, left, mark in footsteps:
-        for when, foot in ((right, 1), (left, 0)):  # foot in the mirrored clip: 0 right, 1 left
-            if np.isfinite(when):
-                landings.append((when, foot))
-                if foot == 0:
-                    marks.append(mark)
+    for right, left, _ in footsteps:
+        # In the mirrored clip, foot 0 is the right one, which was the left one.
+        landings += [(when, foot) for when, foot in ((right, 1), (left, 0)) if np.isfinite(when)]
         if np.isnan(right) and np.isnan(left):
             landings.append((np.nan, -1))
     rows = rows_of_landings(landings)
-    has_right = np.isfinite(rows[:, 0])
-    rows[has_right, 2] = marks
+    rows[np.isfinite(rows[:, 0]), 2] = footsteps[np.isfinite(footsteps[:, 1]), 2]
     return rows
 
 
-def _list_landings(footsteps: Array) -> tuple[Array, Array, np.ndarray]:
-    """The n landings in order: their frames (n,), their phases (n,), and which are joined, bool (n - 1,).
+def _unwrapped_landings(footsteps: Array) -> tuple[Array, Array, np.ndarray]:
+    """The n landings in order: frames (n,), phases (n,) that never fall, and which are joined, bool (n - 1,).
 
-    A phase is 0 (right) or .5 (left). Two successive landings are joined if they are in the same bout of
-    walking.
+    Two successive landings are joined if they are in the same bout of walking. The phase is not wrapped to
+    0..1. It rises by half a cycle between them, and by about IDLE_RATE a frame between two bouts.
     """
     when: list[float] = []
-    phases: list[float] = []
+    unwrapped: list[float] = []
     joined: list[bool] = []
-    bout_ended = True
+    bout_ended, last = True, np.nan  # the phase of the last landing
     for right, left, _ in footsteps:
-        if np.isnan(right) and np.isnan(left):
-            bout_ended = True
+        bout_ended |= bool(np.isnan(right) and np.isnan(left))
         for landing, phase in ((right, 0.0), (left, 0.5)):
-            if np.isfinite(landing):
-                if when:
-                    joined.append(not bout_ended and phases[-1] != phase)
-                when.append(landing)
-                phases.append(phase)
-                bout_ended = False
-    return np.array(when, float), np.array(phases, float), np.array(joined, bool)
-
-
-def _unwrap(when: Array, phases: Array, joined: np.ndarray) -> Array:
-    """(n,) phase of each landing, not wrapped to 0..1, so that it never falls.
-
-    The phase rises by half a cycle in each step of a bout, and by about IDLE_RATE per frame between two
-    bouts. when, phases, joined: from `_list_landings`.
-    """
-    unwrapped = [phases[0]]
-    for i, in_one_bout in enumerate(joined):
-        if in_one_bout:
-            unwrapped.append(unwrapped[-1] + 0.5)
-            continue
-        # The smallest rise to the phase of the next landing, plus whole cycles if the time allows them.
-        least = (phases[i + 1] - unwrapped[-1]) % 1.0
-        spare = (when[i + 1] - when[i]) * IDLE_RATE - least
-        unwrapped.append(unwrapped[-1] + least + max(0, round(spare)))
-    return np.array(unwrapped)
+            if not np.isfinite(landing):
+                continue
+            rise = phase
+            if when:
+                joined.append(not bout_ended and last != phase)
+                # The smallest rise to this phase, plus whole cycles if the time allows them.
+                least = (phase - unwrapped[-1]) % 1.0
+                spare = (landing - when[-1]) * IDLE_RATE - least
+                rise = unwrapped[-1] + (0.5 if joined[-1] else least + max(0, round(spare)))
+            when.append(landing)
+            unwrapped.append(rise)
+            bout_ended, last = False, phase
+    return np.array(when, float), np.array(unwrapped, float), np.array(joined, bool)

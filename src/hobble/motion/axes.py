@@ -141,23 +141,13 @@ class RigAxes:
     facing: str
 
 
-@dataclass(frozen=True)
-class UprightClip:
-    """A clip with right-handed coordinates and Y up.
+def straighten(
+    clip: Clip, up: str, handedness: str, standing: bool = True
+) -> tuple[Clip, RigAxes, str, bool]:
+    """The clip with right-handed coordinates and Y up, and the axes of its file.
 
-    axes: the axes of the file. notes, unsure: both are empty unless motion and rest pose disagree on which
-    axis is up. Then one sentence says so. It is in `notes` if the motion is clear, because the figure crawls
-    or moves far over the ground. Otherwise it is in `unsure`.
-    """
-
-    clip: Clip
-    axes: RigAxes
-    notes: list[str]
-    unsure: list[str]
-
-
-def straighten(clip: Clip, up: str, handedness: str, standing: bool = True) -> UprightClip:
-    """The clip with right-handed coordinates and Y up.
+    Also returns a sentence if motion and rest pose disagree on which axis is up, else "", and whether this is
+    in doubt. It is not if the figure crawls or moves far over the ground.
 
     A rest pose that faces along an axis is turned to +Z. An oblique rest pose is left as it is.
 
@@ -168,7 +158,7 @@ def straighten(clip: Clip, up: str, handedness: str, standing: bool = True) -> U
 
     Raises ValueError with up = "auto" if the figure crawls and nobody can stand in the rest pose.
     """
-    up_axis, notes, unsure = _up_axis(clip, standing) if up == "auto" else (f"+{up}", [], [])
+    up_axis, note, in_doubt = _up_axis(clip, standing) if up == "auto" else (f"+{up}", "", False)
     if handedness == "auto":
         left, upward, feet = body_axes(clip.skeleton, clip.positions)
         # In right-handed coordinates, the cross product of left and up points forward, like the feet.
@@ -182,9 +172,8 @@ def straighten(clip: Clip, up: str, handedness: str, standing: bool = True) -> U
     along_axis = cosine > 1 - 1e-9
     axes = RigAxes(up_axis, handedness, facing if along_axis else "oblique")
     world = quat.between(DIRECTIONS[up_axis], UP)
-    return UprightClip(
-        _turned(clip, world, quat.inv(rest) if along_axis else quat.IDENTITY), axes, notes, unsure
-    )
+    turned = _turned(clip, world, quat.inv(rest) if along_axis else quat.IDENTITY)
+    return turned, axes, note, in_doubt
 
 
 def _nearest_axis(direction: Array) -> tuple[str, float]:
@@ -194,8 +183,8 @@ def _nearest_axis(direction: Array) -> tuple[str, float]:
     return ("+" if cosines[k] > 0 else "-") + "XYZ"[k], float(abs(cosines[k]))
 
 
-def _up_axis(clip: Clip, standing: bool) -> tuple[str, list[str], list[str]]:
-    """The axis that points up, and the lists `notes` and `unsure` of `UprightClip`."""
+def _up_axis(clip: Clip, standing: bool) -> tuple[str, str, bool]:
+    """The axis that points up, and what `straighten` returns last."""
     in_motion, in_rest = (
         _nearest_axis(_along_body(clip.skeleton, positions).mean(axis=0))[0]
         for positions in (clip.positions, rest_positions(clip.skeleton)[None])
@@ -207,13 +196,13 @@ def _up_axis(clip: Clip, standing: bool) -> tuple[str, list[str], list[str]]:
             "nobody could stand in its zero pose"
         )
     if in_motion == in_rest or not standing:
-        return in_motion, [], []
+        return in_motion, "", False
     up, why = (in_rest, "the body crawls") if crawls else (in_motion, "the motion is more reliable")
     note = (
         f"From feet to head, the body points along {in_motion} and its rest pose along {in_rest}. {up} was "
         f"taken for up, because {why} (motion.up overrides this)."
     )
-    return (up, [note], []) if crawls or _travels(clip, in_motion) else (up, [], [note])
+    return up, note, not crawls and not _travels(clip, in_motion)
 
 
 def _along_body(skeleton: Skeleton, positions: Array) -> Array:
@@ -260,10 +249,7 @@ def _turned(clip: Clip, world: Array, rest: Array) -> Clip:
 
 def _changed(clip: Clip, vectors: Callable[[Array], Array], rotations: Array, root: Array) -> Clip:
     """The clip with other rotations and roots. vectors: changes all vectors (..., 3) in axes of joints."""
-    ends = {}
-    for name, offset in clip.skeleton.end_sites.items():
-        x, y, z = vectors(np.array(offset)).tolist()
-        ends[name] = (x, y, z)
+    ends = {name: tuple(vectors(np.array(end)).tolist()) for name, end in clip.skeleton.end_sites.items()}
     skeleton = replace(clip.skeleton, offsets=vectors(clip.skeleton.offsets), end_sites=ends)
     translations = None if clip.translations is None else vectors(clip.translations)
     return replace(clip, skeleton=skeleton, rotations=rotations, root=root, translations=translations)

@@ -15,11 +15,8 @@ from hobble.core.errors import HobbleError
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton, other_side
 from hobble.core.smooth import smoothstep
-from hobble.motion.axes import turned_about_vertical
+from hobble.motion.axes import FLIP, MIRROR, turned_about_vertical
 from hobble.motion.root import facing_directions
-
-# A position, or a rotation (w, x, y, z), is mirrored in the plane x = 0 if it is multiplied by this.
-MIRRORED, MIRRORED_ROTATION = np.array([-1.0, 1.0, 1.0]), np.array([1.0, 1.0, -1.0, -1.0])
 
 # Loops.
 SEAM = 0.2  # seconds before and after a seam over which it is blended; doubled until the seam is smooth
@@ -39,9 +36,6 @@ TELEPORT = 30.0  # cm: where the root jumps further than this, the clip is cut i
 HEAD, TAIL = 0.5, 1.0
 BRIDGE = 0.25  # seconds: if two jumps are at most this far apart, the frames between can be interpolated
 BLEND = 0.1  # seconds on each side of a jump over which the motion is smoothed
-# A joint that turns by more than this from one frame to the next spins faster than a living joint can. Above
-# 120 Hz the limit is lower, in proportion to the time between frames.
-SPIN = np.radians(60.0)
 BLOCK = 4096  # frames that are searched at a time, to keep intermediate arrays small
 NO_POSE = 0.75  # frames have no pose if more than this share of their joints' rotations are zero
 
@@ -99,15 +93,15 @@ def mirror_skeleton(skeleton: Skeleton) -> Skeleton:
         # A joint without a counterpart keeps its own end site, mirrored.
         x, y, z = skeleton.end_sites.get(other_side(name), skeleton.end_sites[name])
         ends[name] = (-x, y, z)
-    return replace(skeleton, offsets=skeleton.offsets[swap] * MIRRORED, end_sites=ends)
+    return replace(skeleton, offsets=skeleton.offsets[swap] * FLIP, end_sites=ends)
 
 
 def mirror_clip(clip: Clip, name: str) -> Clip:
     """The clip mirrored in the plane x = 0. name: of the mirrored clip."""
     swap, skeleton = clip.skeleton.mirror_joints, mirror_skeleton(clip.skeleton)
-    rotations = clip.rotations[:, swap] * MIRRORED_ROTATION
-    moved = None if clip.translations is None else clip.translations[:, swap] * MIRRORED
-    return Clip(name, skeleton, clip.fps, rotations, clip.root * MIRRORED, moved)
+    rotations = clip.rotations[:, swap] * MIRROR
+    moved = None if clip.translations is None else clip.translations[:, swap] * FLIP
+    return Clip(name, skeleton, clip.fps, rotations, clip.root * FLIP, moved)
 
 
 def mirror_report(report: Mapping[str, Any], name: str) -> dict[str, Any]:
@@ -265,7 +259,9 @@ def repair_defects(clip: Clip) -> tuple[Clip, int, list[str]]:
     for start, end, after in ((0, first - 1, first - 1), (last + 1, len(clip) - 1, last)):
         if start <= end:
             jump = next(jump for jump in jumps if jump.before == after)
-            sentences.append(_cut_sentence(clip, start, end, jump))
+            turns = np.abs(quat.positive(clip.rotations[start : end + 1]) - quat.IDENTITY).max(axis=-1)
+            what = " (no pose)" if np.mean(turns < 1e-6) > NO_POSE else ""
+            sentences.append(f"{_number_frames(start, end).capitalize()}{what} cut off: {jump}.")
     part = mended.part(slice(first, last + 1))
     return replace(part, rotations=quat.continuous(part.rotations)), first, sentences
 
@@ -310,28 +306,6 @@ def _find_glitches(clip: Clip) -> list[tuple[int, float, str]]:
     return [(int(i) + 1, float(size[i]), clip.skeleton.joints[off[i].argmax()]) for i in found]
 
 
-def notes_on_spins(clip: Clip, first: int) -> list[str]:
-    """A sentence for each joint that spins faster than a living joint can.
-
-    Thumbs and end joints of captured rigs spin like this, because markers do not show how these joints are
-    turned. first: the source's frame (from 0) at which the clip begins.
-    """
-    limit = SPIN * min(1.0, 120.0 / clip.fps)
-    sentences = []
-    for j, name in enumerate(clip.skeleton.joints):
-        q = clip.rotations[:, j]
-        # The dot product of two unit quaternions is the cosine of half the angle between them.
-        angle = 2 * np.arccos(np.clip(np.abs(np.sum(q[1:] * q[:-1], axis=-1)), 0.0, 1.0))
-        too_fast = np.flatnonzero(angle > limit)
-        if len(too_fast):
-            frame = first + int(too_fast[0]) + 1
-            sentences.append(
-                f"{name} spins by up to {np.degrees(angle.max()):.0f} degrees from one frame to the next, "
-                f"{len(too_fast)} times (first between frames {frame} and {frame + 1}); left as it is."
-            )
-    return sentences
-
-
 def _longest_part(frames: int, fps: float, jumps: list[Jump]) -> tuple[int, int]:
     """The first and the last frame that remain of a clip with so many frames.
 
@@ -352,13 +326,6 @@ def _longest_part(frames: int, fps: float, jumps: list[Jump]) -> tuple[int, int]
 def _number_frames(start: int, end: int) -> str:
     """Frames in words for users, who count from 1. start, end: first and last frame, counted from 0."""
     return f"frames {start + 1} to {end + 1}" if end > start else f"frame {start + 1}"
-
-
-def _cut_sentence(clip: Clip, start: int, end: int, jump: Jump) -> str:
-    """Says in words that the frames `start` to `end` were cut off, because of a jump."""
-    unrotated = np.abs(quat.positive(clip.rotations[start : end + 1]) - quat.IDENTITY).max(axis=-1) < 1e-6
-    what = " (no pose)" if unrotated.mean() > NO_POSE else ""
-    return f"{_number_frames(start, end).capitalize()}{what} cut off: {jump}."
 
 
 def _pair_jumps(clip: Clip, jumps: list[Jump]) -> tuple[list[Jump], list[tuple[int, int, Jump]]]:

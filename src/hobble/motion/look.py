@@ -6,7 +6,7 @@ import html
 import json
 import re
 from collections import Counter
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from pathlib import Path
@@ -20,7 +20,6 @@ from hobble.core.errors import HobbleError, InputError
 from hobble.core.quat import Array
 from hobble.motion.body import SIDES, TRUNK
 from hobble.motion.duplicates import ClipDigest, clip_digest, duplicate_pairs
-from hobble.motion.edit import resample
 from hobble.motion.make import fit_skeleton, load_source, make_clip
 from hobble.motion.options import ClipMotion
 from hobble.motion.other_formats import MOTION_SUFFIXES, read_motion
@@ -110,13 +109,9 @@ def _summary_of_file(file: Path, skeleton: Path, skeleton_folder: Path, options:
     try:
         clip, report = make_clip(file, skeleton, skeleton_folder, file.stem, skeleton.stem, options)
     except HobbleError as error:
-        return ClipSummary(file.stem, refused=_without_path(str(error).split("\n")[0], file))
+        # In the table, the message follows the clip's name.
+        return ClipSummary(file.stem, refused=str(error).split("\n")[0].removeprefix(str(file)).lstrip(":, "))
     return summary_of_clip(clip, report)
-
-
-def _without_path(message: str, file: Path) -> str:
-    """A message without the path of its file, because in the table it follows the clip's name."""
-    return message.removeprefix(str(file)).lstrip(":, ")
 
 
 def summary_of_report(report: Mapping[str, Any]) -> ClipSummary:
@@ -124,13 +119,17 @@ def summary_of_report(report: Mapping[str, Any]) -> ClipSummary:
 
     The fields that would need the clip itself keep their defaults.
     """
+    warnings = [*report.get("unsure", [])]
+    if repairs := report["repairs"]:  # the start of the first one, and the number of the others
+        more = f" and {len(repairs) - 1} more" if len(repairs) > 1 else ""
+        warnings.append(f"repaired: {re.split('[;.,] ', repairs[0])[0].rstrip('.')}{more}")
     return ClipSummary(
         report["clip"],
         rig=report["rig"],
         fps=report["source_fps"],
         seconds=report["seconds"],
         largest_difference=most_different(report["retarget"]) if report.get("retarget") else None,
-        warnings=(*report.get("unsure", []), *_repair_warning(report)),
+        warnings=tuple(warnings),
     )
 
 
@@ -138,33 +137,18 @@ def summary_of_clip(clip: Clip, report: Mapping[str, Any]) -> ClipSummary:
     """The whole summary of a clip. report: its report (`motion/<clip>.json`)."""
     hips = clip.positions[:, clip.skeleton.role("hips")]
     moves = np.linalg.norm(np.diff(hips[:, [0, 2]], axis=0), axis=-1)
-    distance = float(moves.sum())
-    seconds = len(clip) / clip.fps
-    steps = step_count(clip)
-    standing = standing_seconds(moves * clip.fps, clip.fps)
-    summary = summary_of_report(report)
+    seconds, steps = len(clip) / clip.fps, step_count(clip)
     return replace(
-        summary,
+        summary_of_report(report),
         name=clip.name,
         seconds=seconds,
         hip_height=float(np.median(hips[:, 1])),
-        speed=distance / seconds,
+        speed=float(moves.sum()) / seconds,
         steps=steps,
         cadence=60.0 * steps / seconds,
-        standing=standing,
+        standing=standing_seconds(moves * clip.fps, clip.fps),
         digest=clip_digest(clip, report["sha256"]),
     )
-
-
-def _repair_warning(report: Mapping[str, Any]) -> list[str]:
-    """A short warning that the clip was repaired: the start of the first repair and the number of the others.
-
-    The list is empty if nothing was repaired.
-    """
-    if not (repairs := report["repairs"]):
-        return []
-    more = f" and {len(repairs) - 1} more" if len(repairs) > 1 else ""
-    return [f"repaired: {re.split('[;.,] ', repairs[0])[0].rstrip('.')}{more}"]
 
 
 def duplicate_notes(clips: Sequence[ClipSummary]) -> list[str]:
@@ -208,32 +192,20 @@ def format_table(folder: FolderSummary) -> str:
     return "\n".join([*lines, *folder.notes])
 
 
-# Makes an HTML page about a data set before training: a line for each clip, with a small walking figure.
-#
-# If there are very many clips, only some of them are read. The lines of the others show only what is in their
-# reports and labels.
-
+# The page about a data set before training: a line for each clip, with a small walking figure. If there are
+# very many clips, only some of them are read. The lines of the others show what their reports and labels say.
 
 FRAMES, SECONDS = 40, 4.0  # the small figure shows up to 40 frames from the middle 4 seconds of its clip
-# Limits for the clips that are read: how many, and their length in seconds. Clips at these limits make a page
-# of 10 MB in half a minute.
-MOST_READ, MOST_SECONDS = 600, 5 * 3600.0
+MOST_READ = 600  # clips; as many make a page of 10 MB in half a minute
 MOST_NOTES = 40  # at most this many notes above the table are shown, such as notes on duplicates
 LABELS = ("cycles", "seconds", "warnings")  # keys of `labels/<clip>.json` that the page shows
-GOLDEN = 0.6180339887498949  # golden ratio - 1; its multiples, modulo 1, are spread evenly over 0..1
-COLUMNS = (
-    "clip",
-    "",
-    "rig",
-    "fps",
-    "s",
-    "hips, cm",
-    "steps/min",
-    "cycles",
-    "gait, s",
-    "foot down",
-    "largest difference",
+SAMPLED = (
+    "To keep this page small, only {} clips were read, clips with warnings first. Only these have a figure "
+    "and all numbers. Duplicates were searched only among them."
 )
+GOLDEN = 0.6180339887498949  # golden ratio - 1; its multiples, modulo 1, are spread evenly over 0..1
+COLUMNS = ("clip", "", "rig", "gait, s", "largest difference")  # texts; the columns of numbers follow
+COLUMNS += ("fps", "s", "hips, cm", "steps/min", "cycles", "foot down")
 STYLE = """body{font:14px/1.4 system-ui,sans-serif;margin:1.5em;color:#222;background:#fff}
 table{border-collapse:collapse}th,td{padding:2px 9px;text-align:left;border-bottom:1px solid #e3e3e3}
 th{position:sticky;top:0;background:#fff}td.n{text-align:right;font-variant-numeric:tabular-nums}
@@ -269,15 +241,11 @@ def make_figure(clip: Clip) -> dict[str, Any]:
     height = max(float(np.percentile(p[..., 1].max(axis=1), 90)), 1.0)
     # The hips are in the middle, the floor is at pixel 76, and the figure is 68 pixels tall.
     pixels = np.stack([40 + 68 * along / height, 76 - 68 * p[..., 1] / height], axis=-1)
-    bones = [(parent, j, _side(clip, j)) for j, parent in enumerate(clip.skeleton.parents) if parent >= 0]
+    names = [name.lower() for name in clip.skeleton.joints]
+    sides = [1 if "left" in name else 2 if "right" in name else 0 for name in names]
+    bones = [(parent, j, sides[j]) for j, parent in enumerate(clip.skeleton.parents) if parent >= 0]
     flat = np.clip(pixels, 0, 80).round(1).reshape(len(frames), -1)
     return {"p": flat.tolist(), "b": bones, "f": round(len(frames) * clip.fps / shown, 2)}
-
-
-def _side(clip: Clip, joint: int) -> int:
-    """1 for a joint on the left, 2 on the right, 0 in the middle, by its name."""
-    name = clip.skeleton.joints[joint].lower()
-    return 1 if "left" in name else 2 if "right" in name else 0
 
 
 def foot_down_share(contacts: Array) -> float:
@@ -286,20 +254,6 @@ def foot_down_share(contacts: Array) -> float:
     contacts: (F, 4), whether each of both heels and toes is on the ground (1 or 0).
     """
     return float((np.asarray(contacts) > 0.5).any(axis=1).mean())
-
-
-@dataclass(frozen=True)
-class _ClipLine:
-    """What the page shows about a clip.
-
-    labels: the values of LABELS for the clip. figure: the result of `make_figure`. foot_down: the result of
-    `foot_down_share`. Both are None if the clip was not read.
-    """
-
-    summary: ClipSummary
-    labels: Mapping[str, Any]
-    figure: dict[str, Any] | None = None
-    foot_down: float | None = None
 
 
 def look_page(
@@ -314,79 +268,46 @@ def look_page(
     in `labels/<clip>.json`. read: index of a clip -> the clip and its contacts (F, 4). It is called only for
     the clips of `choose_clips`, one after another.
     """
-    chosen = choose_clips(reports, labels)
-    lines = [
-        _ClipLine(summary_of_report(report), labelled)
-        for report, labelled in zip(reports, labels, strict=True)
-    ]
-    for n in sorted(chosen):
+    summaries = [summary_of_report(report) for report in reports]
+    chosen = choose_clips(
+        [bool(summary.warnings or of["warnings"]) for summary, of in zip(summaries, labels, strict=True)]
+    )
+    figures, foot_down = [], {}
+    for n in chosen:
         clip, contacts = read(n)
-        summary = summary_of_clip(clip, reports[n])
-        lines[n] = _ClipLine(summary, labels[n], make_figure(clip), foot_down_share(contacts))
-    summaries, common = shared_warnings([line.summary for line in lines])
-    lines = [replace(line, summary=summary) for line, summary in zip(lines, summaries, strict=True)]
+        summaries[n] = summary_of_clip(clip, reports[n])
+        figures.append(make_figure(clip))
+        foot_down[n] = foot_down_share(contacts)
+    short, common = shared_warnings(summaries)
     # Only if all clips were read is it certain that nobody stands in them.
-    all_read = len(chosen) == len(lines)
-    notes = standing_notes(summaries) if all_read else [_sample_note(len(chosen))]
-    notes += [*common, *duplicate_notes(summaries)]
+    notes = standing_notes(short) if len(chosen) == len(short) else [SAMPLED.format(len(chosen))]
+    notes += [*common, *duplicate_notes(short)]
     if (more := len(notes) - MOST_NOTES) > 0:
         notes[MOST_NOTES:] = [f"And {more} more notes, most of them on duplicates."]
-    return _html(name, lines, notes)
-
-
-def choose_clips(reports: Sequence[Mapping[str, Any]], labels: Sequence[Mapping[str, Any]]) -> list[int]:
-    """Indices of the clips that are read for the page: all of them, or some if there are very many.
-
-    Clips with warnings are taken first, until they are half of MOST_READ. Then clips without warnings are
-    taken, and last any further clips with warnings. The clips of each group are spread evenly over the data
-    set. If there is any clip, at least one is taken.
-
-    reports, labels: as for `look_page`.
-    """
-    warned = [
-        bool(summary_of_report(report).warnings or labelled["warnings"])
-        for report, labelled in zip(reports, labels, strict=True)
-    ]
-    # Wherever a list in this order is cut off, the numbers before the cut are spread evenly.
-    spread = sorted(range(len(reports)), key=lambda n: n * GOLDEN % 1)
-    with_warning, without = ([n for n in spread if warned[n] is which] for which in (True, False))
-    half = MOST_READ // 2
-    out: list[int] = []
-    seconds = 0.0
-    for n in [*with_warning[:half], *without, *with_warning[half:]][:MOST_READ]:
-        seconds += reports[n]["seconds"]
-        if out and seconds > MOST_SECONDS:
-            break
-        out.append(n)
-    return out
-
-
-def _sample_note(count: int) -> str:
-    return (
-        f"To keep this page small, only {count} clips were read, clips with warnings first. Only the clips "
-        "that were read have a figure and all numbers. Duplicates were searched only among them."
-    )
-
-
-def _html(name: str, lines: Sequence[_ClipLine], notes: Sequence[str]) -> str:
-    """The text of the page: the notes, then a table of the lines."""
-    seconds = sum(line.summary.seconds for line in lines)
-    figures = [line.figure for line in lines if line.figure is not None]
+    rows = (_row(summary, labels[n], foot_down.get(n)) for n, summary in enumerate(short))
+    seconds, title = sum(summary.seconds for summary in short), html.escape(name)
     data = json.dumps(figures, separators=(",", ":"))
-    title = html.escape(name)
     return (
         f'<!doctype html><html lang="en"><meta charset="utf-8"><title>{title}</title><style>{STYLE}</style>'
-        f"<h1>{title}</h1><p>{len(lines)} clips, {seconds:.0f} s. Left is red, right is blue.</p>"
+        f"<h1>{title}</h1><p>{len(short)} clips, {seconds:.0f} s. Left is red, right is blue.</p>"
         + "".join(f'<p class="note">{html.escape(note)}</p>' for note in notes)
         + f"<table><thead><tr>{''.join(f'<th>{column}</th>' for column in COLUMNS)}</tr></thead>"
-        + f"<tbody>{''.join(_row(line) for line in lines)}</tbody></table>"
+        + f"<tbody>{''.join(rows)}</tbody></table>"
         + f'<script type="application/json" id="d">{data}</script><script>{SCRIPT}</script></html>\n'
     )
 
 
-def _row(line: _ClipLine) -> str:
-    """A row of the table, with a cell for each of COLUMNS."""
-    summary, labels = line.summary, line.labels
+def choose_clips(warned: Sequence[bool]) -> list[int]:
+    """Indices of the clips that are read for the page, in order: all of them, or MOST_READ.
+
+    warned: for each clip, whether it has a warning. These are taken first. The others are spread evenly over
+    the data set, since wherever a list in the order of `n * GOLDEN % 1` is cut off, its numbers are.
+    """
+    return sorted(sorted(range(len(warned)), key=lambda n: (not warned[n], n * GOLDEN % 1))[:MOST_READ])
+
+
+def _row(summary: ClipSummary, labels: Mapping[str, Any], foot_down: float | None) -> str:
+    """A row of the table, with a cell for each column. foot_down: None if the clip was not read."""
     gaits = ", ".join(f"{gait} {s:.1f}" for gait, s in labels["seconds"].items() if s >= 0.05)
     difference = "not retargeted"
     if summary.largest_difference:
@@ -394,21 +315,16 @@ def _row(line: _ClipLine) -> str:
         # The bar is full at 15 degrees, the mean difference above which a clip is refused.
         bar = f'<span class="bar"><i style="width:{min(100.0, degrees / 15 * 100):.0f}%"></i></span>'
         difference = f"{bar}{html.escape(joint)} {degrees:.0f}&deg;"
-    remarks = "; ".join([*summary.warnings, *labels["warnings"]])
-    name = html.escape(summary.name) + (f"<br><small>{html.escape(remarks)}</small>" if remarks else "")
-    # These cells stay empty if the clip was not read.
-    picture, measured_cells, foot_down = "", ["", ""], ""
-    if line.foot_down is not None:
-        picture = '<canvas width="80" height="80"></canvas>'
-        measured_cells = [f"{summary.hip_height:.0f}", f"{summary.cadence:.0f}"]
-        foot_down = f"{100 * line.foot_down:.0f} %"
-    numbers = [f"{summary.fps:.4g}", f"{summary.seconds:.1f}", *measured_cells, str(labels["cycles"])]
-    cells = "".join(f'<td class="n">{value}</td>' for value in numbers)
-    return (
-        f"<tr><td>{name}</td><td>{picture}</td>"
-        f"<td>{html.escape(summary.rig)}</td>{cells}<td>{html.escape(gaits)}</td>"
-        f'<td class="n">{foot_down}</td><td>{difference}</td></tr>'
-    )
+    remarks = html.escape("; ".join([*summary.warnings, *labels["warnings"]]))
+    name = html.escape(summary.name) + (f"<br><small>{remarks}</small>" if remarks else "")
+    picture, height, cadence, down = ("",) * 4
+    if foot_down is not None:
+        picture, down = '<canvas width="80" height="80"></canvas>', f"{100 * foot_down:.0f} %"
+        height, cadence = f"{summary.hip_height:.0f}", f"{summary.cadence:.0f}"
+    numbers = [f"{summary.fps:.4g}", f"{summary.seconds:.1f}", height, cadence, str(labels["cycles"]), down]
+    texts = [name, picture, html.escape(summary.rig), gaits, difference]
+    cells = [f"<td>{text}</td>" for text in texts] + [f'<td class="n">{number}</td>' for number in numbers]
+    return f"<tr>{''.join(cells)}</tr>"
 
 
 # Draws a clip beside the retargeted motion, as stick figures from the side and from the front.
@@ -433,14 +349,11 @@ def picture_of_file(bvh: Path, skeleton: Path, skeleton_folder: Path, options: C
     """
     target = load_skeleton(skeleton, skeleton.stem)
     source = load_source(read_motion(bvh), target, skeleton_folder, options)
-    before = resample(source.clip, options.fps)
-    before = replace(before, skeleton=replace(before.skeleton, roles=source.match.roles))
-    fitted = fit_skeleton(before, source, target.skeleton, options.proportions)
+    fitted = fit_skeleton(source, target.skeleton, options)
     if fitted.difference is None:
-        raise InputError(
-            bvh, f"already has the bones of {target.skeleton.name}, so there is no retargeting to draw"
-        )
-    return retarget_picture(before, fitted.clip, *most_different(fitted.difference))
+        problem = f"already has the bones of {target.skeleton.name}, so there is no retargeting to draw"
+        raise InputError(bvh, problem)
+    return retarget_picture(fitted.source, fitted.clip, *most_different(fitted.difference))
 
 
 def retarget_picture(source: Clip, result: Clip, part: str, degrees: float) -> str:
@@ -495,30 +408,20 @@ def _draw_figures(clip: Clip, frames: Array, part: str, view: str) -> list[str]:
         role: scale * np.stack([np.sum((p - at["hips"]) * rightward, axis=-1), lowest - p[:, 1]], axis=-1)
         for role, p in at.items()
     }
-    lines = [""] * len(frames)
-    for a, b, colour, thick in _bones_to_draw(pixels, part):
-        for k in range(len(frames)):
-            (x1, y1), (x2, y2) = pixels[a][k], pixels[b][k]
-            lines[k] += (
-                f'<line x1="{x1:.1f}" y1="{y1:.1f}" x2="{x2:.1f}" y2="{y2:.1f}" stroke="{colour}" '
-                f'stroke-width="{thick}" stroke-linecap="round"/>'
-            )
-    return lines
-
-
-def _bones_to_draw(roles: Collection[str], part: str) -> list[tuple[str, str, str, int]]:
-    """For each bone to draw: the roles of its start and end, its colour, and its width in pixels.
-
-    roles: those that the figure has. part: the joint or limb in red.
-    """
     side, _, name = part.partition(" ")
     ends = ANGLES.get(name) or BONES.get(name) or ()
     in_part = set(pairwise(role if role == "head" else f"{side}_{role}" for role in ends))
     chains = [("", TRUNK)] + [
-        (side, (first, *(f"{side}_{role}" for role in rest))) for side in SIDES for first, *rest in LIMBS
+        (s, (first, *(f"{s}_{r}" for r in rest))) for s in SIDES for first, *rest in LIMBS
     ]
-    return [
-        (a, b, *((WRONG, 6) if (a, b) in in_part else (COLOURS[side], 3)))
-        for side, chain in chains
-        for a, b in pairwise(role for role in chain if role in roles)
-    ]
+    lines = [""] * len(frames)
+    for limb, chain in chains:
+        for a, b in pairwise(role for role in chain if role in pixels):
+            colour, thick = (WRONG, 6) if (a, b) in in_part else (COLOURS[limb], 3)
+            for k in range(len(frames)):
+                (x1, y1), (x2, y2) = pixels[a][k], pixels[b][k]
+                lines[k] += (
+                    f'<line x1="{x1:.1f}" y1="{y1:.1f}" x2="{x2:.1f}" y2="{y2:.1f}" stroke="{colour}" '
+                    f'stroke-width="{thick}" stroke-linecap="round"/>'
+                )
+    return lines

@@ -19,7 +19,7 @@ from hobble.core.errors import InputError
 from hobble.core.skeleton import Skeleton, rest_positions
 from hobble.motion.axes import RigAxes, straighten, turned_about_vertical
 from hobble.motion.body import Body, body_by_roles, match_joints
-from hobble.motion.edit import facing_angle, loop_clip, notes_on_spins, repair_defects, resample
+from hobble.motion.edit import facing_angle, loop_clip, repair_defects, resample
 from hobble.motion.ground import put_on_floor, tilt_problem
 from hobble.motion.limbs import on_four_legs
 from hobble.motion.options import ACCEPT, ClipMotion, MotionOptions, Problem, accept
@@ -80,7 +80,7 @@ def make_clip(
         file = _cut(file, *options.frames)
     source = load_source(file, target, skeleton_folder, options)
     _check_length(file, source.clip, target.skeleton, options)
-    fitted = fit_skeleton(resample(source.clip, options.fps), source, target.skeleton, options.proportions)
+    fitted = fit_skeleton(source, target.skeleton, options)
     made, repairs, loops = fitted.clip, source.repairs + fitted.repairs, options.loops
     problems = clip_problems(made, source.clip.fps, fitted.scale, options)
     if fitted.difference is not None:
@@ -249,8 +249,9 @@ def load_source(
             mended, notes = mended + floor_repairs, notes + floor_notes
     if mended and options.defects == "refuse":
         raise InputError(file.path, mended[0], fix="Set motion.defects: repair to repair it this way.")
-    repairs, notes = counted + source.repairs + mended, notes + notes_on_spins(clip, first)
-    return replace(source, clip=clip, first_frame=first, repairs=repairs, notes=notes)
+    return replace(
+        source, clip=clip, first_frame=first, repairs=counted + source.repairs + mended, notes=notes
+    )
 
 
 def _load_rig(file: Bvh, target: KnownSkeleton, folder: str | Path, options: ClipMotion) -> FileMotion:
@@ -278,23 +279,24 @@ def _load_rig(file: Bvh, target: KnownSkeleton, folder: str | Path, options: Cli
     roles = known.roles if is_known and known else body.roles(raw.skeleton.joints)
     clip = _scaled(file, replace(raw.skeleton, roles=roles), decoded, unit, options)
     try:
-        straight = straighten(clip, options.up, options.handedness, standing)
+        clip, axes, note, in_doubt = straighten(clip, options.up, options.handedness, standing)
     except ValueError as error:
         fix = "Set motion.up in the data set to Y or Z (option --up)."
         raise InputError(file.path, f"the up axis is in doubt: {error}", fix=fix) from None
+    told = [note] if note else []
     source = FileMotion(
-        straight.clip,
+        clip,
         known or RigMatch(UNKNOWN_RIG, roles),
         unit,
         unit_name,
         # The standing rest pose that replaces another one faces +Z.
-        straight.axes if standing else replace(straight.axes, facing="+Z"),
+        axes if standing else replace(axes, facing="+Z"),
         rest_source="its zero pose",
         has_moving_joints=_has_moving_joints(decoded, body, unit),
         has_standing_rig=False,
         repairs=decoded.repairs,
-        notes=decoded.notes + straight.notes + how_found,
-        unsure=doubts + straight.unsure,
+        notes=decoded.notes + ([] if in_doubt else told) + how_found,
+        unsure=doubts + (told if in_doubt else []),
     )
     return source if is_known else _with_standing_rig(file, source, body, target, options)
 
@@ -398,32 +400,35 @@ def _scaled(file: Bvh, rig: Skeleton, decoded: Decoded, unit: float, options: Cl
 class Fitted(NamedTuple):
     """A clip on the joints of the target.
 
-    scale: length of the clip's path / length of the source's path. difference: how the clip differs from the
-    source (see `compare_motions`), or None if it was not retargeted. repairs, unsure: sentences on what was
-    changed, and on what is uncertain.
+    source: the clip before, at the same frame rate. scale: length of the clip's path / length of the source's
+    path. difference: how the clip differs from the source (see `compare_motions`), or None if it was not
+    retargeted. repairs, unsure: sentences on what was changed, and on what is uncertain.
     """
 
     clip: Clip
+    source: Clip
     scale: float
     difference: dict[str, Any] | None
     repairs: list[str]
     unsure: list[str]
 
 
-def fit_skeleton(clip: Clip, source: FileMotion, target: Skeleton, proportions: str) -> Fitted:
-    """Put the clip's motion on the target skeleton.
+def fit_skeleton(source: FileMotion, target: Skeleton, options: MotionOptions) -> Fitted:
+    """Put a file's motion on the target skeleton, at the frame rate of the options.
 
-    clip: the clip of `source` at the new frame rate. proportions: "skeleton" for the target's bone lengths,
-    "clip" to keep the clip's own bone lengths. They can be kept if the clip has the target's joints,
-    and its bones point in the same directions in the rest pose.
+    With `proportions: clip`, the clip keeps its own bone lengths if it has the target's joints and its bones
+    point in the same directions in the rest pose.
     """
     match, moved = source.match, "Movements of joints relative to their parents were "
+    clip, kept = resample(source.clip, options.fps), options.proportions == "clip"
+    before = replace(clip, skeleton=replace(clip.skeleton, roles=match.roles))
     if match.is_target_skeleton:
         reordered = _reordered(clip, target)
         has_equal_offsets = np.abs(reordered.skeleton.offsets - target.offsets).max() <= SAME
-        if has_equal_offsets or proportions == "clip":
+        if has_equal_offsets or kept:
             reordered = replace(reordered, skeleton=target) if has_equal_offsets else reordered
-            return Fitted(reordered, 1.0, None, [f"{moved}kept."] if source.has_moving_joints else [], [])
+            repairs = [f"{moved}kept."] if source.has_moving_joints else []
+            return Fitted(reordered, before, 1.0, None, repairs, [])
     followed_joints, unsure = match.followed_joints, source.unsure
     # Retargeting needs a rest pose that stands. If `has_standing_rig` is True, `load_source` has made one.
     if not source.has_standing_rig:
@@ -432,12 +437,10 @@ def fit_skeleton(clip: Clip, source: FileMotion, target: Skeleton, proportions: 
         clip, unsure = standing.clip, unsure + standing.doubts
         # `with_upright_rest` drops a joint, even one of joints_to_keep, if none of its ancestors belongs to
         # the body.
-        followed_joints = {
-            joint: followed for joint, followed in followed_joints.items() if followed in clip.skeleton.joints
-        }
+        followed_joints = {a: b for a, b in followed_joints.items() if b in clip.skeleton.joints}
     how = plan(clip.skeleton, target, followed_joints)
     repairs = [f"{moved}dropped, because the bone lengths changed."] if source.has_moving_joints else []
-    if proportions == "clip":
+    if kept:
         why = f"Its rig is {'unknown' if match.rig == UNKNOWN_RIG else match.rig}"
         if match.rig == target.name:
             why = f"Its joints or its rest pose are not those of {target.name}"
@@ -445,7 +448,7 @@ def fit_skeleton(clip: Clip, source: FileMotion, target: Skeleton, proportions: 
             f"{why}, so it could not keep its own bone lengths. It got the bone lengths of {target.name}."
         )
     made = retarget_clip(clip, how)
-    return Fitted(made, round(how.scale, 6), compare_motions(clip, made, how.scale), repairs, unsure)
+    return Fitted(made, before, round(how.scale, 6), compare_motions(clip, made, how.scale), repairs, unsure)
 
 
 def _reordered(clip: Clip, target: Skeleton) -> Clip:

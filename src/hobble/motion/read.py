@@ -10,10 +10,11 @@ from __future__ import annotations
 import hashlib
 import io
 import re
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 
@@ -28,8 +29,7 @@ MOST_BYTES = 1 << 30
 MOST_HEADER = 1 << 24  # bytes before the word MOTION
 MOST_JOINTS = 4096
 LONGEST_NAME = 200  # characters
-MOST_LINES = 50_000_000  # lines after the word MOTION
-LONGEST_LINE = 1 << 22  # bytes; a frame of 4096 joints with six values of 25 characters has 614,400
+LONGEST_LINE = 1 << 22  # bytes, in a file with an error; 4096 joints with six long values have 614,400
 MOST_JOINT_POSES = 50_000_000  # frames times joints
 CHANNELS = tuple(f"{axis}{kind}" for kind in ("position", "rotation") for axis in "XYZ")
 EXPORT = "Export the clip again."  # advice in most errors
@@ -149,8 +149,7 @@ class _Joints:
 
     names, parents, offsets, channels, end_sites: as in `Bvh`. line: number of the current line. open: stack
     of the joints whose braces are open, -1 for an end site. pending: the joint, or -1 for an end site, that
-    still needs its opening brace. end_placed: whether the last end site has its OFFSET. seen: name of each
-    joint -> number of its line.
+    still needs its opening brace. placed: those of the open joints and end sites that have their OFFSET.
     """
 
     def __init__(self, path: Path, data: bytes) -> None:
@@ -163,19 +162,19 @@ class _Joints:
         self.end_sites: dict[str, list[tuple[float, float, float]]] = {}
         self.open: list[int] = []
         self.pending: list[int] = []  # none or one
-        self.end_placed = True
-        self.seen: dict[str, int] = {}
-        start = data.upper().index(b"HIERARCHY")  # the root may follow on the same line
-        data = data[:start] + data[start + len(b"HIERARCHY") :]
+        self.placed: set[int] = set()
+        self.lines: dict[str, int] = {}  # name -> number of its line
         try:
             text = data.decode("utf-8")
         except UnicodeDecodeError:
             text = data.decode("latin-1")
+        # The root may follow on the line of the first word, HIERARCHY.
+        text = re.sub("HIERARCHY", "", text, count=1, flags=re.IGNORECASE)
         for self.line, raw in enumerate(text.split("\n"), 1):
             # A brace is a statement of its own, wherever it is in the line.
-            for part in raw.replace("{", "\n{\n").replace("}", "\n}\n").split("\n"):
-                if words := " ".join(part.split()):
-                    self.read_statement(*words.partition(" ")[::2])
+            for part in re.split(r"([{}])", raw):
+                if words := part.split():
+                    self.read_statement(words[0], words[1:])
         self.need(not self.open and not self.pending, "truncated: a joint is still open where MOTION begins")
         self.need(bool(self.names), "no joints before MOTION")
 
@@ -184,91 +183,85 @@ class _Joints:
         if not right:
             raise InputError(self.path, problem, line=self.line, fix=EXPORT)
 
-    def read_statement(self, word: str, rest: str) -> None:
+    def read_statement(self, word: str, rest: list[str]) -> None:
         """Read a keyword and what follows it, or a brace alone."""
         keyword = word.upper()
         self.need(not self.pending or word == "{", "an opening brace is missing")
         if keyword in ("ROOT", "JOINT"):
-            self.read_joint(rest)
+            self.read_joint(" ".join(rest))
         elif keyword == "END":
             self.need(bool(self.open), "an end site outside of any joint")
-            self.pending, self.end_placed = [-1], False
+            self.pending = [-1]
+            self.placed.discard(-1)
         elif word == "{":
             self.need(bool(self.pending), "an opening brace without a joint")
             self.open.append(self.pending.pop())
         elif word == "}":
-            self.close_brace()
+            self.need(bool(self.open), "a closing brace too many")
+            joint = self.open.pop()
+            what = f"joint {self.names[joint]!r}" if joint >= 0 else "an end site"
+            self.need(joint in self.placed, f"{what} has no OFFSET")
         elif keyword == "OFFSET":
             self.read_offset(rest)
         elif keyword == "CHANNELS":
             self.read_channels(rest)
         else:
-            expected = "expected is a joint, OFFSET, CHANNELS or a brace"
-            self.need(False, f"{word[:40]!r} is not known here; {expected}")
+            self.need(
+                False, f"{word[:40]!r} is not known here; expected is a joint, OFFSET, CHANNELS or a brace"
+            )
 
     def read_joint(self, name: str) -> None:
-        """Begin a joint. Its OFFSET is NaN until it is read."""
+        """Begin a joint."""
         self.need(bool(name), "a joint without a name")
         too_long = f"a joint's name has {len(name)} characters, more than {LONGEST_NAME}"
         self.need(len(name) <= LONGEST_NAME, too_long)
-        twice = f"joint {name!r} occurs twice (first in line {self.seen.get(name)})"
-        self.need(name not in self.seen, twice)
+        self.need(
+            name not in self.lines, f"joint {name!r} occurs twice (first in line {self.lines.get(name)})"
+        )
         second_root = f"a second root, {name!r}, although a file may have only one figure"
         self.need(bool(self.open) or not self.names, second_root)
         self.need(len(self.names) < MOST_JOINTS, f"more than {MOST_JOINTS} joints")
-        self.seen[name] = self.line
+        self.lines[name] = self.line
         self.pending = [len(self.names)]
         self.names.append(name)
         self.parents.append(self.open[-1] if self.open else -1)
-        self.offsets.append((np.nan,) * 3)
+        self.offsets.append((0.0, 0.0, 0.0))
         self.channels.append(())
 
-    def close_brace(self) -> None:
-        """End a joint or an end site, which must have its OFFSET."""
-        self.need(bool(self.open), "a closing brace too many")
-        joint = self.open.pop()
-        if joint < 0:
-            self.need(self.end_placed, "an end site has no OFFSET")
-        else:
-            placed = not np.isnan(self.offsets[joint][0])
-            self.need(placed, f"joint {self.names[joint]!r} has no OFFSET")
-
-    def read_offset(self, text: str) -> None:
+    def read_offset(self, words: list[str]) -> None:
         """Read the OFFSET of a joint or of an end site."""
         self.need(bool(self.open), "OFFSET outside of any joint")
-        words = text.split()
+        text = " ".join(words)[:60]
         numbers = len(words) == 3 and all(map(_is_number, words))
-        self.need(numbers, f"OFFSET needs three numbers, not {text[:60]!r}")
+        self.need(numbers, f"OFFSET needs three numbers, not {text!r}")
         x, y, z = map(float, words)
-        self.need(bool(np.isfinite((x, y, z)).all()), f"OFFSET is not finite: {text[:60]!r}")
+        self.need(bool(np.isfinite((x, y, z)).all()), f"OFFSET is not finite: {text!r}")
+        self.placed.add(self.open[-1])
         if self.open[-1] >= 0:
             self.offsets[self.open[-1]] = (x, y, z)
         else:
-            self.end_placed = True
             self.end_sites.setdefault(self.names[self.open[-2]], []).append((x, y, z))
 
-    def read_channels(self, text: str) -> None:
+    def read_channels(self, words: list[str]) -> None:
         """Read the names of a joint's channels."""
         self.need(bool(self.open) and self.open[-1] >= 0, "CHANNELS outside of any joint")
         # Only the beginnings of very long texts are read, because a damaged file may hold anything.
-        count, *words = text.split()[:100] or [""]
-        counted = count.isdecimal() and int(count[:9]) == len(words)
-        self.need(counted, f"CHANNELS declares {count[:12] or 'no number'} and names {len(words)}")
-        names = tuple(word[:40].capitalize() for word in words)
-        for name, word in zip(names, words, strict=True):
-            known = f"unknown channel {word[:40]!r}; known are {', '.join(CHANNELS)}"
-            self.need(name in CHANNELS, known)
-        self.need(len(set(names)) == len(names), f"a channel is named twice: {text[:100]}")
-        self.channels[self.open[-1]] = names
+        count, *names = [word[:40].capitalize() for word in words[:100]] or [""]
+        counted = count.isdecimal() and int(count[:9]) == len(names)
+        self.need(counted, f"CHANNELS declares {count[:12] or 'no number'} and names {len(names)}")
+        unknown = next((name for name in names if name not in CHANNELS), "")
+        self.need(not unknown, f"unknown channel {unknown!r}; known are {', '.join(CHANNELS)}")
+        self.need(len(set(names)) == len(names), f"a channel is named twice: {' '.join(names)}")
+        self.channels[self.open[-1]] = tuple(names)
 
 
-def _is_number(word: str | bytes) -> bool:
+def _is_number(word: str) -> bool:
     """Whether `float` reads a word. Python would also accept 1_000, which other programs do not write."""
     try:
         float(word)
     except ValueError:
         return False
-    return ("_" if isinstance(word, str) else b"_") not in word  # type: ignore[operator]
+    return "_" not in word
 
 
 def _declaration(
@@ -313,78 +306,52 @@ def _check_size(path: Path, declared: int, width: int, joints: int, left: int, l
 
 
 def _read_values(path: Path, data: bytes, at: int, width: int, declared: int, first_line: int) -> Array:
-    """The table (F, width) of the numbers in `data` from `at` on.
+    """The table (F, width) of the numbers in `data` from `at` on, however they are divided into lines.
 
-    `np.loadtxt` reads a file with one frame on each line. For the rest, `_read_or_explain` reads the table or
-    finds the error. declared: the number of frames that the file declares. first_line: number of the line
-    that begins at `at`.
+    declared: the number of frames that the file declares. first_line: number of the line that begins at `at`.
     """
-    if not re.compile(rb"\S").search(data, at):
+    body = data[at:]
+    if not body.strip():
         raise InputError(path, f"truncated: declares {declared} frames and has none", line=first_line)
-    _check_lines(path, data, at, first_line)
-    text = io.BytesIO(data)  # shares the memory of `data`; a slice would be a copy
-    text.seek(at)
     try:
-        table = np.loadtxt(text, dtype=float, comments=None, ndmin=2)
-    except ValueError:
-        table = np.empty((0, 0))
-    if table.shape[1] != width:
-        table = _read_or_explain(path, data[at:], width, first_line)
-    bad = ~np.isfinite(table).all(axis=1)
-    if bad.any():
-        frame = int(np.argmax(bad))
-        filled = np.flatnonzero(_words_in_lines(data[at:]))
-        line = first_line + int(filled[frame]) if len(filled) == len(table) else None
-        raise InputError(path, "a value is NaN or infinite", line=line, frame=frame + 1, fix=EXPORT)
-    if abs(len(table) - declared) > 1:
-        declares = "truncated: declares" if len(table) < declared else "declares"
-        raise InputError(path, f"{declares} {declared} frames and has {len(table)}", fix=EXPORT)
-    return table
+        with warnings.catch_warnings():
+            warnings.simplefilter("error", DeprecationWarning)  # NumPy before 2.4 only warns of other words
+            values = np.fromstring(body, sep=" ")  # type: ignore[call-overload]
+    except (ValueError, DeprecationWarning):
+        values = np.array([np.nan])
+    if len(values) % width or not np.isfinite(values).all():
+        _explain(path, body, width, first_line)
+    frames = len(values) // width
+    if abs(frames - declared) > 1:
+        declares = "truncated: declares" if frames < declared else "declares"
+        raise InputError(path, f"{declares} {declared} frames and has {frames}", fix=EXPORT)
+    return values.reshape(frames, width)
 
 
-def _check_lines(path: Path, data: bytes, at: int, first_line: int) -> None:
-    """Raise InputError if a line is too long or there are too many lines.
+def _explain(path: Path, body: bytes, width: int, first_line: int) -> NoReturn:
+    """Raise InputError for a table that holds other words than numbers, or a part of a frame.
 
-    This is checked first, because splitting such a text into lines would take too much memory.
+    body: the text of the table. first_line: the number of its first line in the file.
     """
-    for start in range(at, len(data) - LONGEST_LINE, LONGEST_LINE):
-        if data.find(b"\n", start, start + LONGEST_LINE) < 0:
-            line = first_line + data.count(b"\n", at, start)
-            problem = f"a line of more than {LONGEST_LINE >> 20} MB"
-            raise InputError(path, problem, line=line, fix=EXPORT)
-    if data.count(b"\n", at) > MOST_LINES:
-        raise InputError(path, f"more than {MOST_LINES} lines after MOTION", fix=CUT)
-
-
-def _words_in_lines(body: bytes) -> Array:
-    """The number of words in each line of a text."""
-    return np.fromiter((len(raw.split()) for raw in io.BytesIO(body)), np.int32)
-
-
-def _read_or_explain(path: Path, body: bytes, width: int, first_line: int) -> Array:
-    """The table (F, width) of a text in which each frame is split over several lines.
-
-    Raises InputError with the line for any other text. body: the text of the table. first_line: the number of
-    its first line in the file.
-    """
-    counts = _words_in_lines(body)
-    filled, total = np.flatnonzero(counts), int(counts.sum(dtype=np.int64))
+    counts = []  # (values in a line, number of the line), without empty lines
+    for line, raw in enumerate(io.BytesIO(body), first_line):
+        if len(raw) > LONGEST_LINE:
+            raise InputError(path, f"a line of more than {LONGEST_LINE >> 20} MB", line=line, fix=EXPORT)
+        words = raw.decode("latin-1").split()
+        for word in words:
+            if not _is_number(word) or not np.isfinite(float(word)):
+                problem = f"{word[:40]!r} is not a number{' (a decimal comma?)' if ',' in word else ''}"
+                problem = "a value is NaN or infinite" if _is_number(word) else problem
+                raise InputError(path, problem, line=line, frame=len(counts) + 1, fix=EXPORT)
+        if words:
+            counts.append((len(words), line))
     # A line with `width` values or more shows that each line should hold one frame.
-    if total % width or not total or not (counts[filled] < width).all():
-        wrong = np.flatnonzero(counts[filled] != width)
-        if len(wrong):
-            frame, i = int(wrong[0]), int(filled[wrong[0]])
-            last = " (truncated?)" if i == filled[-1] else ""
-            problem = f"{counts[i]} values, but the joints have {width} channels{last}"
-            raise InputError(path, problem, line=first_line + i, frame=frame + 1, fix=EXPORT)
-    for i, raw in enumerate(io.BytesIO(body)):
-        for word in raw.split():
-            if not _is_number(word):
-                comma = " (a decimal comma?)" if b"," in word else ""
-                problem = f"{word[:40].decode('latin-1')!r} is not a number{comma}"
-                raise InputError(path, problem, line=first_line + i, fix=EXPORT)
-    words = (float(word) for raw in io.BytesIO(body) for word in raw.split())
-    return np.fromiter(words, float, total).reshape(-1, width)
+    frame, (count, line) = next((i, found) for i, found in enumerate(counts, 1) if found[0] != width)
+    if all(values < width for values, _ in counts):
+        count, line = sum(values for values, _ in counts), counts[-1][1]
+    last = " (truncated?)" if line == counts[-1][1] else ""
+    problem = f"{count} values, but the joints have {width} channels{last}"
+    raise InputError(path, problem, line=line, frame=frame, fix=EXPORT)
 
 
 @dataclass(frozen=True)

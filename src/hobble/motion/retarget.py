@@ -24,7 +24,7 @@ from hobble.core.errors import HobbleError
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton, aim_bone, local_rotations, rest_positions, two_bone_knee
 from hobble.core.smooth import smooth_above, smoothstep
-from hobble.motion.axes import rest_frame, unit
+from hobble.motion.axes import UP, bend_direction, rest_frame, unit
 from hobble.motion.body import SIDES
 from hobble.motion.ground import steady_heels
 from hobble.motion.options import Problem
@@ -57,9 +57,7 @@ class Retarget:
 
     drivers: (J,) for each target joint the nearest of `joints` above it, or the joint itself if it is one of
     them. A joint has the world rotation of its driver. driver_offsets: (J, 3) cm, position of each joint in
-    the coordinates of its driver, or of its parent's driver if the joint is its own driver. levels: the
-    `joints` below the hips, grouped by the number of drivers between them and the hips. Groups nearer to the
-    hips come first, because the positions of a group follow from those of the groups before it.
+    the coordinates of its driver, or of its parent's driver if the joint is its own driver.
 
     forward: (3,) the direction that the target's rest pose faces. pelvis: (3,) cm, from the target's hips to
     the middle between its two hip joints. scale: leg length of the target / leg length of the source. lifts:
@@ -75,7 +73,6 @@ class Retarget:
     turns: Array = field(repr=False)
     drivers: Array = field(repr=False)
     driver_offsets: Array = field(repr=False)
-    levels: tuple[Array, ...] = field(repr=False)
     forward: Array = field(repr=False)
     pelvis: Array = field(repr=False)
     scale: float
@@ -119,7 +116,6 @@ def plan(source: Skeleton, target: Skeleton, followed_joints: Mapping[str, str])
         turns=turns,
         drivers=drivers,
         driver_offsets=driver_offsets,
-        levels=_levels(target, joints, drivers),
         forward=quat.rotate(rest_frame(target), np.array([0.0, 0.0, 1.0])),
         pelvis=middle - rest[target.role("hips")],
         scale=scale,
@@ -174,18 +170,11 @@ def _drivers(target: Skeleton, joints: Array) -> tuple[Array, Array]:
     return drivers, driver_offsets
 
 
-def _levels(target: Skeleton, joints: Array, drivers: Array) -> tuple[Array, ...]:
-    """`levels` of a Retarget."""
-    depth = {target.role("hips"): 0}
-    for j in joints:
-        if j not in depth:
-            depth[int(j)] = depth[int(drivers[target.parents[j]])] + 1
-    return tuple(np.array([j for j in depth if depth[j] == d]) for d in range(1, max(depth.values()) + 1))
-
-
 def retarget_clip(clip: Clip, how: Retarget) -> Clip:
     """The clip's motion on the target skeleton. how: what `plan` returns for the two skeletons."""
-    rotations = _follow_rotations(how, clip.global_rotations)
+    # World rotations of the target, from those of the source. Only those of `how.joints` are set.
+    rotations = np.empty((len(clip), len(how.target.joints), 4))
+    rotations[:, how.joints] = quat.mul(clip.global_rotations[:, how.follows], how.turns)
     how = _with_measured_lifts(how, clip, rotations)
     for side in SIDES:
         heel, toe = (clip.positions[:, how.source.role(f"{side}_{part}")] for part in ("heel", "toe"))
@@ -193,15 +182,16 @@ def retarget_clip(clip: Clip, how: Retarget) -> Clip:
         foot = quat.rotate(rotations[:, ankle], how.driver_offsets[ball])
         tilt = steady_heels(foot, heel * how.scale, toe * how.scale, clip.fps)
         rotations[:, ankle] = quat.mul(tilt, rotations[:, ankle])
-    positions, rotations = _place_joints(how, clip.positions, rotations, clip.fps)
-    local = quat.continuous(local_rotations(how.target, rotations))
-    return Clip(clip.name, how.target, clip.fps, local, positions[:, 0])
+    hips = _bend_legs(how, clip, rotations)
+    root = hips + quat.rotate(rotations[:, how.target.role("hips")], how.driver_offsets[0])
+    local = quat.continuous(local_rotations(how.target, rotations[:, how.drivers]))
+    return Clip(clip.name, how.target, clip.fps, local, root)
 
 
 def _with_measured_lifts(how: Retarget, clip: Clip, rotations: Array) -> Retarget:
     """The plan with `lifts` corrected, so that nearly straight legs bend on average as in the clip.
 
-    rotations: as `_follow_rotations` returns them.
+    rotations: (F, J, 4) of the target's joints in the world.
     """
     hips, lifts = _hips_position(how, clip.positions, rotations), how.lifts.copy()
     for k, side in enumerate(SIDES):
@@ -213,59 +203,19 @@ def _with_measured_lifts(how: Retarget, clip: Clip, rotations: Array) -> Retarge
     return replace(how, lifts=lifts)
 
 
-def retarget_pose(how: Retarget, positions: Array, rotations: Array) -> tuple[Array, Array]:
-    """Transfer single poses to the target, such as the pose of a network in each frame of a game.
+def _bend_legs(how: Retarget, clip: Clip, rotations: Array) -> Array:
+    """Turn thighs and shanks so that the balls of the feet are where they are in the scaled source.
 
-    how: what `plan` returns. positions: (..., J, 3) cm and rotations: (..., J, 4) of the source's joints in
-    the world. Returns positions and rotations of the target's joints in the world, with the same shapes but
-    for the number of joints.
+    rotations: (F, J, 4) of the target's joints in the world, which are changed. Returns the positions (F, 3)
+    of the hips, which come down smoothly where a leg would be too straight.
     """
-    return _place_joints(how, positions, _follow_rotations(how, rotations))
-
-
-def _follow_rotations(how: Retarget, rotations: Array) -> Array:
-    """World rotations (..., J, 4) of the target, from those of the source. Only `how.joints` are set."""
-    out = np.empty((*rotations.shape[:-2], len(how.target.joints), 4))
-    out[..., how.joints, :] = quat.mul(rotations[..., how.follows, :], how.turns)
-    return out
-
-
-def _place_joints(
-    how: Retarget, source: Array, rotations: Array, fps: float | None = None
-) -> tuple[Array, Array]:
-    """World positions and rotations of the target's joints.
-
-    The balls of the feet are at the source's scaled positions, if the legs reach so far.
-
-    source: (..., J, 3) world positions of the source's joints. rotations: (..., J, 4) as `_follow_rotations`
-    returns them; they are changed in place. fps: frame rate of a clip, whose hips must come down smoothly; or
-    None for single poses.
-    """
-    hips = _hips_position(how, source, rotations)
-    legs = [_Leg(how, source, rotations, hips, side) for side in SIDES]
+    hips = _hips_position(how, clip.positions, rotations)
+    legs = [_Leg(how, clip.positions, rotations, hips, side) for side in SIDES]
     too_high = [np.maximum(excess, 0.0) * weight for excess, weight in (leg.excess(SPARED) for leg in legs)]
-    drop = np.maximum(*too_high)
-    drop = (drop if fps is None else smooth_above(drop, max(1, round(SMOOTH * fps))))[..., None] * [
-        0.0,
-        1.0,
-        0.0,
-    ]
-    hips = hips - drop
+    drop = smooth_above(np.maximum(*too_high), max(1, round(SMOOTH * clip.fps)))[:, None] * UP
     for leg in legs:
         leg.bend(leg.start - drop)
-    positions = np.empty((*rotations.shape[:-1], 3))
-    positions[..., how.target.role("hips"), :] = hips
-    parents = np.array(how.target.parents)
-    for level in how.levels:
-        above = how.drivers[parents[level]]
-        offsets = quat.rotate(rotations[..., above, :], how.driver_offsets[level])
-        positions[..., level, :] = positions[..., above, :] + offsets
-    driven = np.flatnonzero(how.drivers != np.arange(len(how.drivers)))
-    drivers = how.drivers[driven]
-    rotations[..., driven, :] = rotations[..., drivers, :]
-    offsets = quat.rotate(rotations[..., drivers, :], how.driver_offsets[driven])
-    positions[..., driven, :] = positions[..., drivers, :] + offsets
-    return positions, rotations
+    return hips - drop
 
 
 def _hips_position(how: Retarget, source: Array, rotations: Array) -> Array:
@@ -409,20 +359,18 @@ def compare_motions(source: Clip, result: Clip, scale: float) -> dict[str, Any]:
     knees: side -> mean cosine of the angle between where the result's bent knee points and where its body
     faces, or None for a knee that hardly bends.
     """
-    frames = min(len(source), len(result))
-    source_at, result_at = (
-        {role: place[:frames] for role, place in clip.at_roles().items()} for clip in (source, result)
-    )
-    return {
-        "angles": {
-            f"{s} {name}": _compare_angle(source_at, result_at, s, name) for s in SIDES for name in ANGLES
-        },
-        "directions": {
-            f"{s} {name}": _compare_direction(source_at, result_at, s, name) for s in SIDES for name in BONES
-        },
-        "feet": {s: _compare_foot(source_at, result_at, s, scale, result.fps) for s in SIDES},
-        "knees": {s: _knee_cosine(result_at, s) for s in SIDES},
-    }
+    before, after = ({role: at[: len(result)] for role, at in c.at_roles().items()} for c in (source, result))
+    angles, directions, feet = {}, {}, {}
+    for side in SIDES:
+        for name, parts in ANGLES.items():
+            bends = (_bend(at, side, parts) for at in (before, after))
+            angles[f"{side} {name}"] = _compare_angle(*bends, name in SHAPE_DEPENDENT)
+        for name, ends in BONES.items():
+            start, end = (f"{side}_{part}" for part in ends)
+            directions[f"{side} {name}"] = _mean_angle(*(at[end] - at[start] for at in (before, after)))
+        feet[side] = _compare_foot(before[f"{side}_toe"] * scale, after[f"{side}_toe"], result.fps)
+    knees = {side: _knee_cosine(after, side) for side in SIDES}
+    return {"angles": angles, "directions": directions, "feet": feet, "knees": knees}
 
 
 def difference_problems(path: Path, differences: dict[str, Any], rig: str) -> list[Problem]:
@@ -478,22 +426,15 @@ def most_different(differences: dict[str, Any]) -> tuple[str, float]:
     return name, apart[name]
 
 
-def _compare_angle(
-    source_at: dict[str, Array], result_at: dict[str, Array], side: str, name: str
-) -> dict[str, Any]:
-    """What `compare_motions` returns in `angles` for one joint.
-
-    source_at, result_at: role -> (F, 3) positions.
-    """
-    source, result = (_bend(at, side, ANGLES[name]) for at in (source_at, result_at))
-    difference = result - source
-    constant = float(np.median(difference))
-    difference = difference - (constant if name in SHAPE_DEPENDENT else 0.0)
+def _compare_angle(before: Array, after: Array, depends_on_shape: bool) -> dict[str, Any]:
+    """What `compare_motions` returns in `angles` for one joint. before, after: (F,) its angles, degrees."""
+    constant = float(np.median(after - before))
+    apart = after - before - (constant if depends_on_shape else 0.0)
     return {
-        "source": [round(float(x), 1) for x in np.percentile(source, [5, 50, 95])],
-        "result": [round(float(x), 1) for x in np.percentile(result, [5, 50, 95])],
+        "source": [round(float(x), 1) for x in np.percentile(before, [5, 50, 95])],
+        "result": [round(float(x), 1) for x in np.percentile(after, [5, 50, 95])],
         "constant": round(constant, 2),
-        "apart": round(float(np.abs(difference).mean()), 2),
+        "apart": round(float(np.abs(apart).mean()), 2),
     }
 
 
@@ -506,29 +447,19 @@ def _bend(at: dict[str, Array], side: str, parts: tuple[str, ...]) -> Array:
     return np.degrees(np.arccos(np.clip(np.sum(unit(b - a) * unit(c - b), axis=-1), -1.0, 1.0)))
 
 
-def _compare_direction(
-    source_at: dict[str, Array], result_at: dict[str, Array], side: str, name: str
-) -> float:
-    """Mean angle, degrees, between the directions of a limb in source and result."""
-    start, end = (f"{side}_{part}" for part in BONES[name])
-    source, result = (unit(at[end] - at[start]) for at in (source_at, result_at))
-    cosines = np.clip(np.sum(source * result, axis=-1), -1.0, 1.0)
+def _mean_angle(one: Array, other: Array) -> float:
+    """Mean angle, degrees, between vectors (F, 3) of any length."""
+    cosines = np.clip(np.sum(unit(one) * unit(other), axis=-1), -1.0, 1.0)
     return round(float(np.degrees(np.arccos(cosines)).mean()), 2)
 
 
-def _compare_foot(
-    source_at: dict[str, Array], result_at: dict[str, Array], side: str, scale: float, fps: float
-) -> dict[str, float | None]:
-    """What `compare_motions` returns in `feet` for one side."""
-    source, result = source_at[f"{side}_toe"] * scale, result_at[f"{side}_toe"]
+def _compare_foot(source: Array, result: Array, fps: float) -> dict[str, float | None]:
+    """What `compare_motions` returns in `feet`. source, result: (F, 3) of the ball, at the result's scale."""
     speeds = [np.linalg.norm(np.diff(at[:, [0, 2]], axis=0), axis=-1) for at in (source, result)]
     stance = np.linalg.norm(np.diff(source, axis=0), axis=-1) * fps / 60.0 < STANCE_SPEED
     slides = [round(float(speed[stance].mean() * fps), 2) if stance.any() else None for speed in speeds]
-    return {
-        "higher": round(float(np.mean(result[:, 1] - source[:, 1])), 2),
-        "slide_source": slides[0],
-        "slide_result": slides[1],
-    }
+    higher = round(float(np.mean(result[:, 1] - source[:, 1])), 2)
+    return {"higher": higher, "slide_source": slides[0], "slide_result": slides[1]}
 
 
 def _knee_cosine(
@@ -546,7 +477,5 @@ def _knee_cosine(
     weight = np.maximum(_bend(at, side, ANGLES["knee"]) - BENT_KNEE, 0.0)
     if np.mean(weight > 0) < 0.1:
         return None
-    # How far the knee lies out from the straight line between hip and heel: where it points.
-    leg_line = unit(heel - hip)
-    outward = knee - hip - leg_line * np.sum((knee - hip) * leg_line, axis=-1, keepdims=True)
+    outward = bend_direction(hip, knee, heel)  # where the knee points
     return round(float(np.sum(unit(outward) * ahead, axis=-1) @ weight / weight.sum()), 2)

@@ -7,13 +7,13 @@ Users write these files by hand, so each error names the line of the mistake.
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from difflib import get_close_matches
 from functools import lru_cache
 from itertools import pairwise
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any
 
 import numpy as np
 
@@ -36,6 +36,10 @@ APART = 0.25  # leg lengths: the joint from which the legs hang may be at most t
 # A part of a limb (as `names.part_of` calls it) -> the role of the joint at which it begins.
 ROLE_OF_PART = {"upperarm": "shoulder", "forearm": "elbow", "hand": "wrist"}
 ROLE_OF_PART |= {"thigh": "hip", "shank": "knee", "foot": "heel", "toe": "toe"}
+
+
+# A mistake in a file: the section and the key where it is, what is wrong, and what to do (None if plain).
+Mistake = tuple[str, str, str, str | None]
 
 
 @dataclass(frozen=True)
@@ -62,15 +66,29 @@ def load_skeleton(path: str | Path, name: str | None = None) -> KnownSkeleton:
 def _load(path: Path, name: str, changed: int, size: int) -> KnownSkeleton:
     """Read a skeleton file, once as long as its time of change and its size stay the same."""
     data: Any = read_yaml(path)
-    _Check(path, data, read_text(path)).run()
+    for section, key, problem, fix in _mistakes(data):
+        line = _line_of(read_text(path), section, key)
+        raise InputError(path, printable(problem, 400), line=line, fix=fix)
     try:
         return KnownSkeleton(Skeleton.from_dict({**data, "name": name}), data.get("maps") or {})
     except (AttributeError, KeyError, TypeError, ValueError, OverflowError) as error:
         raise InputError(path, f"not a skeleton file: {printable(error)}") from None
 
 
-class _Check:
-    """Checks a skeleton file. `run` raises InputError with the line of the first mistake, if it is found.
+def _line_of(text: str, section: str, key: str) -> int | None:
+    """The line of a key in a section of a skeleton file, or of the section itself if the key is empty."""
+    found, inside = None, False
+    wanted = re.compile(rf"""^\s+(['"]?){re.escape(key)}\1\s*:""")
+    for number, line in enumerate(text.split("\n"), 1):
+        if re.match(r"\w", line):
+            inside = bool(section) and line.startswith(f"{section}:")
+        if found is None and inside and (not key or wanted.match(line)):
+            found = number
+    return found
+
+
+def _mistakes(data: Any) -> Iterator[Mistake]:
+    """The mistakes in a skeleton file's content. What comes after the first one may fail or be wrong.
 
     Each joint but the first needs a parent that is listed above it. Each joint needs an offset of three
     numbers. Only the roles in ROLES are allowed, and no two roles may have the same joint (except spine and
@@ -78,114 +96,94 @@ class _Check:
     say the side of the joint's role. All roles but those in OPTIONAL are required, and both toes or none.
     The legs must hang from a joint at or near the hips. If there is a chest, the arms must hang from it or
     from the neck.
-
-    data: the file's content as plain data. text: its content as it is written, to find the line of a mistake.
     """
+    for key in ("joints", "roles"):
+        section = data.get(key) if isinstance(data, Mapping) else None
+        if not isinstance(section, Mapping) or not section:
+            yield (
+                "",
+                "",
+                f"a skeleton file needs a section `{key}`",
+                "config/skeletons/README.md describes it.",
+            )
+    joints, roles = data["joints"], data["roles"]
+    yield from _joint_mistakes(joints)
+    yield from _role_mistakes(list(joints), roles)
+    names = list(joints)
+    parents = [
+        -1 if joint.get("parent") is None else names.index(joint["parent"]) for joint in joints.values()
+    ]
+    yield from _order_mistakes(names, parents, roles)
+    yield from _hub_mistakes(names, parents, roles, [joint["offset"] for joint in joints.values()])
 
-    def __init__(self, path: Path, data: Any, text: str) -> None:
-        self.path, self.data, self.text = path, data, text
 
-    def run(self) -> None:
-        for key in ("joints", "roles"):
-            if (
-                not isinstance(self.data, Mapping)
-                or not isinstance(self.data.get(key), Mapping)
-                or not self.data[key]
-            ):
-                fix = "config/skeletons/README.md describes it."
-                self._refuse(f"a skeleton file needs a section `{key}`", fix=fix)
-        self.roles: Mapping[str, str] = self.data["roles"]
-        self.names = list(self.data["joints"])
-        self._check_joints()
-        self.parents = [
-            -1 if joint.get("parent") is None else self.names.index(joint["parent"])
-            for joint in self.data["joints"].values()
-        ]
-        self._check_roles()
-        self._check_order()
-        self._check_hubs()
+def _joint_mistakes(joints: Mapping[Any, Any]) -> Iterator[Mistake]:
+    above: set[str] = set()
+    for name, joint in joints.items():
+        parent, problem = joint.get("parent") if isinstance(joint, Mapping) else None, ""
+        if not isinstance(name, str) or not isinstance(joint, Mapping):
+            problem = "expected {parent: ..., offset: [x, y, z]}"
+        elif parent is None and above:
+            problem = "only the first joint may have no parent"
+        elif parent is not None and (not isinstance(parent, str) or parent not in above):
+            problem = f"its parent {parent!r} must be listed above it"
+        elif not _is_offset(joint.get("offset")):
+            problem = f"its offset must be three numbers of {FARTHEST:g} cm at most"
+        if problem:
+            yield "joints", str(name), f"joint {name}: {problem}", None
+        above.add(name)
 
-    def _refuse(self, problem: str, section: str = "", name: str = "", fix: str | None = None) -> NoReturn:
-        """Raise InputError with the line of the key `name` of a section, or of the section itself."""
-        found, inside = None, False
-        key = re.compile(rf"""^\s+(['"]?){re.escape(name)}\1\s*:""")
-        for number, line in enumerate(self.text.split("\n"), 1):
-            if re.match(r"\w", line):
-                inside = bool(section) and line.startswith(f"{section}:")
-            if found is None and inside and (key.match(line) if name else True):
-                found = number
-        raise InputError(self.path, printable(problem, 400), line=found, fix=fix)
 
-    def _check_joints(self) -> None:
-        above: set[str] = set()
-        for name, joint in self.data["joints"].items():
-            if not isinstance(name, str) or not isinstance(joint, Mapping):
-                self._refuse(
-                    f"joint {name}: expected {{parent: ..., offset: [x, y, z]}}", "joints", str(name)
-                )
-            parent = joint.get("parent")
-            if parent is None and above:
-                self._refuse(f"joint {name}: only the first joint may have no parent", "joints", name)
-            if parent is not None and (not isinstance(parent, str) or parent not in above):
-                self._refuse(f"joint {name}: its parent {parent!r} must be listed above it", "joints", name)
-            if not _is_offset(joint.get("offset")):
-                problem = f"joint {name}: its offset must be three numbers of {FARTHEST:g} cm at most"
-                self._refuse(problem, "joints", name)
-            above.add(name)
+def _role_mistakes(names: list[str], roles: Mapping[Any, Any]) -> Iterator[Mistake]:
+    role_of: dict[str, str] = {}
+    for role, joint in roles.items():
+        if role not in ROLES:
+            yield "roles", str(role), f"there is no role {role}{_guess(role, ROLES, '{}')}", None
+        if not isinstance(joint, str) or joint not in names:
+            yield "roles", role, f"{role}: there is no joint {joint!r}{_guess(joint, names, '{!r}')}", None
+        if joint in role_of and {role, role_of[joint]} != {"spine", "chest"}:
+            yield "roles", role, f"{role} and {role_of[joint]} are the same joint, {joint}", None
+        role_of[joint] = role
+    toes = {"left_toe", "right_toe"}
+    needed = [role for role in ROLES if role not in OPTIONAL or (role in toes and toes & set(roles))]
+    if missing := [role for role in needed if role not in roles]:
+        yield "roles", "", f"these roles are missing: {', '.join(missing)}", None
 
-    def _check_roles(self) -> None:
-        role_of: dict[str, str] = {}
-        for role, joint in self.roles.items():
-            if role not in ROLES:
-                self._refuse(f"there is no role {role}{_guess(role, ROLES, '{}')}", "roles", str(role))
-            if not isinstance(joint, str) or joint not in self.names:
-                guess = _guess(joint, self.names, "{!r}")
-                self._refuse(f"{role}: there is no joint {joint!r}{guess}", "roles", role)
-            if joint in role_of and {role, role_of[joint]} != {"spine", "chest"}:
-                self._refuse(f"{role} and {role_of[joint]} are the same joint, {joint}", "roles", role)
-            role_of[joint] = role
-        toes = {"left_toe", "right_toe"}
-        needed = [role for role in ROLES if role not in OPTIONAL or (role in toes and toes & set(self.roles))]
-        if missing := [role for role in needed if role not in self.roles]:
-            self._refuse(f"these roles are missing: {', '.join(missing)}", "roles")
 
-    def _path_up(self, role: str) -> list[str]:
-        """The names of the joint of a role and of all joints above it."""
-        return [self.names[j] for j in path_to_root(self.parents, self.names.index(self.roles[role]))]
+def _order_mistakes(names: list[str], parents: list[int], roles: Mapping[str, str]) -> Iterator[Mistake]:
+    """Each joint hangs from the one before it, the hips from no role, and names say no other side."""
+    above = {role: [names[j] for j in path_to_root(parents, names.index(of))] for role, of in roles.items()}
+    for chain in (*LIMBS, TRUNK[1:]):
+        for first, second in pairwise(role for role in chain if role in roles):
+            if roles[first] not in above[second]:
+                problem = f"which does not hang from {roles[first]}, the {first}"
+                yield "roles", second, f"{second} is {roles[second]}, {problem}", ORDER
+    for role, joint in roles.items():
+        if joint in above["hips"][1:]:
+            yield "roles", "hips", f"hips is {roles['hips']}, which hangs from {joint}, the {role}", ORDER
+        side, named = role.partition("_")[0], side_of(joint)
+        if side in SIDES and named not in (None, side):
+            fix = "Swap left and right. If the name is wrong, rename the joint here and in the clips."
+            yield "roles", role, f"{role} is {joint}, whose name says {named}", fix
 
-    def _check_order(self) -> None:
-        """Each joint hangs from the one before it, the hips from no role, and names say no other side."""
-        for chain in (*LIMBS, TRUNK[1:]):
-            for first, second in pairwise(role for role in chain if role in self.roles):
-                if self.roles[first] not in self._path_up(second):
-                    problem = f"which does not hang from {self.roles[first]}, the {first}"
-                    self._refuse(f"{second} is {self.roles[second]}, {problem}", "roles", second, ORDER)
-        for role, joint in self.roles.items():
-            if joint in self._path_up("hips")[1:]:
-                problem = f"hips is {self.roles['hips']}, which hangs from {joint}, the {role}"
-                self._refuse(problem, "roles", "hips", ORDER)
-            side, named = role.partition("_")[0], side_of(joint)
-            if side in SIDES and named is not None and named != side:
-                fix = "Swap left and right. If the name is wrong, rename the joint here and in the clips."
-                self._refuse(f"{role} is {joint}, whose name says {named}", "roles", role, fix)
 
-    def _check_hubs(self) -> None:
-        """The arms hang from the chest or the neck, and the legs from a joint near the hips."""
-        index = {role: self.names.index(joint) for role, joint in self.roles.items()}
-        arms, legs = (
-            lowest_common_ancestor(self.parents, [index[f"{side}_{part}"] for side in SIDES])
-            for part in ("shoulder", "hip")
-        )
-        if "chest" in index and arms not in (index["chest"], index.get("neck")):
-            problem = f"chest is {self.roles['chest']}, but the arms hang from {self.names[arms]}"
-            self._refuse(problem, "roles", "chest")
-        lengths = [float(np.linalg.norm(joint["offset"])) for joint in self.data["joints"].values()]
-        # A bone's length is the offset of its lower joint, which may be either end: the path may go up.
-        bones = pairwise(path_between(self.parents, index["hips"], legs))
-        distance = sum(lengths[a if self.parents[a] == b else b] for a, b in bones)
-        if distance > APART * (lengths[index["left_knee"]] + lengths[index["left_heel"]]):
-            problem = f"hips is {self.roles['hips']}, but the legs hang from {self.names[legs]}"
-            self._refuse(problem, "roles", "hips")
+def _hub_mistakes(
+    names: list[str], parents: list[int], roles: Mapping[str, str], offsets: Any
+) -> Iterator[Mistake]:
+    """The arms hang from the chest or the neck, and the legs from a joint near the hips."""
+    index = {role: names.index(joint) for role, joint in roles.items()}
+    arms, legs = (
+        lowest_common_ancestor(parents, [index[f"{side}_{part}"] for side in SIDES])
+        for part in ("shoulder", "hip")
+    )
+    if "chest" in index and arms not in (index["chest"], index.get("neck")):
+        yield "roles", "chest", f"chest is {roles['chest']}, but the arms hang from {names[arms]}", None
+    lengths = np.linalg.norm(np.array(offsets, float), axis=-1)
+    # A bone's length is the offset of its lower joint, which may be either end: the path may go up.
+    bones = pairwise(path_between(parents, index["hips"], legs))
+    distance = sum(lengths[a if parents[a] == b else b] for a, b in bones)
+    if distance > APART * (lengths[index["left_knee"]] + lengths[index["left_heel"]]):
+        yield "roles", "hips", f"hips is {roles['hips']}, but the legs hang from {names[legs]}", None
 
 
 def _guess(word: Any, known: Any, shown: str) -> str:
