@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hobble.report.raster import draw_triangles, fill_triangles, finish_picture
+from hobble.report.raster import draw_triangles, finish_picture
 
 FACE = np.array([[0, 1, 2]])
 # Screen coordinates: y points down, and a front face has a negative area.
@@ -15,13 +15,6 @@ def inside() -> np.ndarray:
     """Pixels (9, 8) whose coordinates are inside the triangle of CORNER."""
     y, x = np.mgrid[:9, :8]
     return (x >= 1) & (y >= 1) & (x + y <= 6)
-
-
-def test_a_triangle_covers_the_pixels_inside_it() -> None:
-    for order in ([0, 1, 2], [0, 2, 1]):
-        cover = np.zeros((9, 8), np.float32)
-        fill_triangles(CORNER[order], FACE, cover)
-        assert np.array_equal(cover > 0, inside()), "seen from either side"
 
 
 def test_the_nearer_triangle_is_seen_and_back_faces_are_not() -> None:

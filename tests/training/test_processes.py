@@ -114,12 +114,14 @@ def together(database: Path, network: Any, training: Recipe, tmp_path: Path) -> 
             machines,
             processes,
             tmp_path / "log",
-            database=data,
-            network=network,
-            training=typed,
-            checkpoints=tmp_path / folder,
-            start=None,
-            code=None,
+            {
+                "database": data,
+                "network": network,
+                "training": typed,
+                "checkpoints": tmp_path / folder,
+                "start": None,
+                "code": None,
+            },
         )
         return load_npz(next((tmp_path / folder).glob("*/checkpoint.npz")))
 

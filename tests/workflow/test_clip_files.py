@@ -12,7 +12,6 @@ import pytest
 from hobble.core.errors import HobbleError
 from hobble.motion.options import ClipMotion
 from hobble.workflow.project import Project
-from hobble.workflow.targets import notes_on_unused_files
 from tests.workflow.small_project import DATASET
 
 
@@ -84,10 +83,7 @@ def test_a_mirror_beside_its_original_is_left_out(base: Path, mirror: bool) -> N
 def test_a_status_file_without_a_clip_is_reported_with_the_nearest_name(base: Path) -> None:
     (base / "data/mine/orphan.bvh").write_text("")
     (base / "data/mine/orphn_injuries.txt").write_text("frames:9\n1-9 LeftLeg-LeftFoot[4];\n")
-    (note,) = notes_on_unused_files(
-        Project(base, {}), ["results/one/report.html", "results/hurt/report.html"]
-    )
-    assert note.startswith("data set mine: ")
+    (note,) = Project(base, {}).clips.notes_on_unused_files("mine")
     assert (
         "orphn_injuries.txt belongs to no clip and is not read. If it belongs to orphan, rename it." in note
     )

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from hobble.workflow.batches import LEAST_BATCHES, ClipBatch, batch_of
+from hobble.workflow.batches import LEAST_BATCHES, batch_of
 from hobble.workflow.demands import WEEK_MINUTES, Demands, bvh_seconds
 from hobble.workflow.project import Project
 
@@ -83,30 +83,20 @@ def test_a_gpu_is_requested_if_training_uses_one(workflow) -> None:
     assert "gpu=1" not in workflow.run("-np", weights)
 
 
-def alone(dataset: str, clip: str) -> ClipBatch:
-    return ClipBatch(dataset, clip, (clip,), mirrored=True)
-
-
 def test_requests_grow_with_motion_and_attempt(demands) -> None:
-    short, long = (demands.batch_memory("hurt", alone("synthetic", clip)) for clip in ("jog-2", "jog-1"))
+    short, long = (demands.job("hurt", "synthetic", [clip]) for clip in ("jog-2", "jog-1"))
+    again = demands.job("hurt", "synthetic", ["jog-1"], attempt=2)
     assert short < long
-    assert demands.batch_memory("hurt", alone("synthetic", "jog-1"), attempt=2) == pytest.approx(
-        2 * long, abs=1
-    )
-    assert demands.batch_memory("hurt", alone("synthetic", "jog-1_hurt1")) == long
-    assert demands.batch_memory("hurt", alone("synthetic-ava", "jog-1")) > long
-    minutes = [demands.batch_minutes("hurt", alone("synthetic", "jog-1"), attempt) for attempt in (1, 3)]
-    assert minutes[1] == 3 * minutes[0]
-    assert demands.training_memory("ava") > demands.training_memory("holden")
-    assert demands.training_minutes("ava", attempt=10_000) == WEEK_MINUTES
-
-
-def test_a_batch_requests_the_memory_of_its_longest_clip_and_the_time_of_all(demands) -> None:
-    both = ClipBatch("synthetic", "0", ("jog-1", "jog-2"), mirrored=True)
-    each = [alone("synthetic", clip) for clip in both.clips]
-    assert demands.batch_memory("hurt", both) == max(demands.batch_memory("hurt", one) for one in each)
-    assert demands.batch_minutes("hurt", both) == pytest.approx(
-        sum(demands.batch_minutes("hurt", one) for one in each), abs=1
+    assert again == pytest.approx((2 * long.mem_mb, 2 * long.runtime), abs=1)
+    assert demands.job("hurt", "synthetic", ["jog-1_hurt1"]) == long
+    assert demands.job("hurt", "synthetic-ava", ["jog-1"]).mem_mb > long.mem_mb
+    both = demands.job("hurt", "synthetic", ["jog-1", "jog-2"])
+    assert both == pytest.approx((long.mem_mb, short.runtime + long.runtime), abs=1)
+    assert demands.training("ava").mem_mb > demands.training("holden").mem_mb
+    assert demands.training("ava", attempt=10_000).runtime == WEEK_MINUTES
+    measured = demands.measure("holden", "accuracy")
+    assert demands.measure("holden", "accuracy", attempt=3).mem_mb == pytest.approx(
+        3 * measured.mem_mb, abs=2
     )
 
 

@@ -94,13 +94,25 @@ def folders(*stages):
 
 
 def memory(stage):
-    """A resource function: the MB of a batch's job, see hobble.workflow.demands."""
-    return lambda w, attempt: demands.batch_memory(stage, batch_of(w), attempt)
+    """A resource function: the MB of a job, see hobble.workflow.demands."""
+    return lambda w, attempt: request_of(stage, w, attempt).mem_mb
 
 
 def minutes(stage):
-    """A resource function: the minutes of a batch's job."""
-    return lambda w, attempt: demands.batch_minutes(stage, batch_of(w), attempt)
+    """A resource function: the minutes of a job."""
+    return lambda w, attempt: request_of(stage, w, attempt).runtime
+
+
+def request_of(stage, w, attempt):
+    """What a job requests, from its stage and its wildcards."""
+    if stage == "measure":
+        return demands.measure(w.configuration, w.measure, attempt)
+    if stage == "training":
+        return demands.training(w.configuration, attempt)
+    dataset = w.get("dataset") or configurations.dataset(w.configuration)
+    clip = w.get("clip")
+    names = batch_of(w).clips if w.get("batch") else [clip] if clip else None
+    return demands.job(stage, dataset, names, attempt)
 
 
 def motion_files(dataset, clip):

@@ -37,8 +37,8 @@ rule database_merge:
     benchmark:
         "results/datasets/{dataset}/benchmarks/database/database_merge/{channels}.tsv"
     resources:
-        mem_mb=lambda w, attempt: demands.dataset_memory("merge", w.dataset, attempt),
-        runtime=lambda w, attempt: demands.dataset_minutes("merge", w.dataset, attempt),
+        mem_mb=memory("merge"),
+        runtime=minutes("merge"),
     params:
         dataset=lambda w: w.dataset,
         splits=splits_of,

@@ -11,12 +11,8 @@ rule measure:
     benchmark:
         "results/{configuration}/benchmarks/evaluation/{measure}.tsv"
     resources:
-        mem_mb=lambda w, attempt: demands.measure_memory(
-            w.configuration, w.measure, attempt
-        ),
-        runtime=lambda w, attempt: demands.measure_minutes(
-            w.configuration, w.measure, attempt
-        ),
+        mem_mb=memory("measure"),
+        runtime=minutes("measure"),
     params:
         measured=lambda w: measurements.params(w.configuration, w.measure),
         code=lambda w: measurements.code(
@@ -37,12 +33,8 @@ rule measure_piece:
     benchmark:
         "results/{configuration}/benchmarks/evaluation/{measure}-{piece}.tsv"
     resources:
-        mem_mb=lambda w, attempt: demands.measure_memory(
-            w.configuration, w.measure, attempt
-        ),
-        runtime=lambda w, attempt: demands.measure_minutes(
-            w.configuration, w.measure, attempt
-        ),
+        mem_mb=memory("measure"),
+        runtime=minutes("measure"),
     params:
         measured=lambda w: measurements.params(w.configuration, w.measure),
         piece=lambda w: w.piece,

@@ -48,8 +48,8 @@ rule look_page:
     log:
         "results/datasets/{dataset}/logs/labels/look_page.log",
     resources:
-        mem_mb=lambda w, attempt: demands.dataset_memory("look", w.dataset, attempt),
-        runtime=lambda w, attempt: demands.dataset_minutes("look", w.dataset, attempt),
+        mem_mb=memory("look"),
+        runtime=minutes("look"),
     params:
         dataset=lambda w: w.dataset,
         clips=lambda w: list(clips.listed_entries(w.dataset)),

@@ -86,12 +86,8 @@ rule report:
     benchmark:
         "results/{configuration}/benchmarks/report/report.tsv"
     resources:
-        mem_mb=lambda w, attempt: demands.dataset_memory(
-            "report", configurations.dataset(w.configuration), attempt
-        ),
-        runtime=lambda w, attempt: demands.dataset_minutes(
-            "report", configurations.dataset(w.configuration), attempt
-        ),
+        mem_mb=memory("report"),
+        runtime=minutes("report"),
     params:
         configuration=lambda w: w.configuration,
         dataset=lambda w: configurations.dataset(w.configuration),

@@ -11,12 +11,8 @@ rule synthetic_clips:
     benchmark:
         "results/datasets/{dataset}/benchmarks/synthetic/synthetic_clips/{clip}.tsv"
     resources:
-        mem_mb=lambda w, attempt: demands.clip_memory(
-            "synthetic", w.dataset, w.clip, attempt
-        ),
-        runtime=lambda w, attempt: demands.clip_minutes(
-            "synthetic", w.dataset, w.clip, attempt
-        ),
+        mem_mb=memory("synthetic"),
+        runtime=minutes("synthetic"),
     params:
         clip=lambda w: w.clip,
         frames=lambda w: datasets.frames(w.dataset, w.clip),

@@ -23,8 +23,8 @@ rule training:
         "results/{configuration}/benchmarks/training/training.tsv"
     threads: lambda w: demands.training_threads(w.configuration)
     resources:
-        mem_mb=lambda w, attempt: demands.training_memory(w.configuration, attempt),
-        runtime=lambda w, attempt: demands.training_minutes(w.configuration, attempt),
+        mem_mb=memory("training"),
+        runtime=minutes("training"),
         gpu=lambda w: demands.gpus(w.configuration),
         # The training has `processes` processes on each of `nodes` machines. `tasks` (one for each machine) and
         # `gres` (GPUs) are SLURM's names.

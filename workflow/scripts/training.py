@@ -23,7 +23,7 @@ with job(snakemake):
         "code": snakemake.params.get("code"),
     }
     if machines.count > 1:
-        train_together(machines, snakemake.threads, Path(snakemake.log[0]), **arguments)
+        train_together(machines, snakemake.threads, Path(snakemake.log[0]), arguments)
     # If several processes have trained, `run` starts at their last checkpoint and has nothing left to train.
     # Otherwise it trains. Then it writes the outputs.
     run(

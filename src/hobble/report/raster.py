@@ -1,7 +1,7 @@
 """Draws the character's body without a browser, with light, ground and shadow, as in the report page.
 
-Compiled, because a picture takes 50 ms so and 200 ms with NumPy. The compiled functions release Python's
-global lock (GIL), so that several films can be drawn at once.
+The triangles are drawn by a compiled function. It releases Python's global lock (GIL), so that several films
+can be drawn at once.
 """
 
 from __future__ import annotations
@@ -20,29 +20,17 @@ from hobble.core.quat import Array
 from hobble.figure.mesh import Mesh
 
 
-@njit(nogil=True)
-def corner_normals(corners: Array, faces: Any) -> Array:  # pragma: no cover
+def corner_normals(corners: Array, faces: Any) -> Array:
     """Unit normals (V, 3) at the V corners of a mesh, for shading.
 
     corners: (V, 3) positions. faces: (T, 3) indices of the corners of each triangle. A corner's normal is the
     mean of the normals of its triangles, weighted by their areas.
     """
-    out = np.zeros_like(corners)
-    for f in range(len(faces)):
-        i, j, k = faces[f]
-        a, b, c = corners[i], corners[j], corners[k]
-        ux, uy, uz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
-        vx, vy, vz = c[0] - a[0], c[1] - a[1], c[2] - a[2]
-        # The cross product of two edges: the triangle's normal, with twice its area as length.
-        x, y, z = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
-        for corner in (i, j, k):
-            out[corner, 0] += x
-            out[corner, 1] += y
-            out[corner, 2] += z
-    for v in range(len(out)):
-        x, y, z = out[v]
-        out[v] /= max(np.sqrt(x * x + y * y + z * z), 1e-12)
-    return out
+    a, b, c = np.moveaxis(corners[faces], 1, 0)
+    # The cross product of two edges: the triangle's normal, with twice its area as length.
+    normal = np.repeat(np.cross(b - a, c - a), 3, axis=0)
+    out = np.stack([np.bincount(faces.ravel(), axis, len(corners)) for axis in normal.T], axis=1)
+    return out / np.maximum(np.linalg.norm(out, axis=1, keepdims=True), 1e-12)
 
 
 @njit(nogil=True)
@@ -69,28 +57,6 @@ def draw_ground(
     return out
 
 
-@njit(nogil=True, cache=False, inline="always")
-def _pixel_range(a: float, b: float, c: float, size: int) -> tuple[int, int]:  # pragma: no cover
-    """The first and the last pixel from the least to the greatest of a, b and c, within 0 and size - 1.
-
-    a, b, c: x (or y) of a triangle's corners, in pixels. size: width (or height) of the picture.
-    """
-    return max(0, int(np.ceil(min(a, b, c)))), min(size - 1, int(np.floor(max(a, b, c))))
-
-
-@njit(nogil=True, cache=False, inline="always")
-def _barycentric_weights(
-    a: Array, b: Array, c: Array, x: int, y: int, area: float
-) -> tuple[float, float]:  # pragma: no cover
-    """Barycentric weights of the corners a and b of a triangle a, b, c at pixel (x, y).
-
-    The weight of c is 1 minus both. area: twice the signed area of the triangle.
-    """
-    u = ((b[0] - x) * (c[1] - y) - (b[1] - y) * (c[0] - x)) / area
-    v = ((c[0] - x) * (a[1] - y) - (c[1] - y) * (a[0] - x)) / area
-    return u, v
-
-
 @njit(nogil=True)
 def draw_triangles(
     points: Array, colours: Array, faces: Any, picture: Array, depth: Array
@@ -108,11 +74,13 @@ def draw_triangles(
         area = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
         if area >= 0:  # a back face: front faces have a negative area, because y points down
             continue
-        x0, x1 = _pixel_range(a[0], b[0], c[0], width)
-        y0, y1 = _pixel_range(a[1], b[1], c[1], height)
-        for y in range(y0, y1 + 1):
-            for x in range(x0, x1 + 1):
-                u, v = _barycentric_weights(a, b, c, x, y, area)
+        left, right = min(a[0], b[0], c[0]), max(a[0], b[0], c[0])
+        top, bottom = min(a[1], b[1], c[1]), max(a[1], b[1], c[1])
+        for y in range(max(0, int(np.ceil(top))), min(height - 1, int(np.floor(bottom))) + 1):
+            for x in range(max(0, int(np.ceil(left))), min(width - 1, int(np.floor(right))) + 1):
+                # Barycentric weights of the corners.
+                u = ((b[0] - x) * (c[1] - y) - (b[1] - y) * (c[0] - x)) / area
+                v = ((c[0] - x) * (a[1] - y) - (c[1] - y) * (a[0] - x)) / area
                 w = 1.0 - u - v
                 if u < 0 or v < 0 or w < 0:
                     continue
@@ -121,28 +89,6 @@ def draw_triangles(
                     depth[y, x] = deep
                     for n in range(3):
                         picture[y, x, n] = u * colours[i, n] + v * colours[j, n] + w * colours[k, n]
-
-
-@njit(nogil=True)
-def fill_triangles(points: Array, faces: Any, cover: Array) -> None:  # pragma: no cover
-    """Set the pixels of `cover` (H, W) that a triangle covers to 1.
-
-    points: (V, 3) corners; their first two columns are x and y in pixels. faces: (T, 3) indices of the
-    corners of each triangle.
-    """
-    height, width = cover.shape
-    for f in range(len(faces)):
-        a, b, c = points[faces[f, 0]], points[faces[f, 1]], points[faces[f, 2]]
-        area = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
-        if area == 0:
-            continue
-        x0, x1 = _pixel_range(a[0], b[0], c[0], width)
-        y0, y1 = _pixel_range(a[1], b[1], c[1], height)
-        for y in range(y0, y1 + 1):
-            for x in range(x0, x1 + 1):
-                u, v = _barycentric_weights(a, b, c, x, y, area)
-                if u >= 0 and v >= 0 and u + v <= 1:
-                    cover[y, x] = 1.0
 
 
 @njit(nogil=True)
@@ -249,12 +195,16 @@ class BodyRenderer:
         key_light = np.array([0.55 * np.sin(camera.yaw - 0.85), 0.78, 0.55 * np.cos(camera.yaw - 0.85)])
         key_light /= np.linalg.norm(key_light)
         rim_light = np.array([0.9 * np.sin(camera.yaw + 2.5), 0.35, 0.9 * np.cos(camera.yaw + 2.5)])
-        # The shadow: the body's corners, moved along the key light to the ground.
-        shadow = np.zeros((camera.size, camera.size), np.float32)
+        # The shadow: the body's corners, moved along the key light to the ground. The body is closed, so the
+        # triangles on one side of it cover all of its shadow.
         on_ground = corners - key_light * (corners[:, 1:2] / key_light[1])
-        fill_triangles(camera.project(on_ground), self._faces, shadow)
+        on_ground, size = camera.project(on_ground), camera.size
+        dark, shadow = np.zeros((size, size, 3), np.float32), np.full((size, size), np.inf, np.float32)
+        draw_triangles(on_ground, np.zeros_like(corners), self._faces, dark, shadow)
         background = _ground(camera)
-        background *= 1 - 0.42 * gaussian_filter(shadow, camera.size / 130)[..., None]
+        background *= (
+            1 - 0.42 * gaussian_filter(np.isfinite(shadow).astype(np.float32), size / 130)[..., None]
+        )
         normal = corner_normals(corners, self._faces)
         # Light from the sky, weaker where the body covers itself; then the key light and the rim light.
         brightness = (

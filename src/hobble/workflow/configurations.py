@@ -135,12 +135,6 @@ class Configurations:
 
 
 OF_CLIPS = ("clips", "summaries")  # inputs with a file for each clip
-NAMES = tuple(each.name for each in all_measures())  # the names of all measurements
-
-
-def piece_file(configuration: str, name: str, piece: str) -> str:
-    """Path of the JSON file with the result of one piece of the measurement `name`."""
-    return f"results/{configuration}/evaluation/pieces/{name}/{piece}.json"
 
 
 def result_file(configuration: str, name: str) -> str:
@@ -167,10 +161,20 @@ class Measurements:
         return [one.module for one in all_measures()]
 
     def inputs(self, configuration: str, name: str) -> dict[str, str | list[str]]:
-        """Name of each input of the measurement -> its file; `batches` -> the folders with rows of clips."""
-        wanted = measure_named(name).inputs
+        """Name of each input of the measurement -> its file; `batches` -> the folders with rows of clips.
+
+        If an input has the name of another measurement, its file is the result of this other one.
+        """
+        wanted, dataset = measure_named(name).inputs, self.configurations.dataset(configuration)
+        known = {
+            "weights": self.configurations.network(configuration, "weights.npz"),
+            "skeleton": self.clips.skeleton_file(dataset),
+            "published": self.package.published_file(),
+        }
         files: dict[str, str | list[str]] = {
-            item: self._input(configuration, item) for item in wanted if item not in OF_CLIPS
+            item: known.get(item) or result_file(configuration, measure_named(item).name)
+            for item in wanted
+            if item not in OF_CLIPS
         }
         if set(OF_CLIPS) & set(wanted):
             files["batches"] = self.configurations.batch_folders(configuration, "database")
@@ -185,21 +189,8 @@ class Measurements:
         options = chosen.options.model_validate(params["options"])
         runtime = Runtime.model_validate(params["runtime"])
         pieces = chosen.pieces(options, runtime, self.configurations.network_options(configuration).modes)
-        return [piece_file(configuration, name, piece) for piece in pieces] if len(pieces) > 1 else []
-
-    def _input(self, configuration: str, item: str) -> str:
-        """The file of one input.
-
-        item: the input's name. If it is the name of another measurement, the input is this one's result.
-        """
-        configurations = self.configurations
-        if item == "weights":
-            return configurations.network(configuration, "weights.npz")
-        if item == "skeleton":
-            return self.clips.skeleton_file(configurations.dataset(configuration))
-        if item == "published":
-            return self.package.published_file()
-        return result_file(configuration, measure_named(item).name)
+        folder = f"results/{configuration}/evaluation/pieces/{name}"
+        return [f"{folder}/{piece}.json" for piece in pieces] if len(pieces) > 1 else []
 
     def params(self, configuration: str, name: str) -> dict[str, Any]:
         """What the script of a measurement gets, as plain data.

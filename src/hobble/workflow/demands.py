@@ -12,21 +12,21 @@ import functools
 import math
 import os
 import re
-from dataclasses import dataclass
+from collections.abc import Iterable
 from pathlib import Path
+from typing import NamedTuple
 
 from hobble.channels import channel
-from hobble.measures.measure import measure_named
+from hobble.measures.measure import Cost, measure_named
 from hobble.models.model import TrainedOptions
 from hobble.rows.layout import RowLayout
 from hobble.training.options import Machines
-from hobble.workflow.batches import ClipBatch
 from hobble.workflow.clips import original
 from hobble.workflow.project import Project
 
-# Memory of Snakemake itself. It runs twice in a cluster job: for SLURM's step and for the script.
-ENGINE_MB = 400
-PYTHON_MB = 400  # memory of Python with numpy, scipy and the package
+# Memory of Snakemake itself, which runs twice in a cluster job (for SLURM's step and for the script), and of
+# Python with numpy, scipy and the package.
+BASE_MB = 400 + 400
 MEMORY_MARGIN = 1.5  # requested memory / measured memory
 TIME_MARGIN = 10  # requested time / measured time, for an old and busy machine
 MEASURED_JOINTS = 31  # joints of the skeleton with which the rates were measured
@@ -37,153 +37,109 @@ HEADER_BYTES = 1 << 20  # the motion of a BVH file begins within this many bytes
 EXCERPT_THOUSANDS = 2.0  # thousands of frames that a measurement reads at once if it reads only a sample
 WEEK_MINUTES = 7 * 24 * 60  # a job requests at most this time
 
-
-@dataclass(frozen=True)
-class Rate:
-    """What a job needs. mb: for a thousand frames of its longest clip. seconds: for a thousand frames of all.
-
-    mirrors: whether mirrors take as long as their clips. row_bytes: bytes for each frame of all clips. least:
-    the least number of minutes.
-    """
-
-    mb: float
-    seconds: float
-    mirrors: bool = False
-    row_bytes: float = 0.0
-    least: int = 1
-
-
+# What the jobs of a stage need: MB and seconds for each thousand frames, and the least number of minutes.
 RATES = {
-    "synthetic": Rate(13, 0.2),
-    "motion": Rate(13, 0.3),
-    "labels": Rate(5, 0.25),
-    "channels": Rate(4, 0.2),  # for each channel
-    "hurt": Rate(20, 0.7),
-    "terrain": Rate(15, 0.3, mirrors=True, least=3),
-    "database": Rate(22, 0.15, mirrors=True),
-    "merge": Rate(10, 0.1, row_bytes=24, least=5),
-    "look": Rate(10, 0.1, row_bytes=24, least=5),
-    "report": Rate(12, 0.1, least=10),
+    "synthetic": Cost(0, 13, 0.2, 1),
+    "motion": Cost(0, 13, 0.3, 1),
+    "labels": Cost(0, 5, 0.25, 1),
+    "channels": Cost(0, 4, 0.2, 1),  # for each channel
+    "hurt": Cost(0, 20, 0.7, 1),
+    "terrain": Cost(0, 15, 0.3, 3),
+    "database": Cost(0, 22, 0.15, 1),
+    "merge": Cost(0, 10, 0.1, 5),
+    "look": Cost(0, 10, 0.1, 5),
+    "report": Cost(0, 12, 0.1, 10),
 }
+# Stages in which mirrors take as long as their clips, and those that keep 24 bytes of each frame in memory.
+WITH_MIRRORS = ("terrain", "database", "merge", "look", "report")
+KEPT_MB, KEEPING = 0.024, ("merge", "look")  # MB of a thousand frames
+
+
+class Request(NamedTuple):
+    """What a job requests: MB of memory and minutes."""
+
+    mem_mb: int
+    runtime: int
+
+
+def request(megabytes: float, seconds: float, attempt: int, least: int) -> Request:
+    """The request of a job that is estimated to need `megabytes` besides Snakemake and Python, and `seconds`.
+
+    attempt: 1 for a job's first try, 2 for the second, ... A job that was killed for lack of memory or time
+    gets more. least: the least number of minutes.
+    """
+    minutes = max(least, math.ceil(TIME_MARGIN * seconds / 60)) * attempt
+    return Request(
+        math.ceil((BASE_MB + MEMORY_MARGIN * megabytes) * attempt), min(math.ceil(minutes), WEEK_MINUTES)
+    )
 
 
 class Demands:
-    """Computes what a project's jobs request.
-
-    Arguments of the methods: dataset, configuration: names. stage: a key of RATES. attempt: 1 for a job's
-    first try, 2 for the second, ... The requests grow with it, so that a job that was killed for lack of
-    memory or time gets more.
-    """
+    """Computes what a project's jobs request. dataset, configuration: names. attempt: see `request`."""
 
     def __init__(self, project: Project) -> None:
-        self.project = project
+        self.project, self.configurations = project, project.configurations
 
-    def batch_memory(self, stage: str, batch: ClipBatch, attempt: int = 1) -> int:
-        """MB for the job of a batch, which holds one clip at a time."""
-        longest = max(self.thousands_of_frames(batch.dataset, clip) for clip in batch.clips)
-        return _megabytes(RATES[stage].mb * longest, attempt)
-
-    def batch_minutes(self, stage: str, batch: ClipBatch, attempt: int = 1) -> int:
-        """Minutes for the job of a batch."""
+    def job(self, stage: str, dataset: str, clips: Iterable[str] | None = None, attempt: int = 1) -> Request:
+        """The request of a job that holds one clip at a time. stage: a key of RATES. clips: None for all."""
         rate = RATES[stage]
-        times = 1 + (rate.mirrors and batch.mirrored)
+        sizes = [self.thousands_of_frames(dataset, clip) for clip in clips or self.all_clips(dataset)]
+        times = 1 + (stage in WITH_MIRRORS and self.project.catalogue.dataset(dataset).mirror)
         if stage == "channels":
-            times = len(self.project.batches.channels(batch))
-        frames = sum(self.thousands_of_frames(batch.dataset, clip) for clip in batch.clips)
-        return _minutes(times * rate.seconds * frames + CLIP_SECONDS * len(batch.clips), attempt, rate.least)
+            times = len(self.project.datasets.channel_sources.channels(dataset))
+        kept = KEPT_MB * times * sum(sizes) if stage in KEEPING else 0.0
+        seconds = times * rate.seconds_per_1000_frames * sum(sizes) + CLIP_SECONDS * len(sizes)
+        return request(rate.mb_per_1000_frames * max(sizes) + kept, seconds, attempt, rate.least_minutes)
 
-    def clip_memory(self, stage: str, dataset: str, clip: str, attempt: int = 1) -> int:
-        """MB for a job that makes one clip."""
-        return self.batch_memory(stage, ClipBatch(dataset, clip, (clip,), False), attempt)
+    def measure(self, configuration: str, name: str, attempt: int = 1) -> Request:
+        """The request of the measurement `name`. Some measurements read only a sample of the frames."""
+        measure, dataset = measure_named(name), self.configurations.dataset(configuration)
+        frames = self.all_thousands_of_frames(dataset)
+        longest = max(self.thousands_of_frames(dataset, clip) for clip in self.all_clips(dataset))
+        if "sample_frames" in measure.options.model_fields:
+            sample = self.configurations.section(configuration, "evaluation")["sample_frames"] / 1e3
+            sample *= self._joints(dataset) / MEASURED_JOINTS
+            if sample < frames:
+                frames, longest = sample, EXCERPT_THOUSANDS
+        cost = measure.cost
+        megabytes = cost.memory_mb + cost.mb_per_1000_frames * longest
+        return request(megabytes, cost.seconds_per_1000_frames * frames, attempt, cost.least_minutes)
 
-    def clip_minutes(self, stage: str, dataset: str, clip: str, attempt: int = 1) -> int:
-        """Minutes for a job that makes one clip."""
-        return self.batch_minutes(stage, ClipBatch(dataset, clip, (clip,), False), attempt)
+    def training(self, configuration: str, attempt: int = 1) -> Request:
+        """The request of a training, on each of its machines.
 
-    def dataset_memory(self, stage: str, dataset: str, attempt: int = 1) -> int:
-        """MB for a job that reads one clip after another of a data set."""
-        rate = RATES[stage]
-        kept = rate.row_bytes * self.all_thousands_of_frames(dataset) / 1e3
-        return _megabytes(rate.mb * self._longest(dataset) + kept, attempt)
+        Each process holds PyTorch (500 MB), its part of the database, the weights and the optimiser's state
+        (32 bytes for each parameter). A network that is built from the rows and not trained, such as motion
+        matching, also has up to three copies of all rows, with 4 bytes for each number.
 
-    def dataset_minutes(self, stage: str, dataset: str, attempt: int = 1) -> int:
-        """Minutes for a job that reads all clips and mirrors of a data set."""
-        rate = RATES[stage]
-        return _minutes(rate.seconds * self.all_thousands_of_frames(dataset), attempt, rate.least)
-
-    def measure_memory(self, configuration: str, name: str, attempt: int = 1) -> int:
-        """MB for the job of the measurement `name`."""
-        cost = measure_named(name).cost
-        if self._measured_share(configuration, name) < 1:
-            return _megabytes(cost.memory_mb + cost.mb_per_1000_frames * EXCERPT_THOUSANDS, attempt)
-        longest = self._longest(self.project.configurations.dataset(configuration))
-        return _megabytes(cost.memory_mb + cost.mb_per_1000_frames * longest, attempt)
-
-    def measure_minutes(self, configuration: str, name: str, attempt: int = 1) -> int:
-        """Minutes for the job of the measurement `name`."""
-        cost = measure_named(name).cost
-        rate = cost.seconds_per_1000_frames * self._measured_share(configuration, name)
-        frames = self.all_thousands_of_frames(self.project.configurations.dataset(configuration))
-        return _minutes(rate * frames, attempt, cost.least_minutes)
-
-    def _measured_share(self, configuration: str, name: str) -> float:
-        """The share of a data set's frames that the measurement `name` reads; below 1 for a sample."""
-        if "sample_frames" not in measure_named(name).options.model_fields:
-            return 1.0
-        section = self.project.configurations.section(configuration, "evaluation", "sample_frames")
-        dataset = self.project.configurations.dataset(configuration)
-        # `all_thousands_of_frames` is scaled with the number of joints; this factor undoes it.
-        frames = 1e3 * self.all_thousands_of_frames(dataset) * MEASURED_JOINTS / self._joints(dataset)
-        return min(1.0, section["sample_frames"] / max(frames, 1.0))
-
-    def training_memory(self, configuration: str, attempt: int = 1) -> int:
-        """MB for a training, on each of its machines.
-
-        Each process holds PyTorch, its part of the database, the weights and the optimiser's state. Some
-        networks, such as motion matching, are built from the rows and not trained. For them, the process also
-        holds up to three copies of all rows.
+        A process multiplies by 6.4e9 weights per second: two cores train a PFNN with layers of 342, 512, 512
+        and 311 units on 10,700 samples per second. A PFNN has four parameters for each weight. A training
+        that is killed continues from its last checkpoint.
         """
-        training = self.project.configurations.section(configuration, "training")
-        # 500 MB for PyTorch, and 32 bytes for each parameter and its part of the optimiser's state.
-        needed = 500 + training["memory_mb"] + 32e-6 * self.parameter_count(configuration)
-        if self.project.configurations.is_built(configuration):
-            layout, dataset = self.layout(configuration), self.project.configurations.dataset(configuration)
-            # A number of a row has 4 bytes, so it needs 4e-3 MB for a thousand rows.
+        options = self.project.catalogue.configuration(configuration).training
+        parameters, machines = self.parameter_count(configuration), self.machines(configuration)
+        needed = 500 + options.memory_mb + 32e-6 * parameters
+        if self.configurations.is_built(configuration):
+            layout, dataset = self.layout(configuration), self.configurations.dataset(configuration)
             needed += 3 * 4e-3 * (layout.x_size + layout.y_size) * self.all_thousands_of_frames(dataset)
-        return _megabytes(self.machines(configuration).processes_per_node * needed, attempt)
-
-    def training_minutes(self, configuration: str, attempt: int = 1) -> int:
-        """Minutes for a training, at most a week. A killed training continues from its last checkpoint.
-
-        The estimate assumes that a process multiplies by 6.4e9 weights per second. Two cores reach this rate:
-        they train a PFNN with layers of 342, 512, 512 and 311 units on 10,700 samples per second. A PFNN has
-        four parameters for each weight.
-        """
-        training = self.project.configurations.section(configuration, "training")
-        seconds = (
-            self.training_samples(configuration, training["passes"])
-            * self.parameter_count(configuration)
-            / 4
-            / 6.4e9
-        )
-        return _minutes(seconds / self.machines(configuration).count, attempt, least=60)
+        seconds = self.training_samples(configuration, options.passes) * parameters / 4 / 6.4e9
+        return request(machines.processes_per_node * needed, seconds / machines.count, attempt, 60)
 
     def training_samples(self, configuration: str, passes: float) -> float:
         """About how many samples a training sees in a number of passes."""
-        dataset = self.project.configurations.dataset(configuration)
+        dataset = self.configurations.dataset(configuration)
         every = self.project.datasets.hurt_row_step(dataset)  # of the rows of hurt versions
         frames = sum(
             self._frames(dataset, original(clip)) / (every if self.project.clips.is_hurt_version(clip) else 1)
-            for clip, split in self.project.configurations.splits(configuration).items()
+            for clip, split in self.configurations.splits(configuration).items()
             if split == "train"
         )
         return frames * VISITS_PER_PASS * passes
 
     def machines(self, configuration: str) -> Machines:
         """The machines on which a configuration trains; one process if its network is built, not trained."""
-        if self.project.configurations.is_built(configuration):
-            return Machines()
-        return self.project.catalogue.configuration(configuration).training
+        built = self.configurations.is_built(configuration)
+        return Machines() if built else self.project.catalogue.configuration(configuration).training
 
     def training_threads(self, configuration: str) -> int:
         """Threads of a training job: one for each process, at least 2.
@@ -202,25 +158,12 @@ class Demands:
         machines = self.machines(configuration)
         if machines.gpus:
             return machines.gpus if machines.nodes == 1 else 0
-        return int(self.project.configurations.section(configuration, "training")["device"] == "cuda")
+        return int(self.project.catalogue.configuration(configuration).training.device == "cuda")
 
     def gres(self, configuration: str) -> str:
         """SLURM's option `gres`, such as "gpu:8", for the GPUs of each of several machines; else ""."""
         machines = self.machines(configuration)
         return f"gpu:{machines.gpus}" if machines.gpus and machines.nodes > 1 else ""
-
-    # Sizes
-
-    def thousands_of_frames(self, dataset: str, clip: str) -> float:
-        """Thousands of frames of a clip, multiplied by (its number of joints / MEASURED_JOINTS)."""
-        return self._frames(dataset, original(clip)) / 1e3 * self._joints(dataset) / MEASURED_JOINTS
-
-    @functools.cache  # noqa: B019 - one project lives as long as the process
-    def _longest(self, dataset: str) -> float:
-        """Thousands of frames of the longest clip, scaled like `thousands_of_frames`."""
-        return max(
-            self.thousands_of_frames(dataset, clip) for clip in self.project.clips.listed_entries(dataset)
-        )
 
     def parameter_count(self, configuration: str) -> float:
         """Number of trained parameters of a configuration's network; 0 if it is not trained."""
@@ -237,13 +180,19 @@ class Demands:
         channels = tuple((name, len(channel(name).columns(skeleton))) for name in chosen.channels)
         return RowLayout(joints=len(skeleton.joints), channels=channels, **row_options)
 
+    def all_clips(self, dataset: str) -> list[str]:
+        """All clips and hurt versions of a data set, without mirrors."""
+        return list(self.project.clips.entries(dataset))
+
+    def thousands_of_frames(self, dataset: str, clip: str) -> float:
+        """Thousands of frames of a clip, multiplied by (its number of joints / MEASURED_JOINTS)."""
+        return self._frames(dataset, original(clip)) / 1e3 * self._joints(dataset) / MEASURED_JOINTS
+
     @functools.cache  # noqa: B019 - one project lives as long as the process
     def all_thousands_of_frames(self, dataset: str) -> float:
         """Thousands of frames of all clips and mirrors, scaled like `thousands_of_frames`."""
-        without_mirrors = sum(
-            self.thousands_of_frames(dataset, clip) for clip in self.project.clips.entries(dataset)
-        )
-        return without_mirrors * (1 + self.project.catalogue.dataset(dataset).mirror)
+        frames = sum(self.thousands_of_frames(dataset, clip) for clip in self.all_clips(dataset))
+        return frames * (1 + self.project.catalogue.dataset(dataset).mirror)
 
     @functools.cache  # noqa: B019
     def _joints(self, dataset: str) -> int:
@@ -256,7 +205,7 @@ class Demands:
         if self.project.catalogue.dataset(dataset).synthetic is not None:
             return self.project.datasets.frames(dataset, clip)
         seconds = bvh_seconds(Path(self.project.clips.source(dataset, clip)))
-        rate = self.project.datasets.options(dataset, "motion")["fps"]
+        rate = self.project.catalogue.dataset(dataset).motion.fps
         return ASSUMED_FRAMES if seconds is None else seconds * rate
 
 
@@ -278,13 +227,3 @@ def bvh_seconds(path: Path) -> float | None:
     except ValueError:
         return None
     return frame_time * (size - found.start(2)) / len(found[2]) if found and frame_time > 0 else None
-
-
-def _megabytes(megabytes: float, attempt: int) -> int:
-    """The requested MB of a job that is estimated to need `megabytes` besides Snakemake and Python."""
-    return math.ceil((ENGINE_MB + PYTHON_MB + MEMORY_MARGIN * megabytes) * attempt)
-
-
-def _minutes(seconds: float, attempt: int, least: int) -> int:
-    """The requested minutes of a job that is estimated to take `seconds`."""
-    return min(max(least, math.ceil(TIME_MARGIN * seconds / 60)) * attempt, WEEK_MINUTES)

@@ -11,8 +11,7 @@ from __future__ import annotations
 import ast
 import functools
 import hashlib
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from collections.abc import Iterable
 from pathlib import Path
 
 # Modules and packages that cannot change a result -> the reason. A change in them re-runs nothing.
@@ -37,15 +36,9 @@ def fingerprint(script: Path, source: Path, modules: Iterable[str] = ()) -> str:
     A module counts, too, if another imported module imports it. source: the folder of the project's packages.
     modules: full names of modules that the script imports dynamically.
     """
-    paths = (script, *sorted(imported_files(script, source, modules)))
-    parsed = [_parse_module(path, source) for path in paths]
-    used_names = frozenset().union(*(module.names for module in parsed))
     digest = hashlib.sha256()
-    for module in parsed:
-        digest.update(module.digest)
-        for name, text in module.texts:
-            if name in used_names:  # otherwise only messages use the text
-                digest.update(f"{name}={text}".encode())
+    for path in (script, *sorted(imported_files(script, source, modules))):
+        digest.update(_parse_module(path, source)[0])
     return digest.hexdigest()[:16]
 
 
@@ -58,61 +51,26 @@ def imported_files(script: Path, source: Path, modules: Iterable[str] = ()) -> s
     files = {path for module in modules for path in _files_of(module, source)}
     unread = [script, *files]
     while unread:
-        new = set(_parse_module(unread.pop(), source).imports) - files
+        new = _parse_module(unread.pop(), source)[1] - files
         files |= new
         unread += new
     return files
 
 
-@dataclass(frozen=True)
-class _Module:
-    """What the fingerprint needs of a module.
-
-    digest: hash of its code without its string constants. texts: (name, value) of each string constant at
-    module level; it is hashed only if code other than messages uses it. names: the variables and attributes
-    that the code uses. imports: the project files that the module imports.
-    """
-
-    digest: bytes
-    texts: tuple[tuple[str, str], ...]
-    names: frozenset[str]
-    imports: frozenset[Path]
-
-
 @functools.cache
-def _parse_module(path: Path, source: Path) -> _Module:
+def _parse_module(path: Path, source: Path) -> tuple[bytes, frozenset[Path]]:
+    """The hash of a module's code, and the project files that it imports."""
     remover = _Remover()
     tree = remover.visit(ast.parse(path.read_text(encoding="utf-8"), filename=str(path)))
-    texts, code = [], []
-    for node in tree.body:
-        if (constant := _string_constant(node)) is not None:
-            texts.append(constant)
-        else:
-            code.append(ast.dump(node))
     imports = {file for name in remover.imported for file in _files_of(name, source)}
-    return _Module(
-        hashlib.sha256("\n".join(code).encode()).digest(),
-        tuple(texts),
-        frozenset(remover.names),
-        frozenset(imports),
-    )
+    return hashlib.sha256(ast.dump(tree).encode()).digest(), frozenset(imports)
 
 
 class _Remover(ast.NodeTransformer):
-    """Removes what cannot change a result. Collects the names and the imports of the remaining code."""
+    """Removes what cannot change a result. Collects the imports of the remaining code."""
 
     def __init__(self) -> None:
-        self.names: set[str] = set()  # variables and attributes that are used
         self.imported: set[str] = set()  # full names of what is imported: modules, and objects in them
-
-    def visit_Name(self, node: ast.Name) -> ast.AST:
-        if isinstance(node.ctx, ast.Load):
-            self.names.add(node.id)
-        return node
-
-    def visit_Attribute(self, node: ast.Attribute) -> ast.AST:
-        self.names.add(node.attr)
-        return self.generic_visit(node)
 
     def visit_Expr(self, node: ast.Expr) -> ast.AST:
         value = node.value
@@ -176,16 +134,6 @@ def _last_name(node: ast.AST) -> str:
     return node.id if isinstance(node, ast.Name) else ""
 
 
-def _string_constant(node: ast.stmt) -> tuple[str, str] | None:
-    """(name, value) if the statement assigns a string or an f-string to a name, else None."""
-    if isinstance(node, ast.Assign) and len(node.targets) == 1 and isinstance(node.targets[0], ast.Name):
-        if isinstance(node.value, ast.JoinedStr):
-            return node.targets[0].id, ast.dump(node.value)
-        if isinstance(node.value, ast.Constant) and isinstance(node.value.value, str):
-            return node.targets[0].id, node.value.value
-    return None
-
-
 def _is_infrastructure(module: str) -> bool:
     """Whether a module, given by its full name, is in INFRASTRUCTURE or in a package listed there."""
     return any(module == name or module.startswith(f"{name}.") for name in INFRASTRUCTURE)
@@ -193,21 +141,14 @@ def _is_infrastructure(module: str) -> bool:
 
 @functools.cache
 def _files_of(module: str, source: Path) -> tuple[Path, ...]:
-    """What `_files_of_module` yields. The result is cached."""
-    return tuple(_files_of_module(module, source))
-
-
-def _files_of_module(module: str, source: Path) -> Iterator[Path]:
     """The module's file, and the `__init__.py` of each package that contains it.
 
-    Yields nothing for a module outside `source`. For an object in a module, it yields the module's files.
+    Empty for a module outside `source`. For an object in a module, the module's files.
     """
     parts = module.split(".")
-    for n in range(1, len(parts) + 1):
-        here = source.joinpath(*parts[:n])
-        for candidate in (here / "__init__.py", here.with_suffix(".py")):
-            if candidate.is_file():
-                yield candidate
+    heres = [source.joinpath(*parts[:n]) for n in range(1, len(parts) + 1)]
+    candidates = [path for here in heres for path in (here / "__init__.py", here.with_suffix(".py"))]
+    return tuple(path for path in candidates if path.is_file())
 
 
 class Package:

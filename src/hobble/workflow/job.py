@@ -196,20 +196,15 @@ class _Maker:
     def make(self, own: Mapping[str, Any], log: logging.Logger) -> bool:
         """Make the files of one clip. Returns whether they were there already."""
         began = time.monotonic()
-        files = {
-            name: [self.inputs(f) for f in value] if isinstance(value, list) else self.inputs(value)
-            for name, value in own.get("files", {}).items()
-        }
         params = {**self.params, **{name: value for name, value in own.items() if name != "files"}}
-        reads = {
-            name: [self.inputs(file) for file in named]
-            if "{channels}" in self.reads[name]
-            else self.inputs(named[0])
-            for name, named in _names(self.reads, params).items()
+        named = {**own.get("files", {}), **_names(self.reads, params)}
+        found = {
+            name: [self.inputs(f) for f in value] if isinstance(value, list) else self.inputs(value)
+            for name, value in named.items()
         }
-        writes = {name: named[0] for name, named in _names(self.writes, params).items()}
+        writes = _names(self.writes, params)
         output = {name: str(self.root / file) for name, file in writes.items()}
-        piece = Piece(params["clip"], params, {**self.shared, **files, **reads}, output)
+        piece = Piece(params["clip"], params, {**self.shared, **found}, output)
         paths = [path for value in piece.input.values() for path in _as_list(value)]
         before = _stamps(paths)
         key = self._key(piece, before, writes)
@@ -225,7 +220,7 @@ class _Maker:
             seconds = round(time.monotonic() - began, 3)
             write_text(record, json.dumps({"key": key, "files": checks, "seconds": seconds}))
         for file in writes.values():
-            _link(self.root / file, self.folder / file)
+            _give_second_name(self.root / file, self.folder / file)
         return kept
 
     def _key(self, piece: Piece, stamps: Mapping[str, Any], writes: Mapping[str, str]) -> str:
@@ -248,21 +243,15 @@ class _Maker:
         return self.digests[path, stamp]
 
 
-def _names(patterns: Mapping[str, str], params: Mapping[str, Any]) -> dict[str, list[str]]:
-    """Name -> names of files, from patterns as in `make_each`. Files of mirrors only if there are mirrors."""
+def _names(patterns: Mapping[str, str], params: Mapping[str, Any]) -> dict[str, Any]:
+    """Name -> name of a file, or list of names, from patterns as in `make_each`."""
     clip, out = params["clip"], {}
+    words = {"clip": clip, "original": original(clip), "mirror": clip + MIRROR_SUFFIX}
     for name, pattern in patterns.items():
-        if "{mirror}" in pattern and not params.get("mirrored"):
-            continue
-        channels = params["channels"] if "{channels}" in pattern else [params.get("channel", "")]
-        out[name] = [
-            pattern.replace("{channels}", "{channel}")
-            .replace("{channel}", channel)
-            .replace("{original}", original(clip))
-            .replace("{mirror}", clip + MIRROR_SUFFIX)
-            .replace("{clip}", clip)
-            for channel in channels
-        ]
+        if "{channels}" in pattern:
+            out[name] = [pattern.format(**words, channels=channel) for channel in params["channels"]]
+        elif "{mirror}" not in pattern or params.get("mirrored"):
+            out[name] = pattern.format(**words, channel=params.get("channel", ""))
     return out
 
 
@@ -283,8 +272,8 @@ def _crc32(path: str) -> int:
     return zlib.crc32(Path(path).read_bytes())
 
 
-def _link(source: Path, target: Path) -> None:
-    """Give a file a second name, which takes no space, or copy it where the file system has no hard links."""
+def _give_second_name(source: Path, target: Path) -> None:
+    """Link a file, which takes no space, or copy it where the file system has no hard links."""
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
         target.unlink(missing_ok=True)

@@ -13,11 +13,9 @@ import getpass
 import os
 import signal
 import threading
-import time
 from collections.abc import Iterator
 from pathlib import Path
 from types import FrameType
-from typing import Any
 
 from hobble.core.errors import HobbleError, InputError
 
@@ -101,24 +99,11 @@ def end_children(pid: int, grace: float = GRACE_SECONDS) -> None:
 
     with contextlib.suppress(psutil.NoSuchProcess):
         descendants = psutil.Process(pid).children(recursive=True)
-        for process in descendants:
-            with contextlib.suppress(psutil.Error):
-                process.terminate()
-        deadline = time.monotonic() + grace
-        while time.monotonic() < deadline and any(map(_is_running, descendants)):
-            time.sleep(0.05)
-        for process in filter(_is_running, descendants):
-            with contextlib.suppress(psutil.Error):
-                process.kill()
-
-
-def _is_running(process: Any) -> bool:
-    """Whether a `psutil.Process` runs and is not a zombie."""
-    import psutil
-
-    with contextlib.suppress(psutil.Error):
-        return bool(process.is_running() and process.status() != psutil.STATUS_ZOMBIE)
-    return False
+        for end in (psutil.Process.terminate, psutil.Process.kill):
+            for process in descendants:
+                with contextlib.suppress(psutil.Error):
+                    end(process)
+            descendants = psutil.wait_procs(descendants, timeout=grace)[1]
 
 
 @contextlib.contextmanager

@@ -7,7 +7,7 @@ results/datasets/<data set>/... or results/compare/...
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
 
@@ -19,7 +19,7 @@ from hobble.workflow.configurations import COMPARE
 from hobble.workflow.project import Project
 
 if TYPE_CHECKING:
-    from hobble.config.models import ClipEntry, Configuration, Dataset, SkeletonFile
+    from hobble.config.models import Configuration, SkeletonFile
 
 PAGE = "page"  # the folder in results/ with the files that all reports share
 
@@ -45,72 +45,46 @@ def open_project(workflow: Any, config: Mapping[str, Any], words: Sequence[str],
                 "results/holden/ held another network. For a configuration of this name in config/, type "
                 f"results/{Path(files[0]).stem}/report.html. For single keys, use --config."
             )
-        targets = [word for word in words if word.startswith("results/")]
-        check_targets(project, targets)
-        for sentence in notes_on_unused_files(project, targets):
-            note(sentence)
+        for dataset in check_targets(project, [word for word in words if word.startswith("results/")]):
+            for sentence in project.clips.notes_on_unused_files(dataset):
+                note(f"data set {dataset}: {sentence}")
     return project
 
 
-def check_targets(project: Project, targets: Iterable[str]) -> None:
+def check_targets(project: Project, targets: Iterable[str]) -> list[str]:
     """Validate the targets, and every configuration, data set and skeleton that they need.
 
+    Without targets, the one is checked that Snakemake makes by default. Returns the names of the data sets.
     Raises HobbleError for the first mistake that is found.
     """
-    for target in targets_or_default(targets):
+    datasets: list[str] = []
+    seen: set[str] = set()  # configurations
+    for target in list(targets) or ["results/holden/report.html"]:
         _, name, folder, file, *_ = (*Path(target).parts, "", "", "")
         if name == "datasets":
-            _check_dataset(project, folder)
+            datasets.append(folder)
         elif name == COMPARE:
             for compared in project.comparison.names():
-                _check_configuration(project, compared)
+                datasets += _check_configuration(project, compared, seen)
         elif name and name != PAGE:
-            _check_configuration(project, name)
+            datasets += _check_configuration(project, name, seen)
             _check_target_possible(project, name, folder, file)
+    datasets = list(dict.fromkeys(datasets))
+    for dataset in datasets:
+        _check_dataset(project, dataset)
+    for name in seen:
+        project.configurations.splits(name)  # raises HobbleError for unusable clips
+    return datasets
 
 
-def notes_on_unused_files(project: Project, targets: Iterable[str]) -> list[str]:
-    """Sentences about unused files in the folders of the data sets that the targets need."""
-    names = datasets_of(project, targets)
-    return [
-        f"data set {name}: {note}" for name in names for note in project.clips.notes_on_unused_files(name)
-    ]
+def _check_configuration(project: Project, name: str, seen: set[str]) -> Iterator[str]:
+    """Check a configuration, and those that it names. Yields the names of their data sets.
 
-
-def datasets_of(project: Project, targets: Iterable[str]) -> list[str]:
-    """The names of the data sets that the targets need.
-
-    If a configuration uses or continues the network of another configuration, the data set of this other one
-    is needed, too.
+    seen: the configurations that are checked; this one is added.
     """
-    names: list[str] = []
-    configurations: list[str] = []  # those whose data sets are still to be added
-    for target in targets_or_default(targets):
-        _, name, folder, *_ = (*Path(target).parts, "", "")
-        if name == "datasets":
-            names.append(folder)
-        elif name == COMPARE:
-            configurations += project.comparison.names()
-        elif name and name != PAGE:
-            configurations.append(name)
-    seen = set()
-    while configurations:
-        name = configurations.pop(0)
-        if name not in seen:
-            seen.add(name)
-            configuration = project.catalogue.configuration(name)
-            names.append(configuration.dataset)
-            configurations += filter(None, (configuration.network_of, configuration.training.continues))
-    return list(dict.fromkeys(names))
-
-
-def targets_or_default(targets: Iterable[str]) -> list[str]:
-    """The targets as a list. If there are none, the list has the target that Snakemake makes by default."""
-    return list(targets) or ["results/holden/report.html"]
-
-
-def _check_configuration(project: Project, name: str) -> None:
-    """Check a configuration, the configurations that it names, and its data set."""
+    if name in seen:
+        return
+    seen.add(name)
     configuration = project.catalogue.configuration(name)
     for other in filter(None, (configuration.network_of, configuration.training.continues)):
         if other == name:
@@ -118,14 +92,12 @@ def _check_configuration(project: Project, name: str) -> None:
                 f"configuration {name} names itself in `network_of` or `training.continues`. "
                 "Name another configuration there"
             )
-        project.catalogue.configuration(other)  # raises HobbleError if it does not exist or has a mistake
+        yield from _check_configuration(project, other, seen)
     if configuration.training.continues:
         _check_continues(project, name, configuration)
     if configuration.training.symmetric and not configuration.network_of:
         _check_symmetric(project, name, configuration)
-    dataset = configuration.dataset
-    _check_dataset(project, dataset)
-    project.datasets.splits(dataset, configuration.channels)  # raises HobbleError for unusable clips
+    yield configuration.dataset
 
 
 def _check_symmetric(project: Project, name: str, configuration: Configuration) -> None:
@@ -181,46 +153,28 @@ def _check_dataset(project: Project, name: str) -> None:
     skeleton = project.catalogue.skeleton(dataset.skeleton)
     for clip, entry in project.clips.listed_entries(name).items():
         project.clips.clip_skeleton_files(name, clip)  # raises InputError if the clip has no file
-        _check_entry(f"data set {name}: clips.{clip}", entry)
-    _check_hurt(project, name, dataset, [f"{a}-{b}" for a, b in skeleton.links])
+        if entry.recipe is not None:  # what the synthetic walker does
+            from hobble.synthetic.plan import RECIPES  # imports numpy, which takes longer than all checks
+
+            if entry.recipe not in RECIPES:
+                where, fix = f"data set {name}: clips.{clip}.recipe", f"There are {', '.join(RECIPES)}."
+                raise InputError(where, f"no such recipe: {entry.recipe:.80}", fix=fix)
+    links = [f"{a}-{b}" for a, b in skeleton.links]
+    if dataset.hurt is not None and project.clips.hurt_versions(name):
+        if not links:
+            raise HobbleError(
+                f"data set {name}: hurt: skeleton {dataset.skeleton} has no `links`. Add them to its file."
+            )
+        if unknown := [link for link in dataset.hurt.links if link not in links]:
+            there = ", ".join(links)
+            raise HobbleError(
+                f"data set {name}: hurt.links: no such link: {', '.join(unknown)}. There are {there}."
+            )
     project.datasets.channel_sources.check(name)
     # Raises HobbleError if `held_out` is wrong, or if no clip is left for training.
     project.datasets.splits(name, project.datasets.channel_sources.channels(name))
     if dataset.mirror:
         _check_mirror(dataset.skeleton, skeleton)
-
-
-def _check_entry(where: str, entry: ClipEntry) -> None:
-    """Check that the recipe in a clip's entry exists. A recipe says how the synthetic walker makes the clip.
-
-    where: place of the entry, for messages.
-    """
-    if entry.recipe is not None:
-        from hobble.synthetic.plan import RECIPES  # imports numpy, which takes longer than all checks
-
-        if entry.recipe not in RECIPES:
-            raise InputError(
-                f"{where}.recipe",
-                f"no such recipe: {entry.recipe:.80}",
-                fix=f"There are {', '.join(RECIPES)}.",
-            )
-
-
-def _check_hurt(project: Project, name: str, dataset: Dataset, links: Sequence[str]) -> None:
-    """Check that the links of a data set's section `hurt` exist.
-
-    links: all links of the skeleton. A link is named after two joints, as in LeftUpLeg-LeftLeg.
-    """
-    if dataset.hurt is None or not project.clips.hurt_versions(name):
-        return
-    if not links:
-        raise HobbleError(
-            f"data set {name}: hurt: skeleton {dataset.skeleton} has no `links`. Add them to its file."
-        )
-    if unknown := [link for link in dataset.hurt.links if link not in links]:
-        raise HobbleError(
-            f"data set {name}: hurt.links: no such link: {', '.join(unknown)}. There are {', '.join(links)}."
-        )
 
 
 def _check_mirror(name: str, skeleton_file: SkeletonFile) -> None:

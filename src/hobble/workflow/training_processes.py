@@ -6,7 +6,6 @@ A process is `python -m hobble.workflow.training_processes JOB.json`. JOB.json h
 
 from __future__ import annotations
 
-import contextlib
 import json
 import logging
 import os
@@ -18,10 +17,10 @@ import tempfile
 import uuid
 from collections.abc import Mapping
 from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
 from hobble.core.errors import HobbleError
-from hobble.models.model import Options
+from hobble.core.section import Section
 from hobble.training.options import Machines, Training
 from hobble.workflow import lifetime
 from hobble.workflow.lifetime import ends_with_run
@@ -44,40 +43,38 @@ def on_machines(training: Training, machines: Machines, gpus: bool) -> Training:
     return Training.model_validate({**training.model_dump(), **keys, "device": device})
 
 
-def train_together(
-    machines: Machines,
-    threads: int,
-    log: Path,
-    *,
-    database: Path,
-    network: Options,
-    training: Training,
-    checkpoints: Path,
-    start: Path | None,
-    code: str | None,
-) -> None:
+def train_together(machines: Machines, threads: int, log: Path, arguments: Mapping[str, Any]) -> None:
     """Train in `machines.count` processes. Returns when the last checkpoint is on disk.
 
     threads: number of threads of all processes of one machine together. log: file to which the output of the
-    processes is appended. database, start: paths. The other arguments are those of
-    `hobble.training.train.train`. All machines must be able to read and write these files. Raises HobbleError
-    if a process fails, with its message or with the exit status.
+    processes is appended. arguments: `database`, `network`, `training`, `checkpoints`, `start` and `code` of
+    `hobble.training.run.run`. All machines must be able to read and write these files. Raises HobbleError if
+    a process fails, with its message or with the exit status.
     """
     job = {
-        "database": str(database),
-        "network": network.model_dump(mode="json"),
-        "training": training.model_dump(mode="json"),
-        "checkpoints": str(checkpoints),
-        "start": str(start) if start else None,
-        "code": code,
+        name: value.model_dump(mode="json") if isinstance(value, Section) else value and str(value)
+        for name, value in arguments.items()
     }
+    checkpoints = Path(job["checkpoints"])
     checkpoints.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(prefix="processes-", dir=checkpoints) as folder:
         job_file = Path(folder, "job.json")
         own_threads = max(1, threads // machines.processes_per_node)  # of each process
         job_file.write_text(json.dumps({**job, "threads": own_threads, "log": str(log)}), encoding="utf-8")
         with open(log, "ab") as output:
-            status = _run(command(machines, job_file), _environment(machines, own_threads), output)
+            environment = _environment(machines, own_threads)
+            process = subprocess.Popen(
+                command(machines, job_file),
+                stdin=subprocess.DEVNULL,
+                stdout=output,
+                stderr=output,
+                env=environment,
+            )
+            try:
+                status = process.wait()
+            finally:
+                if process.poll() is None:
+                    lifetime.end_children(os.getpid(), GRACE_SECONDS)
         errors = [file.read_text(encoding="utf-8") for file in sorted(Path(folder).glob("error-*"))]
     if errors:
         raise HobbleError(errors[0])
@@ -94,12 +91,8 @@ def command(machines: Machines, job_file: Path) -> list[str]:
 
     Raises HobbleError for several machines without SLURM.
     """
-    torchrun = [
-        sys.executable,
-        "-m",
-        "torch.distributed.run",
-        f"--nproc-per-node={machines.processes_per_node}",
-    ]
+    torchrun = [sys.executable, "-m", "torch.distributed.run"]
+    torchrun.append(f"--nproc-per-node={machines.processes_per_node}")
     program = ["-m", "hobble.workflow.training_processes", str(job_file)]
     if machines.nodes == 1:
         return [*torchrun, "--standalone", *program]
@@ -108,29 +101,17 @@ def command(machines: Machines, job_file: Path) -> list[str]:
             f"training.nodes is {machines.nodes}, but this is not a SLURM job, so the processes cannot be "
             "started on other machines. Use the profile slurm, or nodes: 1."
         )
+    with socket.socket() as probe:  # a TCP port that no program on this machine uses
+        probe.bind(("", 0))
+        port = int(probe.getsockname()[1])
     rendezvous = [
         f"--nnodes={machines.nodes}",
         "--rdzv-backend=c10d",
-        f"--rdzv-endpoint={platform.node()}:{_free_port()}",
+        f"--rdzv-endpoint={platform.node()}:{port}",
         f"--rdzv-id={uuid.uuid4().hex}",
     ]
     srun = ["srun", "--overlap", "--kill-on-bad-exit=1", f"--ntasks={machines.nodes}", "--cpu-bind=none"]
     return [*srun, *torchrun, *rendezvous, *program]
-
-
-def _run(command: list[str], environment: Mapping[str, str], output: IO[bytes]) -> int:
-    """Run a command and return its exit status. If this process is stopped, the command is ended, too."""
-    process = subprocess.Popen(
-        command, stdin=subprocess.DEVNULL, stdout=output, stderr=output, env=environment
-    )
-    try:
-        return process.wait()
-    finally:
-        if process.poll() is None:
-            process.terminate()
-            with contextlib.suppress(subprocess.TimeoutExpired):
-                process.wait(GRACE_SECONDS)
-            process.kill()
 
 
 def _environment(machines: Machines, threads: int) -> dict[str, str]:
@@ -145,13 +126,6 @@ def _environment(machines: Machines, threads: int) -> dict[str, str]:
     else:  # other machines cannot see whether this process runs
         variables.pop(lifetime.RUN_VARIABLE, None)
     return variables
-
-
-def _free_port() -> int:
-    """A TCP port that no program on this machine uses."""
-    with socket.socket() as probe:
-        probe.bind(("", 0))
-        return int(probe.getsockname()[1])
 
 
 LOG_FORMAT = "%(asctime)s %(levelname)s %(message)s"
