@@ -14,6 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hobble.core.errors import HobbleError, InputError
+from hobble.core.files import read_json
 from hobble.database.reader import Block, Database, read_ahead
 from hobble.database.write import write_database
 from hobble.rows.clip_rows import pair_batches
@@ -205,7 +206,7 @@ def test_any_changed_byte_of_a_chunk_is_detected(sources, tmp_path):
 
 def test_a_manifest_that_differs_from_its_chunks_is_refused(sources, tmp_path):
     write_database(tmp_path, {"a": sources["rocky"]}, {"a": "train"}, channels=["injury"], joint_weight=0.1)
-    manifest = json.loads((tmp_path / "manifest.json").read_text())
+    manifest = read_json(tmp_path / "manifest.json")
     chunk = manifest["chunks"]["train"][0]
     for field, change in (("rows", -1), ("rows", 1), ("rows", 900), ("fits", -3), ("fits", 7)):
         other = {**manifest, "chunks": {"train": [{**chunk, field: chunk[field] + change}], "held_out": []}}
@@ -217,7 +218,7 @@ def test_a_manifest_that_differs_from_its_chunks_is_refused(sources, tmp_path):
 def test_an_incomplete_database_is_refused(path, tmp_path):
     with pytest.raises(InputError, match="did not finish"):
         Database.open(tmp_path)
-    manifest = json.loads((path / "manifest.json").read_text())
+    manifest = read_json(path / "manifest.json")
     (tmp_path / "manifest.json").write_text(json.dumps({**manifest, "version": 0}))
     with pytest.raises(InputError, match="version"):
         Database.open(tmp_path)

@@ -23,6 +23,7 @@ from pathlib import Path
 from typing import Any
 
 from .same import same
+from .values import not_finite
 
 ROOT = Path(__file__).resolve().parents[2]
 NOBODY = 65534
@@ -93,6 +94,7 @@ class Lab:
         self.targets: tuple[str, ...] = ()
         self.jobs: list[Job] = []
         self.seconds: dict[str, float] = {}
+        self.not_finite: set[str] = set()  # what is NaN in the undisturbed run, such as an unknown landing
         for part in (self.kept, folder / "site"):
             part.mkdir(parents=True)
         clone(self.run, None if fresh else ROOT / "src")
@@ -125,6 +127,7 @@ class Lab:
         assert end.status == 0, end.said
         kept = (_job(file.read_text()) for file in self.kept.iterdir())
         self.jobs = sorted((job for job in kept if job.rule not in FETCHED), key=lambda job: job.outputs)
+        self.not_finite = set(not_finite(self.run / "results"))
         for job in self.jobs:
             _import(job.source)
         for job in self.jobs:

@@ -12,6 +12,8 @@ from typing import Any
 
 import numpy as np
 
+from hobble.core.files import CHECKSUMS
+
 TIMED = {
     "responsivity.json": {"milliseconds"},
 }
@@ -49,7 +51,7 @@ def _files(folder: Path) -> dict[str, Path]:
 
 def _untimed(value: Any, names: set[str]) -> Any:
     if isinstance(value, dict):
-        return {k: _untimed(v, names) for k, v in value.items() if k not in names}
+        return {k: _untimed(v, names) for k, v in value.items() if k not in {*names, CHECKSUMS}}
     return [_untimed(v, names) for v in value] if isinstance(value, list) else value
 
 

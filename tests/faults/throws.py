@@ -31,6 +31,7 @@ from .judging import (
     some_input_file,
 )
 from .lab import NOBODY, Bench, Job, Lab
+from .values import change_file, not_finite
 
 OLD = b"what an earlier run made"
 
@@ -103,10 +104,32 @@ def harm(lab: Lab, rng: Random, only: str | None = None) -> Throw:
         return judged(bench, name, target, rng)
 
 
-def _files_read(lab: Lab, job: Job) -> list[str]:
-    """The files with checksums that a job reads and other jobs made, including those in folders."""
+def wrong_value(lab: Lab, rng: Random, ending: str | None = None) -> Throw:
+    """Change a value in an npz or JSON file, with right checksums. It is refused, or nothing becomes NaN.
+
+    ending: of the file's path; None for any file that one job made and another reads.
+    """
+    there = [(job, path) for job in lab.jobs for path in _files_read(lab, job, (".npz", ".json"))]
+    there = [(job, path) for job, path in there if ending is None or path.endswith(ending)]
+    wanted = rng.choice(sorted({(job.rule, kind(path)) for job, path in there}))
+    job, path = rng.choice([(job, path) for job, path in there if (job.rule, kind(path)) == wanted])
+    with lab.bench(job) as bench:
+        target, what = bench.folder / path, f"a wrong value in a file {Path(path).suffix}"
+        change_file(rng, target)
+        end = bench.run()
+        if end.status:
+            named = "database" if target.name == "manifest.json" else target.name
+            wrong = refusal(end, job, named)
+            return Throw(what, ANY, FAULT if wrong else REFUSED, f"{job.name}, {path}: {wrong}" * bool(wrong))
+        made = [bench.folder / output for output in job.outputs]
+        spoilt = [name for output in made for name in not_finite(output) if name not in lab.not_finite]
+        return Throw(what, ANY, FAULT if spoilt else UNHARMED, f"{job.name}, {path}: {spoilt}" * bool(spoilt))
+
+
+def _files_read(lab: Lab, job: Job, endings: tuple[str, ...] = (".npz", ".safetensors")) -> list[str]:
+    """The files with these endings that a job reads and other jobs made, including those in folders."""
     roots = [lab.run / path for path in job.inputs if path.startswith("results/")]
-    files = [file for root in roots for file in _files(root) if file.suffix in (".npz", ".safetensors")]
+    files = [file for root in roots for file in _files(root) if file.suffix in endings]
     return sorted(str(file.relative_to(lab.run)) for file in files)
 
 

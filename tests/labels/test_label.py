@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from hobble.core.declared import load_report
 from hobble.core.errors import InputError
 from hobble.labels import clip_labels
 from hobble.labels.clip_labels import LabelReport, load_labels, save_labels
@@ -158,7 +159,7 @@ def test_labels_survive_their_file_and_the_picture_is_drawn(walker, options, tmp
         np.testing.assert_equal(getattr(again, name), getattr(labels, name))
     write_report(tmp_path / "a.json", report, labels, clip)
     data = json.loads((tmp_path / "a.json").read_text())
-    assert LabelReport.from_dict(data) == report
+    assert load_report(tmp_path / "a.json", "labels", LabelReport) == report
     assert data["seconds"]["walk"] == pytest.approx(10, abs=1)
     assert data["cycles"] == len(labels.cycles)
     curves = data["curves"]

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 from hobble.core.errors import HobbleError
+from hobble.core.files import read_json
 from hobble.core.skeleton import Skeleton
 from hobble.measures import films
 from hobble.measures.films import FILMS, list_doubts, part_links, write_questionnaire
@@ -79,7 +80,7 @@ def answer_first(tab: Any) -> None:
 
 def test_injuries_are_listed_in_a_file_and_not_in_the_page(made: tuple[Path, dict[str, Any]]) -> None:
     folder, written = made
-    assert json.loads((folder / "films.json").read_text()) == json.loads(json.dumps(written))
+    assert read_json(folder / "films.json") == json.loads(json.dumps(written))
     assert [row["parts"] for row in written["films"]] == [list(film.severities) for film in SHORT]
     assert written["films"][0]["links"] == ["LeftForeArm-LeftHand"]
     assert all(row["from_healthy_cm"] > 0 for row in written["films"])

@@ -143,7 +143,7 @@ def test_maps_without_patches_are_refused_by_name() -> None:
 def test_a_damaged_file_is_refused(tmp_path: Path, patches: Patches) -> None:
     path = tmp_path / "p.npz"
     np.savez(path, heights=np.zeros(3))
-    with pytest.raises(InputError, match=r"p\.npz: not a file of patches"):
+    with pytest.raises(InputError, match=r"p\.npz: has no shapes"):
         load_patches(path)
 
 

@@ -20,7 +20,7 @@ import numpy as np
 import pytest
 
 from hobble.core.errors import HobbleError
-from hobble.core.files import load_npz
+from hobble.core.files import load_npz, read_json
 from hobble.database.write import write_database
 from hobble.training.options import Machines
 from hobble.workflow.training_processes import command, on_machines, train_together
@@ -176,7 +176,7 @@ def test_the_message_about_broken_rows_comes_from_their_process(
 
 def spoil(database: Path) -> None:
     """Make one Y of one row NaN, as if the database had been built with it."""
-    manifest = json.loads((database / "manifest.json").read_text())
+    manifest = read_json(database / "manifest.json")
     chunk = manifest["chunks"]["train"][-1]
     file = database / manifest["folder"] / chunk["file"]
     data = bytearray(file.read_bytes())

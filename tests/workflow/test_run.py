@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from hobble.core.files import read_json
 from hobble.measures.measure import all_measures
 
 pytestmark = pytest.mark.workflow
@@ -71,10 +72,7 @@ def test_two_runs_give_the_same_bytes(finished, workflow) -> None:
     assert first.keys() == second.keys()
     assert [name for name in first if first[name] != second[name]] == []
     for name in (measure.name for measure in all_measures()):
-        a, b = (
-            json.loads((w.folder / f"results/test/evaluation/{name}.json").read_text())
-            for w in (finished, workflow)
-        )
+        a, b = (read_json(w.folder / f"results/test/evaluation/{name}.json") for w in (finished, workflow))
         assert without_times(a) == without_times(b), name
 
 

@@ -5,10 +5,11 @@ A row holds the network's input X, output Y and phase P for one frame.
 
 from hobble.channels.clip_values import load_values
 from hobble.core.clip import load_clip
-from hobble.core.files import load_npz
 from hobble.database.options import RowOptions
+from hobble.labels.clip_labels import load_labels
 from hobble.rows.build_rows import build_clip_rows
 from hobble.rows.clip_rows import save_clip_rows, save_summary, summary_of_rows
+from hobble.terrain.clip_fits import load_fits
 from hobble.workflow.job import make_each
 
 
@@ -22,9 +23,9 @@ def make_rows(piece, log):
     rows = build_clip_rows(
         piece.name,
         load_clip(piece.input["clip"]),
-        load_npz(piece.input["labels"]),
+        vars(load_labels(piece.input["labels"])),
         {name: load_values(file)[0] for name, file in files_of_channels},
-        load_npz(piece.input["terrain"]),
+        load_fits(piece.input["terrain"]),
         window=options.window,
         step=options.step,
         facing_sigma=options.facing_sigma,

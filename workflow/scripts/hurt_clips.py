@@ -4,6 +4,7 @@ from hobble.channels import channel
 from hobble.channels.clip_values import load_values, save_values
 from hobble.channels.clip_values import write_report as write_channel_report
 from hobble.core.clip import load_clip, save_clip
+from hobble.core.declared import load_report
 from hobble.core.files import read_json, write_json
 from hobble.hurt.options import HURT_CHANNEL, Hurt
 from hobble.hurt.version import hurt_version
@@ -32,7 +33,7 @@ def make_version(piece, log):
     hurt, label_report = hurt_version(
         clip,
         load_labels(piece.input["labels"]),
-        LabelReport.from_dict(read_json(piece.input["label_report"])),
+        load_report(piece.input["label_report"], "the report of labels", LabelReport),
         Hurt.model_validate(piece.params["options"]),
         name=piece.name,
         version_number=piece.params["turn"],
@@ -53,7 +54,7 @@ def make_mirror(output):
     clip = load_clip(output["clip"])
     clip = mirror_clip(clip, f"{clip.name}_mirror")
     motion_report = mirror_report(read_json(output["report"]), clip.name)
-    label_report = LabelReport.from_dict(read_json(output["label_report"]))
+    label_report = load_report(output["label_report"], "the report of labels", LabelReport)
     labels, label_report = mirror_labels(load_labels(output["labels"]), label_report, clip)
     severity = channel(HURT_CHANNEL).mirror(load_values(output["injury"])[0], clip.skeleton)
     write_files(output, "mirror_", clip, motion_report, labels, label_report, severity)

@@ -4,6 +4,7 @@ They are computed from the motion, or taken from hand-made label files.
 """
 
 from hobble.core.clip import load_clip
+from hobble.core.declared import load_report
 from hobble.core.files import read_json
 from hobble.labels.clip_labels import LabelReport, load_labels, save_labels
 from hobble.labels.label import label_clip, mirror_labels, write_report
@@ -31,7 +32,7 @@ def make_labels(piece, log):
     write_report(piece.output["report"], report, labels, clip)
     if "mirror" in piece.output:
         mirror = load_clip(piece.input["mirror"])
-        report = LabelReport.from_dict(read_json(piece.output["report"]))
+        report = load_report(piece.output["report"], "the report of labels", LabelReport)
         labels, report = mirror_labels(load_labels(piece.output["labels"]), report, mirror)
         save_labels(piece.output["mirror"], labels)
         write_report(piece.output["mirror_report"], report, labels, mirror)

@@ -3,7 +3,7 @@
 import functools
 
 from hobble.core.clip import load_clip
-from hobble.core.files import load_npz
+from hobble.labels.clip_labels import load_labels
 from hobble.terrain.clip_fits import clip_fits, save_fits
 from hobble.terrain.options import FitOptions, HeightSampling
 from hobble.terrain.patches import load_patches
@@ -19,7 +19,7 @@ def make_fits(piece, log):
     """
     fits = clip_fits(
         load_clip(piece.input["clip"]),
-        load_npz(piece.input["labels"]),
+        vars(load_labels(piece.input["labels"])),
         read_patches(piece.input["patches"]),
         piece.params["ground"],
         FitOptions.model_validate(piece.params["options"]),

@@ -13,8 +13,9 @@ import numpy as np
 
 from hobble.channels import ClipSource, channel
 from hobble.core.clip import Clip
+from hobble.core.declared import ArrayOf, load_declared
 from hobble.core.errors import InputError
-from hobble.core.files import load_npz, save_npz, write_json
+from hobble.core.files import save_npz, write_json
 from hobble.core.quat import Array
 
 
@@ -51,11 +52,7 @@ def save_values(path: str | Path, values: Array, labels: Sequence[str]) -> None:
 
 def load_values(path: str | Path) -> tuple[Array, tuple[str, ...]]:
     """Read a file of `save_values`. Returns the values (F, C) and the labels of their columns."""
-    data = load_npz(path)
-    if set(data) != {"values", "labels"} or data["values"].shape[1:] != data["labels"].shape:
-        raise InputError(
-            path, "is not a file of channel values", fix="Delete it. The next run makes it again."
-        )
+    data = load_declared(path, {"values": ArrayOf(("F", "C"), low=0), "labels": ArrayOf(("C",), "U")})
     return data["values"], tuple(str(label) for label in data["labels"])
 
 

@@ -12,7 +12,7 @@ from typing import Any
 from pydantic import create_model
 
 from hobble.config.models import Configuration, Dataset, SkeletonFile
-from hobble.core.files import write_json, write_text
+from hobble.core.files import write_text
 from hobble.models import NETWORK_KINDS, options_of_kind
 
 CONFIG = Path(__file__).resolve().parents[3] / "config"
@@ -97,7 +97,8 @@ def main() -> None:
     """Write the files."""
     write_text(CONFIG / "README.md", readme())
     for kind, schema in schemas().items():
-        write_json(CONFIG / "schema" / f"{kind}.json", schema)
+        text = json.dumps(schema, indent=1, sort_keys=True) + "\n"
+        write_text(CONFIG / "schema" / f"{kind}.json", text)
 
 
 if __name__ == "__main__":

@@ -9,9 +9,13 @@ from pathlib import Path
 
 import numpy as np
 
-from hobble.core.files import load_npz, save_npz
+from hobble.core.declared import ArrayOf, load_declared
+from hobble.core.errors import InputError
+from hobble.core.files import DELETE_IT, save_npz
 from hobble.core.quat import Array
-from hobble.core.skeleton import Skeleton, forward_kinematics
+from hobble.core.skeleton import Skeleton, forward_kinematics, skeleton_from_data
+
+FARTHEST = 1e7  # cm (100 km): farther from the origin, floats are imprecise
 
 
 @dataclass(frozen=True)
@@ -58,6 +62,17 @@ class Clip:
         return replace(self, rotations=self.rotations[frames], root=self.root[frames], translations=moved)
 
 
+# What a clip's file holds, for F frames of J joints.
+DECLARED = {
+    "name": ArrayOf((), "U"),
+    "skeleton": ArrayOf((), "U"),
+    "fps": ArrayOf((), "iuf", 1, 10_000),
+    "rotations": ArrayOf(("F", "J", 4), low=-1.01, high=1.01),
+    "root": ArrayOf(("F", 3), low=-FARTHEST, high=FARTHEST),
+    "translations": ArrayOf(("F", "J", 3), low=-FARTHEST, high=FARTHEST, optional=True),
+}
+
+
 def save_clip(path: str | Path, clip: Clip) -> None:
     """Write a clip with its skeleton as one npz file. Rotations and translations are stored as float32."""
     extra = {} if clip.translations is None else {"translations": clip.translations.astype(np.float32)}
@@ -74,13 +89,17 @@ def save_clip(path: str | Path, clip: Clip) -> None:
 
 def load_clip(path: str | Path) -> Clip:
     """Read what `save_clip` wrote. Rotations are float64 and have unit length again."""
-    data = load_npz(path)
+    data = load_declared(path, DECLARED)
     rotations = data["rotations"].astype(float)
-    rotations /= np.linalg.norm(rotations, axis=-1, keepdims=True)
+    lengths = np.linalg.norm(rotations, axis=-1, keepdims=True)
+    skeleton = skeleton_from_data(path, str(data["skeleton"]), fix=DELETE_IT)
+    if rotations.shape[1] != len(skeleton.joints) or lengths.min(initial=1.0) < 0.5:
+        raise InputError(path, "its rotations are not those of its joints", fix=DELETE_IT)
+    rotations /= lengths
     translations = data.get("translations")
     return Clip(
         str(data["name"]),
-        Skeleton.from_dict(json.loads(str(data["skeleton"]))),
+        skeleton,
         float(data["fps"]),
         rotations,
         data["root"],

@@ -15,6 +15,7 @@ import numpy as np
 from pydantic import TypeAdapter, ValidationError
 
 from hobble.core.errors import InputError
+from hobble.core.files import DELETE_IT, Arrays, load_npz, read_json
 from hobble.core.untrusted import printable
 
 Declared = TypeVar("Declared")
@@ -25,7 +26,8 @@ class ArrayOf(NamedTuple):
 
     shape: the length of each axis, or a letter for a length that all arrays of the file with this letter
     share. kinds: the codes of NumPy's allowed types: f floats, i and u integers, b truth values, U text. low,
-    high: smallest and largest number that is allowed. finite: whether all numbers must be finite.
+    high: smallest and largest number that is allowed. finite: whether all numbers must be finite. optional:
+    whether the file may lack the array.
     """
 
     shape: tuple[int | str, ...]
@@ -33,6 +35,7 @@ class ArrayOf(NamedTuple):
     low: float = -math.inf
     high: float = math.inf
     finite: bool = True
+    optional: bool = False
 
 
 def check_arrays(
@@ -49,6 +52,8 @@ def check_arrays(
     known: dict[Any, int] = dict(lengths or {})
     for name, wanted in declared.items():
         if name not in arrays:
+            if wanted.optional:
+                continue
             raise InputError(path, f"has no {name}", fix=fix)
         array = np.asarray(arrays[name])
         if array.ndim == len(wanted.shape):
@@ -66,7 +71,10 @@ def check_arrays(
 def _check_range(path: str | Path, name: str, array: np.ndarray, wanted: ArrayOf, fix: str | None) -> None:
     if not array.size or array.dtype.kind == "U":
         return
-    low, high = float(array.min()), float(array.max())  # NaN if there is one
+    known = array if wanted.finite or array.dtype.kind != "f" else array[~np.isnan(array)]
+    if not known.size:
+        return
+    low, high = float(known.min()), float(known.max())  # NaN if there is one
     if wanted.finite and not (math.isfinite(low) and math.isfinite(high)):
         raise InputError(path, f"{name} holds numbers that are not finite", fix=fix)
     if low < wanted.low or high > wanted.high:
@@ -96,3 +104,15 @@ def read_declared(
         problem = first["msg"].removeprefix("Value error, ")
         place = f"{what}: {key}" if key else what
         raise InputError(path, printable(f"{place}: {problem}", 300), fix=fix) from None
+
+
+def load_declared(path: str | Path, declared: Mapping[str, ArrayOf], fix: str = DELETE_IT) -> Arrays:
+    """The arrays of an npz file, checked as `check_arrays` does."""
+    arrays = load_npz(path)
+    check_arrays(path, arrays, declared, fix=fix)
+    return arrays
+
+
+def load_report(path: str | Path, what: str, declared: type[Declared]) -> Declared:
+    """The content of a JSON file that a job wrote, as `declared`. what: see `read_declared`."""
+    return read_declared(path, what, declared, read_json(path), DELETE_IT)

@@ -18,7 +18,7 @@ import zipfile
 import zlib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import IO, TYPE_CHECKING, Any
+from typing import IO, TYPE_CHECKING, Any, NoReturn
 
 import numpy as np
 
@@ -35,6 +35,7 @@ MAX_INFLATED_BYTES = 1 << 30
 MAX_JSON_BYTES = 1 << 30
 _HOST = f"{zlib.crc32(platform.node().encode()):08x}"  # this machine, in the names of temporary files
 DELETE_IT = "Delete it; the next run makes it again."
+CHECKSUMS = "checksums"  # key of a JSON file
 # Version of the npy format -> NumPy's function that reads the header of an array in this version.
 HEADER_READERS = {
     (1, 0): np.lib.format.read_array_header_1_0,
@@ -122,21 +123,46 @@ def write_text(path: str | Path, text: str) -> None:
 
 
 def write_json(path: str | Path, value: Any) -> None:
-    """Write `value` as JSON with sorted keys, so that equal values give equal bytes."""
+    """Write `value` as JSON with sorted keys, so that equal values give equal bytes.
+
+    An object gets a key CHECKSUMS, of its other keys. `read_json` compares and removes it.
+    """
+    if isinstance(value, Mapping):
+        value = {**value, CHECKSUMS: _json_checksum(json.loads(json.dumps(value, allow_nan=False)))}
     write_text(path, json.dumps(value, indent=1, sort_keys=True, allow_nan=False) + "\n")
 
 
-def read_json(path: str | Path) -> Any:
-    """Read a JSON file. Raises InputError with the line if it is not valid JSON."""
+def _json_checksum(value: Any) -> str:
+    return f"crc32 {zlib.crc32(json.dumps(value, sort_keys=True).encode()):08x}"
+
+
+def read_json(path: str | Path, fix: str = DELETE_IT) -> Any:
+    """Read a JSON file.
+
+    Raises InputError with the line if it is not valid JSON, and with the advice `fix` if it was changed since
+    `write_json` wrote it.
+    """
     try:
-        return json.loads(read_text(path, MAX_JSON_BYTES), parse_constant=_refuse_constant)
+        value = json.loads(
+            read_text(path, MAX_JSON_BYTES), parse_constant=_refuse_constant, parse_float=_finite
+        )
     except json.JSONDecodeError as error:
         raise InputError(path, f"not valid JSON: {error.msg}", line=error.lineno) from error
     except (RecursionError, ValueError) as error:
         raise InputError(path, f"not valid JSON: {error}") from error
+    checksum = value.pop(CHECKSUMS, None) if isinstance(value, dict) else None
+    if checksum is not None and checksum != _json_checksum(value):
+        raise InputError(path, "was changed after it was written", fix=fix)
+    return value
 
 
-def _refuse_constant(word: str) -> None:
+def _finite(word: str) -> float:
+    """The number, if it is not too large for a float."""
+    value = float(word)
+    return value if abs(value) < float("inf") else _refuse_constant(word)
+
+
+def _refuse_constant(word: str) -> NoReturn:
     raise ValueError(f"{word} is not a number")
 
 

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import json
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Annotated, Any, Self
 
 import numpy as np
 from pydantic import Field, model_validator
 
 from hobble.core import quat
-from hobble.core.errors import HobbleError
+from hobble.core.declared import read_declared
+from hobble.core.errors import HobbleError, InputError
 from hobble.core.quat import Array
 from hobble.core.section import Section, ShortName
 
@@ -37,6 +40,11 @@ def other_side(name: str) -> str:
     return SIDE_LETTER.sub(lambda match: match[0].translate(OTHER_LETTER), name, count=1)
 
 
+# Every character has a joint for each of these roles.
+NEEDED_ROLES = (
+    "hips",
+    *(f"{side}_{part}" for side in ("left", "right") for part in ("hip", "knee", "heel", "toe")),
+)
 # A coordinate of a joint from its parent, cm.
 Coordinate = Annotated[float, Field(ge=-1e5, le=1e5, allow_inf_nan=False)]
 Offset = tuple[Coordinate, Coordinate, Coordinate]
@@ -208,6 +216,26 @@ class Skeleton:
     def children(self, joint: int) -> list[int]:
         """Indices of the joints whose parent is the joint with index `joint`."""
         return [i for i, p in enumerate(self.parents) if p == joint]
+
+
+def skeleton_from_data(
+    path: str | Path, data: Any, needed: Sequence[str] = (), fix: str | None = None
+) -> Skeleton:
+    """The skeleton of `Skeleton.to_dict`, or of its JSON text, in the file `path`.
+
+    needed: roles that it must have. Raises InputError, with the advice `fix`, if it is not valid.
+    """
+    try:
+        data = json.loads(data) if isinstance(data, str) else data
+    except ValueError as error:
+        raise InputError(path, f"its skeleton is not valid JSON: {error}", fix=fix) from None
+    entries = read_declared(path, "its skeleton", dict, data, fix)
+    keys = {key: value for key, value in entries.items() if key not in ("name", "maps")}
+    read = read_declared(path, "its skeleton", SkeletonData, keys, fix)
+    if missing := [role for role in needed if role not in read.roles]:
+        raise InputError(path, f"its skeleton has no joint for the roles {', '.join(missing)}", fix=fix)
+    name = read_declared(path, "its skeleton's name", ShortName, entries.get("name"), fix)  # type: ignore[arg-type]
+    return Skeleton.from_dict({**read.model_dump(), "name": name})
 
 
 def rest_positions(skeleton: Skeleton) -> Array:

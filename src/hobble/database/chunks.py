@@ -18,7 +18,7 @@ from hobble.core.errors import HobbleError, InputError
 from hobble.core.files import read_json, write_json
 from hobble.core.quat import Array
 from hobble.core.section import Positive, PositiveFloat
-from hobble.core.skeleton import SkeletonData
+from hobble.core.skeleton import skeleton_from_data
 from hobble.core.untrusted import printable
 from hobble.rows.layout import RowLayout, column_count_without_terrain, fit_column_count
 
@@ -240,16 +240,15 @@ class Manifest:
             raise InputError(
                 path, f"not a complete database: it has no {FILE}, so its build did not finish", fix=HINT
             )
-        values = read_declared(file, "the manifest", dict, read_json(file), HINT)
+        values = read_declared(file, "the manifest", dict, read_json(file, HINT), HINT)
         if (values.pop("format", ""), values.pop("version", 0)) != ("hobble database", VERSION):
             raise InputError(file, f"not a database of format version {VERSION}", fix=HINT)
         try:
             values["layout"] = RowLayout.from_dict(values["layout"])
+            skeleton_from_data(file, values["skeleton"], fix=HINT)
             skeleton = json.loads(values["skeleton"])
-            keys = {key: value for key, value in skeleton.items() if key != "name"}
         except (KeyError, TypeError, ValueError, AttributeError) as error:
             raise InputError(file, printable(f"not a database's manifest ({error})"), fix=HINT) from error
-        read_declared(file, "skeleton", SkeletonData, keys, HINT)
         manifest = read_declared(file, "the manifest", cls, {**values, "skeleton": skeleton}, HINT)
         read_declared(file, "clips", list[ClipEntry], manifest.clips, HINT)
         read = {split: sum(c["rows"] for c in manifest.clips if c["split"] == split) for split in SPLITS}

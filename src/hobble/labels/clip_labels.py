@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
@@ -10,7 +9,9 @@ from typing import Any
 import numpy as np
 
 from hobble.core.clip import Clip
-from hobble.core.files import load_npz, save_npz
+from hobble.core.declared import ArrayOf, load_declared
+from hobble.core.errors import InputError
+from hobble.core.files import DELETE_IT, save_npz
 from hobble.core.quat import Array
 from hobble.core.smooth import mean
 
@@ -46,7 +47,7 @@ class LabelReport:
 
     clip: its name. phase_source, gait_source: "file" (made by hand) or "automatic" (found from the motion).
     phase_zero, margins: the values of these options in the section `labels`. cycles_dropped: number of cycles
-    that are not used.
+    that are not used. `load_report` of `hobble.core.declared` reads it from the JSON file beside the labels.
     """
 
     clip: str
@@ -57,11 +58,16 @@ class LabelReport:
     cycles_dropped: int
     warnings: tuple[str, ...] = ()
 
-    @classmethod
-    def from_dict(cls, data: Mapping[str, Any]) -> LabelReport:
-        """Make the report from the content of the JSON file beside the labels. Further keys are ignored."""
-        values = {f.name: data[f.name] for f in fields(cls)}
-        return cls(**{**values, "warnings": tuple(values["warnings"])})
+
+# What a file of labels holds, for F frames, N footsteps and C cycles. A landing that is not known is NaN.
+DECLARED = {
+    "contacts": ArrayOf(("F", len(CONTACT_ROLES)), "b"),
+    "phase": ArrayOf(("F",), low=0, high=1),
+    "phase_known": ArrayOf(("F",), "b"),
+    "gait": ArrayOf(("F", len(GAITS)), low=-1e-3, high=1.001),
+    "footsteps": ArrayOf(("N", 3), low=-1e6, high=1e6, finite=False),
+    "cycles": ArrayOf(("C", 2), "iu", low=0),
+}
 
 
 def save_labels(path: str | Path, labels: Labels) -> None:
@@ -71,8 +77,11 @@ def save_labels(path: str | Path, labels: Labels) -> None:
 
 def load_labels(path: str | Path) -> Labels:
     """Read a file that `save_labels` wrote."""
-    data = load_npz(path)
-    return Labels(**{f.name: data[f.name] for f in fields(Labels)})
+    data = load_declared(path, DECLARED)
+    cycles, frames = data["cycles"], len(data["phase"])
+    if np.any(cycles[:, 0] >= cycles[:, 1]) or cycles.max(initial=0) >= max(frames, 1):
+        raise InputError(path, f"its cycles do not lie in its {frames} frames", fix=DELETE_IT)
+    return Labels(**{name: data[name] for name in DECLARED})
 
 
 POINTS = 400  # a curve has at most this many values by default

@@ -24,7 +24,7 @@ from hobble.core.errors import InputError
 from hobble.core.files import load_npz
 from hobble.core.quat import Array
 from hobble.core.section import ShortName
-from hobble.core.skeleton import Skeleton, SkeletonData
+from hobble.core.skeleton import NEEDED_ROLES, Skeleton, skeleton_from_data
 from hobble.core.untrusted import printable, read_yaml
 from hobble.models import DEFAULT_KIND, NETWORK_KINDS, options_of_kind
 from hobble.models.network import FACTS, TERRAIN_SIDE, Network, TrainingFacts
@@ -37,10 +37,6 @@ LARGEST_WEIGHT = 1e6  # trained weights are below 10
 LARGEST_MEAN = 1e9
 LARGEST_STD = 1e20  # so large because the std of a joint that the network shall not see is multiplied by 1e11
 # A skeleton's roles say which joint is the left knee and so on. These roles must have a joint.
-NEEDED_ROLES = (
-    "hips",
-    *(f"{side}_{part}" for side in ("left", "right") for part in ("hip", "knee", "heel", "toe")),
-)
 # Name of an array in a file -> field of `hobble.models.network.Network`.
 STATISTICS = {"Xmean": "x_mean", "Xstd": "x_std", "Ymean": "y_mean", "Ystd": "y_std"}
 DIVERGED = "The training diverged, or the file is damaged."
@@ -81,17 +77,7 @@ class Meta(BaseModel):
 def read_skeleton(path: str | Path) -> Skeleton:
     """The skeleton in a file of config/skeletons. Raises InputError if the skeleton is not valid."""
     data = read_declared(path, "a skeleton", dict, read_yaml(path))
-    return skeleton_from_data(path, {"name": Path(path).stem, **data})
-
-
-def skeleton_from_data(path: str | Path, data: Mapping[str, Any]) -> Skeleton:
-    """The skeleton of `Skeleton.to_dict`, with a joint for each of NEEDED_ROLES."""
-    keys = {key: value for key, value in data.items() if key not in ("name", "maps")}
-    read = read_declared(path, "its skeleton", SkeletonData, keys)
-    if missing := [role for role in NEEDED_ROLES if role not in read.roles]:
-        raise InputError(path, f"its skeleton has no joint for the roles {', '.join(missing)}")
-    name = read_declared(path, "its skeleton's name", ShortName, data.get("name"))  # type: ignore[arg-type]
-    return Skeleton.from_dict({**read.model_dump(), "name": name})
+    return skeleton_from_data(path, {"name": Path(path).stem, **data}, NEEDED_ROLES)
 
 
 def load_network(path: str | Path, skeleton: Skeleton | str | Path | None = None) -> Network:
@@ -132,7 +118,7 @@ def network_from_arrays(
     statistics = read_statistics(path, arrays)
     layout = _read_layout(path, meta, len(statistics["x_mean"]), len(statistics["y_mean"]), skeleton)
     if meta.skeleton:
-        skeleton = skeleton_from_data(path, meta.skeleton)
+        skeleton = skeleton_from_data(path, meta.skeleton, NEEDED_ROLES)
     if skeleton is not None and len(skeleton.joints) != layout.joints:
         raise InputError(
             path, f"has {layout.joints} joints, but skeleton {skeleton.name} has {len(skeleton.joints)}"

@@ -213,7 +213,10 @@ def _check(
         "phase": ArrayOf(("frames of the clip",), low=0, high=1),
         "gait": ArrayOf(("frames of the clip", len(GAITS)), low=-1e-3, high=1.001),
         "contacts": ArrayOf(("frames of the clip", len(CONTACTS)), "biuf", 0, 1),
-        **{each: ArrayOf(("frames of the clip", width)) for each, width in widths.items()},
+        **{
+            each: ArrayOf(("frames of the clip", width), high=channel(each).highest)
+            for each, width in widths.items()
+        },
     }
     check_arrays(name, {**labels, **channels}, declared, {"frames of the clip": len(clip)}, MAKE_AGAIN)
     if not np.array_equal(terrain["frame"], frame):

@@ -20,9 +20,10 @@ from pydantic import Field
 from hobble.core.array_parts import ArrayParts
 from hobble.core.declared import ArrayOf, check_arrays, read_declared
 from hobble.core.errors import InputError
-from hobble.core.files import load_npz, read_json, save_npz, write_json
+from hobble.core.files import DELETE_IT, load_npz, read_json, save_npz, write_json
 from hobble.core.quat import Array
 from hobble.core.section import Finite
+from hobble.core.skeleton import skeleton_from_data
 from hobble.core.untrusted import printable
 from hobble.rows.layout import (
     GAITS,
@@ -35,7 +36,7 @@ from hobble.rows.layout import (
 )
 
 CHANNEL_PREFIX = "channel_"  # in a file, the name of each channel's array begins with it
-DELETE_IT = "Delete it; the next run makes it again."
+VISITS = ArrayOf((), "iu", 1, 1000)
 MOST_ROWS = 1 << 28  # of a clip
 
 
@@ -197,6 +198,8 @@ def read_outline(source: ClipRows | str | Path) -> Outline:
     data = load_npz(source, ("layout", "skeleton", "fits", "visits"))
     try:
         layout = RowLayout.from_dict(json.loads(str(data["layout"])))
+        check_arrays(source, data, {"fits": ArrayOf(("rows",), "iu", 1), "visits": VISITS}, fix=DELETE_IT)
+        skeleton_from_data(source, str(data["skeleton"]), fix=DELETE_IT)
         return Outline(layout, json.loads(str(data["skeleton"])), data["fits"], int(data["visits"]))
     except (AttributeError, KeyError, TypeError, ValueError) as error:
         raise InputError(source, printable(f"not a file of rows ({error})"), fix=DELETE_IT) from error
@@ -212,7 +215,9 @@ def load_clip_rows(path: str | Path, part: tuple[int, int] | None = None) -> Cli
     try:
         data["clip"] = str(data["clip"])
         data["layout"] = RowLayout.from_dict(json.loads(str(data["layout"])))
+        skeleton_from_data(path, str(data["skeleton"]), fix=DELETE_IT)
         data["skeleton"] = json.loads(str(data["skeleton"]))
+        check_arrays(path, data, {"visits": VISITS}, fix=DELETE_IT)
         data["visits"] = int(data["visits"])
         channel_keys = [key for key in data if key.startswith(CHANNEL_PREFIX)]
         data["channels"] = {key.removeprefix(CHANNEL_PREFIX): data.pop(key) for key in channel_keys}

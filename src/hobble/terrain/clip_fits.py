@@ -15,8 +15,9 @@ from typing import Any
 import numpy as np
 
 from hobble.core.clip import Clip
+from hobble.core.declared import ArrayOf, load_declared
 from hobble.core.errors import InputError
-from hobble.core.files import save_npz
+from hobble.core.files import DELETE_IT, Arrays, save_npz
 from hobble.core.quat import Array
 from hobble.motion.root import RootFrames, extend_root, root_frames
 from hobble.terrain.cycle_ground import (
@@ -28,6 +29,7 @@ from hobble.terrain.cycle_ground import (
     flat_ground,
     is_above_other_joint,
 )
+from hobble.terrain.heightmaps import MAX_HEIGHT
 from hobble.terrain.options import FitOptions, HeightSampling
 from hobble.terrain.patches import Patches
 
@@ -284,6 +286,29 @@ def save_fits(path: str | Path, fits: ClipFits) -> None:
     for k, picture in enumerate(fits.pictures):
         arrays |= {f"picture{k}_{f.name}": np.asarray(getattr(picture, f.name)) for f in fields(picture)}
     save_npz(path, **arrays, pictures=np.array(len(fits.pictures)))
+
+
+# What a file of fits holds for C cycles with K fits and R rows, apart from its pictures.
+DECLARED = {
+    **{name: ArrayOf(("R",), "iu", 0) for name in ("frame", "cycle")},
+    "fits": ArrayOf(("R",), "iu", 1),
+    "heights": ArrayOf(("lines", "columns"), low=-MAX_HEIGHT, high=MAX_HEIGHT),
+    "patch": ArrayOf(("C", "K"), "iu", -1),
+    "error": ArrayOf(("C", "K"), low=0),
+    "foot_error": ArrayOf(("C", "K", 2), low=0),
+    "foot_below": ArrayOf(("C", "K"), low=0),
+    **{name: ArrayOf((), "f") for name in ("heel_height", "toe_height")},
+    "pictures": ArrayOf((), "iu", 0, 2),
+}
+
+
+def load_fits(path: str | Path) -> Arrays:
+    """The arrays that `save_fits` wrote. Raises InputError if one is not as it should be."""
+    data = load_declared(path, DECLARED)
+    cycles, fits = data["patch"].shape
+    if data["fits"].sum() != len(data["heights"]) or data["cycle"].max(initial=-1) >= cycles or not fits:
+        raise InputError(path, "its heights are not those of its cycles", fix=DELETE_IT)
+    return data
 
 
 # Data for a picture of a fit of the ground: heights on a grid, the feet over time, and three poses.

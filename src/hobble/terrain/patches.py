@@ -13,10 +13,11 @@ from pathlib import Path
 
 import numpy as np
 
+from hobble.core.declared import ArrayOf, load_declared
 from hobble.core.errors import HobbleError, InputError
-from hobble.core.files import load_npz, save_npz
+from hobble.core.files import DELETE_IT, save_npz
 from hobble.core.quat import Array
-from hobble.terrain.heightmaps import TerrainMap
+from hobble.terrain.heightmaps import MAX_CELLS, MAX_HEIGHT, TerrainMap
 
 VIEWS_PER_DRAW = 1_000  # random views of a heightmap that are tried at a time
 HOLE_HEIGHT = 1e9  # cm; holes in a map get this height, so that views with a hole are dropped
@@ -134,6 +135,19 @@ def _draw_views(
     return np.concatenate(affines), np.concatenate(means)
 
 
+# What a file of patches holds, for P views of M heightmaps with H cells in all.
+DECLARED = {
+    "heights": ArrayOf(("H",), low=-MAX_HEIGHT, high=MAX_HEIGHT),
+    "shapes": ArrayOf(("M", 2), "iu", 2, MAX_CELLS),
+    "names": ArrayOf(("M",), "U"),
+    "which": ArrayOf(("P",), "iu", 0),
+    "affine": ArrayOf(("P", 2, 3)),
+    "mean": ArrayOf(("P",), low=-MAX_HEIGHT, high=MAX_HEIGHT),
+    "cell": ArrayOf((), low=1e-3, high=1e6),
+    "size": ArrayOf((), "iu", 1, 2048),
+}
+
+
 def save_patches(path: str | Path, patches: Patches) -> None:
     """Write the heightmaps and their views as one npz."""
     arrays = {n: getattr(patches, n) for n in ("heights", "shapes", "names", "which", "affine", "mean")}
@@ -142,14 +156,17 @@ def save_patches(path: str | Path, patches: Patches) -> None:
 
 def load_patches(path: str | Path) -> Patches:
     """Read a file that `save_patches` wrote. Raises InputError if the file is damaged."""
-    data = load_npz(path)
-    try:
-        cell, size = float(data.pop("cell")), int(data.pop("size"))
-        return Patches(starts=_first_cells(data["shapes"]), cell=cell, size=size, **data)
-    except (KeyError, TypeError) as error:
-        raise InputError(
-            path, f"not a file of patches ({error})", fix="Delete it; the next run makes it again."
-        ) from error
+    data = load_declared(path, DECLARED)
+    shapes, which, size = data["shapes"].astype(np.int64), data["which"], int(data["size"])
+    corners = np.array([[u, v, 1] for u in (-(size // 2), size - 1 - size // 2) for v in (0, size - 1)])
+    corners[:, 1] -= size // 2
+    if len(data["heights"]) != np.prod(shapes, axis=1).sum() or which.max(initial=0) >= len(shapes):
+        raise InputError(path, "its views are not of its heightmaps", fix=DELETE_IT)
+    at = data["affine"].astype(float) @ corners.T  # (P, 2, 4) row and column in the heightmap
+    if at.min(initial=0) < -0.01 or np.any(at > shapes[which][..., None] - 0.99):
+        raise InputError(path, "a view reaches beyond its heightmap", fix=DELETE_IT)
+    arrays = {name: data[name] for name in DECLARED if name not in ("cell", "size", "shapes")}
+    return Patches(starts=_first_cells(shapes), shapes=shapes, cell=float(data["cell"]), size=size, **arrays)
 
 
 def _with_holes_marked(heightmap: TerrainMap, cell: float) -> Array:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -26,6 +25,7 @@ from hobble.channels.injury.status import (
 )
 from hobble.core.clip import Clip
 from hobble.core.errors import InputError
+from hobble.core.files import read_json
 from hobble.core.skeleton import Skeleton
 from hobble.motion.edit import sample_times
 
@@ -196,7 +196,7 @@ def test_saved_values_keep_their_columns_and_the_report_lists_the_injuries(clip,
     assert (read == severity).all()
     assert links == clip.skeleton.link_names
     write_report(tmp_path / "a.json", "injury", clip, severity, links, ["odd"])
-    report = json.loads((tmp_path / "a.json").read_text())
+    report = read_json(tmp_path / "a.json")
     written = {"clip": "walk", "channel": "injury", "title": "Injury", "values": {THIGH: hurt}}
     assert report == {**written, "highest": 10.0, "warnings": ["odd"]}
 
