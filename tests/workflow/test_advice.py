@@ -14,10 +14,10 @@ pytestmark = [pytest.mark.workflow, pytest.mark.slow]
 DATASET, TEST = "results/datasets/tiny", "results/test"
 # A file of the finished run -> what has to be made from it.
 DAMAGED = {
-    f"{DATASET}/database/injury/statistics.npz": f"{TEST}/network/weights.npz",
-    f"{DATASET}/database/injury/manifest.json": f"{TEST}/network/weights.npz",
+    f"{DATASET}/database/injury+guarding/statistics.npz": f"{TEST}/network/weights.npz",
+    f"{DATASET}/database/injury+guarding/manifest.json": f"{TEST}/network/weights.npz",
     f"{DATASET}/batches/motion/uneven-1/motion/uneven-1.npz": f"{DATASET}/batches/labels/uneven-1",
-    f"{DATASET}/batches/database/uneven-1/database/clips/uneven-1.npz": f"{DATASET}/database/injury",
+    f"{DATASET}/batches/database/uneven-1/database/clips/uneven-1.npz": f"{DATASET}/database/injury+guarding",
     f"{DATASET}/terrain/patches.npz": f"{DATASET}/batches/terrain/uneven-1",
     f"{TEST}/network/weights.npz": f"{TEST}/runtime/scenarios.npz",
 }
@@ -43,7 +43,7 @@ def test_the_advice_helps(finished, copied, damaged: str) -> None:
         r"Delete (results/\S+?); the same command makes it again|Delete the folder of the database", said
     )
     assert advice, said
-    remove(copied.folder / (advice[1] or f"{DATASET}/database/injury"))
+    remove(copied.folder / (advice[1] or f"{DATASET}/database/injury+guarding"))
     assert times
     copied.run("-c2", target)
     for made in (damaged, target):
