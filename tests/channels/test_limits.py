@@ -47,17 +47,6 @@ def test_between_levels_the_speed_is_interpolated(values, speed: float) -> None:
     np.testing.assert_array_equal(LIMITS.highest_speeds(np.array([values], float)), [[speed]])
 
 
-def test_two_injuries_are_slower_than_each_alone_and_take_less_than_both_together() -> None:
-    values = np.random.default_rng(1).uniform(0.1, 10, (50, 2))
-    both = LIMITS.highest_speeds(values)
-    first, second = (LIMITS.highest_speeds(values * keep) for keep in ([1, 0], [0, 1]))
-    assert (both <= np.minimum(first, second)).all()
-    each_slows = np.maximum(first, second) < 3.99  # the second injury slows only from 5 on
-    assert each_slows.sum() > 10
-    assert (both < np.minimum(first, second))[each_slows].all()
-    assert (both > np.maximum(first + second - 4.0, 0.1 * 4.0) - 1e-9).all()  # 4 is the healthy speed
-
-
 def test_two_injuries_add_up_like_the_effects_of_hurt_versions() -> None:
     """Each takes half of the healthy speed of 4: together (2 * .5^3)^(1/3) = .63 of it."""
     limits = Limits(np.array([0.0, 10.0]), np.array([[[4.0, 2.0], [4.0, 2.0]]]), usual=np.array([3.5]))
@@ -143,12 +132,6 @@ def test_the_slowness_of_one_channel_is_not_learnt_for_another() -> None:
         assert limits.speeds[WALK, 0, -1] == pytest.approx(expected, rel=0.02)
 
 
-def test_without_channel_values_no_limit_is_learnt() -> None:
-    found = pace()
-    found.add("healthy", **rows(np.full(30, 2.0), np.zeros((30, 2))))
-    assert found.learn() is None
-
-
 @pytest.mark.parametrize(
     ("changes", "says"),
     [
@@ -167,8 +150,3 @@ def test_a_malformed_table_of_limits_is_refused(changes, says: str) -> None:
         Limits.from_dict(data, 1, 2, 10.0)
     with pytest.raises(ValueError, match="tables of numbers"):
         Limits.from_dict({"levels": "all"}, 1, 2, 10.0)
-
-
-def test_without_usual_speeds_the_highest_speed_is_the_usual_one() -> None:
-    data = {"levels": LIMITS.levels.tolist(), "speeds": LIMITS.speeds.tolist()}
-    assert Limits.from_dict(data, 1, 2, 10.0).usual.tolist() == [4.0]

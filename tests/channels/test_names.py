@@ -59,11 +59,3 @@ def naming(name: str, folder: Path = SRC) -> list[str]:
 @pytest.mark.parametrize("name", CHANNEL_NAMES)
 def test_no_file_outside_its_folder_names_a_channel(name: str) -> None:
     assert naming(name) == []
-
-
-def test_a_file_that_names_a_channel_is_found(tmp_path: Path) -> None:
-    (tmp_path / "a.py").write_text('"""Of moods, as mood."""\nHURTS = "mood"\n')
-    (tmp_path / "b.py").write_text('def f(mood):\n    """x"""\n')
-    (tmp_path / "c.js").write_text("x[X.mood]")
-    (tmp_path / "d.py").write_text('"""As in mood={...}."""\n')
-    assert naming("mood", tmp_path) == ["a.py", "b.py", "c.js"]

@@ -14,7 +14,7 @@ from pathlib import Path
 from random import Random
 
 from . import texts, throws
-from .grammar import Case
+from .grammar import STATUS_BASE, Case
 from .judging import FAULT, REFUSED, REMADE, SKIPPED, UNHARMED, Throw
 from .lab import ROOT, Lab
 
@@ -25,7 +25,7 @@ KINDS: dict[Callable[[Lab, Random], Throw], int] = {
     throws.gone: 5,
     throws.full_disk: 10,
     throws.no_permission: 8,
-    throws.changing_clip: 8,
+    throws.wrong_value: 25,
     throws.spoilt_checkpoint: 4,
 }
 TEXTS_PER_ROUND = 5
@@ -81,7 +81,7 @@ def _rounds(lab: Lab, seed: int, numbers: range | list[int]) -> list[Throw]:
 def _texts(lab: Lab, folder: Path, seed: int, examples: int) -> list[Throw]:
     thrown: list[Throw] = []
     clip = lab.run / next(path for job in lab.jobs for path in job.outputs if path.endswith(".bvh"))
-    bases = {"bvh": texts.base_bvh(clip), "status": texts.status_grammar.BASE}
+    bases = {"bvh": texts.base_bvh(clip), "status": STATUS_BASE}
     names = {"bvh": "a BVH file", "status": "a status file"}
     for which, base in bases.items():
 

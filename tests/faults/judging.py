@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from random import Random
 
-from .damage import DAMAGES, group_of
+from .damage import DAMAGES
 from .lab import Bench, End, Job
 
 TRACEBACK = "Traceback (most recent call last)"
@@ -78,7 +78,7 @@ def some_input_file(bench: Bench, rng: Random) -> Path:
 def judged(bench: Bench, what: str, target: Path, rng: Random) -> Throw:
     """A damaged input is refused with its name, or the result is the same as with the undamaged one."""
     at = kind(str(target)) if target.is_file() else "any file"
-    what = f"bytes {group_of(what)}" if what in DAMAGES else what
+    what = f"bytes {what}" if what in DAMAGES else what
     end = bench.run()
     if end.status == 0:
         if unlike := bench.unlike():

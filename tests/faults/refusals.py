@@ -14,7 +14,7 @@ MB = 1 << 20
 HEADER = "HIERARCHY\nROOT Hips\n{\nOFFSET 0 0 0\nCHANNELS 1 Xposition\n"
 
 
-SECONDS = 5  # of the processor; every hostile file of a few kilobytes is refused in less
+SECONDS = 10  # of the processor; every hostile file of a few kilobytes is refused in less
 
 
 def refused(read: Callable[[], Any], *pieces: str, mb: int = 300, letters: int = 2000) -> None:

@@ -21,8 +21,7 @@ from hobble.core.files import load_npz, read_json
 from hobble.core.untrusted import read_yaml
 from hobble.models.load import load_network, read_arrays
 from hobble.motion.skeleton_file import load_skeleton
-from hobble.terrain.heightmaps import heightmaps, read_heights
-from hobble.terrain.options import HeightmapOptions
+from hobble.terrain.heightmaps import read_heights
 
 from .refusals import MB, refused, write
 
@@ -93,13 +92,6 @@ def test_a_layer_of_the_release_that_is_too_large_is_refused(tmp_path: Path) -> 
     with open(tmp_path / "W0_000.bin", "wb") as file:
         file.truncate(4 << 32)
     refused(lambda: load_network(tmp_path), "b0_000.bin: 65536 x 65536 weights", mb=64)
-
-
-@pytest.mark.parametrize("text", ["1e308 2\n3 4\n", "nan 2\n3 -1e9\n"])
-def test_impossible_heights_are_refused(tmp_path: Path, text: str) -> None:
-    path = write(tmp_path / "a.txt", text)
-    entry = HeightmapOptions.model_validate({"kind": "file", "path": "a.txt"})
-    refused(lambda: heightmaps([entry], [path], cell=4.0, height_scale=10.0), "a.txt: a height of")
 
 
 @pytest.mark.parametrize(("kind", "value"), [(3, (7, 8)), (2, "none"), (7, b"\xff")])
@@ -192,17 +184,6 @@ def test_an_image_of_too_many_pixels_is_refused_before_it_is_unpacked(tmp_path: 
         data = chunk(b"IHDR", header) + chunk(b"IDAT", zlib.compress(bytes(1000))) + chunk(b"IEND", b"")
         path = write(tmp_path / "map.png", b"\x89PNG\r\n\x1a\n" + data)
         refused(lambda p=path: read_heights(p), "map.png: ", mb=64)
-
-
-def test_an_image_whose_header_claims_a_huge_size_is_not_decoded(tmp_path: Path) -> None:
-    def part(kind: bytes, data: bytes) -> bytes:
-        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
-
-    for side in (9_000, 60_000):
-        header = part(b"IHDR", struct.pack(">IIBBBBB", side, side, 8, 0, 0, 0, 0))
-        body = part(b"IDAT", zlib.compress(bytes(1000))) + part(b"IEND", b"")
-        path = write(tmp_path / f"{side}.png", b"\x89PNG\r\n\x1a\n" + header + body)
-        refused(lambda p=path: read_heights(p), f"{side}.png: ", mb=200)
 
 
 LAUGHS = "a0: &a0 [x, x, x, x, x, x, x, x, x]\n" + "".join(

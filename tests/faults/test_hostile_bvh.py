@@ -85,13 +85,6 @@ def test_lines_without_end_take_neither_memory_nor_time(tmp_path: Path, what: st
     refused(lambda: bvh.read_bvh(path), "a.bvh", says)
 
 
-def test_a_frame_may_still_run_over_many_lines(tmp_path: Path) -> None:
-    head = HEADER.replace("1 Xposition", "3 Xposition Yposition Zposition")
-    values = "".join(f"{k}\n\n" for k in range(30))
-    path = write(tmp_path / "a.bvh", f"{head}}}\nMOTION\nFrames: 10\nFrame Time: 0.0083\n{values}")
-    np.testing.assert_array_equal(bvh.read_bvh(path).values, np.arange(30.0).reshape(10, 3))
-
-
 def test_endless_files_are_refused(tmp_path: Path) -> None:
     large = tmp_path / "large.bvh"
     with open(large, "wb") as file:

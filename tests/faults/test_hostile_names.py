@@ -9,7 +9,6 @@ from typing import Any
 import pytest
 import yaml
 
-from hobble.channels.injury.table import write_statuses
 from hobble.config.load_configuration import Catalogue
 from hobble.core.errors import HobbleError, InputError
 from hobble.motion.skeleton_file import load_skeleton
@@ -96,14 +95,6 @@ def test_a_skeleton_with_an_offset_that_is_no_number_is_refused(tmp_path: Path, 
     assert str(refusal.value).isprintable()
 
 
-def test_at_most_twenty_of_many_problems_are_listed(catalogue: Path) -> None:
-    given = {"skeleton": "holden31", "folder": "mine", **{f"key {i}": 1 for i in range(5000)}}
-    write(catalogue / "datasets/mine.yaml", yaml.safe_dump(given))
-    refused(
-        lambda: Catalogue(catalogue).dataset("mine"), "mine.yaml", "and 4980 more problems", letters=30_000
-    )
-
-
 @pytest.mark.parametrize(
     "name",
     [
@@ -128,18 +119,6 @@ def test_unsafe_clip_names_are_refused_with_their_folder(catalogue: Path, tmp_pa
     with pytest.raises(InputError, match="mocap/mine: a clip is called") as refusal:
         Project(catalogue.parent, {"mocap": tmp_path / "mocap"}).clips.entries("mine")
     assert str(refusal.value).isprintable()
-
-
-def test_a_table_writes_beside_the_clips_and_nowhere_else(tmp_path: Path) -> None:
-    (tmp_path / "clips").mkdir()
-    for path in (tmp_path / "a.bvh", tmp_path / "clips/b.bvh"):
-        write(path, "Frames: 9\n")
-    links = ("LeftUpLeg-LeftLeg",)
-    for name in ("../a", str(tmp_path / "a"), "x/../../a"):
-        table = write(tmp_path / "t.csv", f"clip,link,severity,from,to\n{name},{links[0]},5,,\n")
-        with pytest.raises(InputError, match=r"t\.csv, line 2: no such clip"):
-            write_statuses(table, tmp_path / "clips", links)
-    assert not list(tmp_path.rglob("*_injuries.txt"))
 
 
 def test_symbolic_links_are_followed_to_read_but_never_to_write(tmp_path: Path) -> None:

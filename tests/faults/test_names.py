@@ -53,22 +53,6 @@ def test_no_name_reaches_a_shell(lab: Lab, tiny_bvh: str) -> None:
     assert all((lab.run / path).is_file() for path in made)
 
 
-def test_an_impossible_name_is_refused_before_the_first_job(lab: Lab, tiny_bvh: str) -> None:
-    (lab.run / "mocap/mine/a\ntouch pwned\n.bvh").write_text(tiny_bvh)
-    status, said = run(lab, "-np", "results/datasets/mine/database/injury")
-    assert status == 1
-    assert "mocap/mine: a clip is called" in said
-    assert "Building DAG" not in said
-
-
-def test_yaml_tags_in_a_configuration_make_no_objects(lab: Lab) -> None:
-    text = "extends: test\nreport:\n  title: !!python/object/apply:os.system ['touch pwned']\n"
-    (lab.run / "config/mine.yaml").write_text(text)
-    status, said = run(lab, "-np", "results/mine/report.html")
-    assert status == 1
-    assert "mine.yaml, line 3: not valid YAML" in said
-
-
 @pytest.fixture
 def reachable() -> Iterator[Path]:
     """A folder into which the user with that name cannot go."""

@@ -9,9 +9,8 @@ from random import Random
 
 import pytest
 
-from . import bvh_grammar, status_grammar, texts, throws
-from .damage import DAMAGES
-from .grammar import Case, mutated
+from . import texts, throws
+from .grammar import BVH, STATUS, STATUS_BASE, mutated
 from .judging import FAULT, REFUSED
 from .lab import Lab
 from .same import same
@@ -34,72 +33,37 @@ def lab() -> Iterator[Lab]:
 
 
 @pytest.mark.parametrize(
-    ("throw", "times"),
+    ("throw", "times", "refusals"),
     [
-        (throws.kill, 16),
-        (throws.gone, 5),
-        (throws.full_disk, 4),
-        (throws.no_permission, 4),
-        (throws.changing_clip, 6),
+        (throws.kill, 16, 0),
+        (throws.gone, 5, 0),
+        (throws.full_disk, 4, 0),
+        (throws.no_permission, 4, 0),
+        (throws.harm, 40, 20),
+        (throws.wrong_value, 60, 30),
     ],
 )
-def test_no_fault_during_a_job_damages_a_result(lab: Lab, throw, times: int) -> None:
+def test_no_fault_of_a_job_damages_a_result(lab: Lab, throw, times: int, refusals: int) -> None:
     thrown = [throw(lab, Random(f"{SEED}-{number}")) for number in range(times)]
     assert "\n".join(one.detail for one in thrown if one.happened == FAULT) == ""
+    assert sum(one.happened == REFUSED for one in thrown) >= refusals
 
 
-@pytest.mark.parametrize(
-    "rule", ["hurt_clips", "labels_clips", "channel_clips", "terrain_fits", "database_clips"]
-)
-def test_a_damaged_input_is_refused_or_harmless(lab: Lab, rule: str) -> None:
-    thrown = [throws.harm(lab, Random(f"{SEED}-{number}"), rule) for number in range(8)]
-    assert "\n".join(one.detail for one in thrown if one.happened == FAULT) == ""
-    assert sum(one.happened == REFUSED for one in thrown) >= 4
-
-
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return tmp_path_factory.mktemp("texts")
-
-
-def test_every_mutation_of_a_bvh_gives_a_clip_or_one_message(tiny_bvh: str, folder: Path) -> None:
-    assert len(bvh_grammar.MUTATIONS) > 150
-    path = folder / "clip.bvh"
-    path.write_text(tiny_bvh)
-    whole = texts.read_clip(path)
-    for number, name in enumerate(bvh_grammar.MUTATIONS):
-        case = mutated(tiny_bvh, bvh_grammar.MUTATIONS, [name], number)
-        texts.judge(case, path, texts.read_clip, whole)
-
-
-def test_every_mutation_of_a_status_file_gives_severities_or_one_message(folder: Path) -> None:
-    assert len(status_grammar.MUTATIONS) > 100
-    path = folder / "clip_injuries.txt"
-    path.write_text(status_grammar.BASE)
-    whole = texts.read_severity(path)
-    for number, name in enumerate(status_grammar.MUTATIONS):
-        case = mutated(status_grammar.BASE, status_grammar.MUTATIONS, [name], number)
-        texts.judge(case, path, texts.read_severity, whole)
-
-
-def test_several_mutations_of_one_file_give_a_result_or_one_message(folder: Path) -> None:
-    became: list[str] = []
-
-    def report(case: Case, what: str) -> None:
-        became.append(what)
-
-    texts.throw("status", status_grammar.BASE, folder, 60, SEED, report)
-    assert len(became) >= 60
-
-
-def test_damage_always_changes_the_bytes() -> None:
-    from .damage import damaged
-
-    for name in DAMAGES:
-        for number in range(20):
-            rng = Random(number)
-            data = rng.randbytes(rng.randint(1, 300))
-            assert damaged(rng, name, data) != data
+@pytest.mark.parametrize("which", ["bvh", "status"])
+def test_every_mutation_of_a_file_gives_a_result_or_one_message(
+    tiny_bvh: str, tmp_path: Path, which: str
+) -> None:
+    table, base = (BVH, tiny_bvh) if which == "bvh" else (STATUS, STATUS_BASE)
+    read = texts.read_clip if which == "bvh" else texts.read_severity
+    path = tmp_path / ("clip.bvh" if which == "bvh" else "clip_injuries.txt")
+    path.write_text(base)
+    whole = read(path)
+    for number, name in enumerate(table):
+        texts.judge(mutated(base, table, [name], number), path, read, whole)
+    if which == "status":
+        became: list[str] = []
+        texts.throw(which, base, tmp_path, 60, SEED, lambda case, what: became.append(what))
+        assert len(became) >= 60
 
 
 def test_same_ignores_times_and_nothing_else(tmp_path: Path) -> None:

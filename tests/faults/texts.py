@@ -17,8 +17,7 @@ from hobble.motion.make import make_clip
 from hobble.motion.options import ClipMotion
 from hobble.motion.skeleton_file import load_skeleton
 
-from . import bvh_grammar, status_grammar
-from .grammar import Case, cases
+from .grammar import BVH, STATUS, Case, cases
 from .lab import ROOT
 from .refusals import SECONDS
 
@@ -94,7 +93,6 @@ def throw(
     which: str, base: str, folder: Path, examples: int, seed_: int, report: Callable[[Case, str], Any]
 ) -> None:
     """Read and judge files of a grammar ("bvh" or "status") that hypothesis generates from a seed."""
-    grammar = bvh_grammar if which == "bvh" else status_grammar
     read = read_clip if which == "bvh" else read_severity
     path = folder / ("clip.bvh" if which == "bvh" else "clip_injuries.txt")
     path.write_text(base)
@@ -111,4 +109,4 @@ def throw(
         phases=phases,
         suppress_health_check=list(HealthCheck),
     )
-    seed(seed_)(wanted(given(cases(base, grammar.MUTATIONS))(one)))()
+    seed(seed_)(wanted(given(cases(base, BVH if which == "bvh" else STATUS))(one)))()

@@ -8,13 +8,12 @@ import shutil
 import signal
 import subprocess
 import sys
-import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from random import Random
 from typing import Any
 
-from .damage import DAMAGES, damaged, group_of
+from .damage import DAMAGES, damaged
 from .judging import (
     ANY,
     FAULT,
@@ -98,7 +97,7 @@ def harm(lab: Lab, rng: Random, only: str | None = None) -> Throw:
         target = bench.folder / path
         whole, times = target.read_bytes(), target.stat()
         if not whole:
-            return Throw("bytes " + group_of(name), kind(str(target)), SKIPPED, "an empty file")
+            return Throw("bytes " + name, kind(str(target)), SKIPPED, "an empty file")
         target.write_bytes(damaged(rng, name, whole))
         os.utime(target, ns=(times.st_atime_ns, times.st_mtime_ns))
         return judged(bench, name, target, rng)
@@ -230,66 +229,6 @@ def become_nobody() -> None:
     os.setgid(NOBODY)
     os.setuid(NOBODY)
     os.environ["HOME"] = "/nonexistent"
-
-
-def changing_clip(lab: Lab, rng: Random) -> Throw:
-    """A clip is rewritten while its job reads it. The result is that of the old clip, that of the new one, or
-    a refusal. That of the old clip is right only if Snakemake sees that the clip is newer and makes it again.
-    """
-    clips = [job for job in lab.jobs if job.rule == "motion_clips"]
-    job, other = rng.sample(clips, 2)
-    how = rng.choice(("written over", "emptied and written", "replaced"))
-    with lab.bench(job) as bench:
-        clip = bench.folder / next(p for p in job.inputs if p.endswith(".bvh"))
-        new = (lab.run / next(p for p in other.inputs if p.endswith(".bvh"))).read_bytes()
-        delay, pause = rng.uniform(0, 0.8 * lab.seconds[job.name]), rng.uniform(0, 0.01)
-
-        def change() -> None:
-            time.sleep(delay)
-            _write_anew(clip, new, how, pause)
-
-        end = bench.run(meanwhile=change)
-        at = f"{how} while it is read"
-        if end.status != 0:
-            wrong = refusal(end, job, clip.name)
-            return Throw("a clip that changes", at, FAULT if wrong else REFUSED, wrong)
-        written = min(path.stat().st_mtime_ns for path in _outputs(bench))
-        if clip.stat().st_mtime_ns >= written:
-            torn = bench.unlike()
-            return Throw(
-                "a clip that changes",
-                at,
-                FAULT if torn else UNHARMED,
-                f"neither old nor new: {torn}" * bool(torn),
-            )
-        made = {path: path.read_bytes() for path in _outputs(bench)}
-        end = bench.run()
-        again = {path: path.read_bytes() for path in _outputs(bench)}
-        if end.status or made != again:
-            return Throw(
-                "a clip that changes", at, FAULT, f"{job.name}: the result is not that of the new clip"
-            )
-        return Throw("a clip that changes", at, UNHARMED)
-
-
-def _outputs(bench: Bench) -> list[Path]:
-    return [file for path in bench.job.outputs for file in _files(bench.folder / path)]
-
-
-def _write_anew(clip: Path, new: bytes, how: str, pause: float) -> None:
-    if how == "replaced":
-        new_file = clip.with_suffix(".new")
-        new_file.write_bytes(new)
-        os.replace(new_file, clip)
-        return
-    with open(clip, "r+b") as file:
-        if how.startswith("emptied"):
-            file.truncate(0)
-        for at in range(0, len(new), len(new) // 5 + 1):
-            file.write(new[at : at + len(new) // 5 + 1])
-            file.flush()
-            time.sleep(pause)
-        file.truncate(len(new))
 
 
 def spoilt_checkpoint(lab: Lab, rng: Random) -> Throw:

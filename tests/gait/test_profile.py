@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hobble.core.errors import HobbleError
-from hobble.gait.cycles import WalkCycles, measure_cycles
+from hobble.gait.cycles import measure_cycles
 from hobble.gait.profile import features, measure_effects, mirror_profile, profile_of_walk
 from hobble.gait.recognise import grade_walk, recognise, windows_with_cycles
 
@@ -84,24 +83,6 @@ def test_effects_of_a_made_limp_are_found(holden31, swinger, healthy):
     assert sizes["lean_hurt"] == pytest.approx(3.0)  # from 3 degrees to the left to none: towards the right
     assert sizes["lean"] == pytest.approx(5.0)
     assert sizes["pelvis_drop"] == pytest.approx(2.0)
-
-
-def test_a_shorter_stance_and_step_belong_to_the_hurt_leg(holden31, stepper):
-    even, limp = stepper(), stepper(stance_right=30, stance_left=42, ahead_right=10)
-    walk, healthy = (
-        profile_of_walk(measure_cycles(holden31, made.positions(holden31))) for made in (limp, even)
-    )
-    right, left = measure_effects(walk, healthy, "right"), measure_effects(walk, healthy, "left")
-    assert right["stance"] == pytest.approx(12 / 60, abs=0.6 / 60)
-    assert left["stance"] == pytest.approx(-right["stance"])
-    # The right ankle lands 10 instead of 25 cm ahead of the hips; the left one is 20 cm behind them then.
-    assert right["step_hurt"] == pytest.approx(30 / 45)
-    assert left["step_sound"] == right["step_hurt"]
-
-
-def test_a_profile_without_cycles_is_refused():
-    with pytest.raises(HobbleError, match="no whole cycle"):
-        profile_of_walk(WalkCycles(60.0, (), ()))
 
 
 def test_each_feature_is_the_difference_that_its_name_says(holden31, stepper):

@@ -79,13 +79,6 @@ def test_the_result_is_nearer_to_both_clips_than_either_alone(clips, part: str) 
 
 
 @pytest.mark.shared
-def test_a_clip_combined_with_itself_is_itself_in_its_cycles(clips) -> None:
-    (walk, labels), _ = clips
-    same = combine_clips(walk, labels, walk, labels, "arms", "same")
-    assert apart((same, labels), (walk, labels), joints_of_part(walk.skeleton, "arms"), "chest") < 0.5
-
-
-@pytest.mark.shared
 def test_a_clip_without_steps_is_refused(clips) -> None:
     (walk, labels), (jog, jog_labels) = clips
     none = Labels(**{**vars(jog_labels), "cycles": np.zeros((0, 2), int)})

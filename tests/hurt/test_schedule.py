@@ -2,12 +2,8 @@
 
 from __future__ import annotations
 
-import csv
-import itertools
-
 import numpy as np
 import pytest
-import yaml
 
 from hobble.core.errors import HobbleError
 from hobble.hurt.effects import part_of_link
@@ -47,22 +43,6 @@ def test_hurt_versions_of_the_synthetic_clips_hurt_all_thirty_links(root, holden
     assert seconds[legs].min() > 14
 
 
-@pytest.mark.shared
-def test_hurt_versions_of_the_captured_clips_hurt_all_thirty_links(root, shared, holden31) -> None:
-    data = yaml.safe_load((root / "config/datasets/cmu.yaml").read_text())
-    with open(shared / "mocap/clips.csv") as file:
-        known = {row["file"]: int(row["frames"]) // 2 for row in csv.DictReader(file)}
-    frames = {clip: known[f"cmu/{clip}.bvh"] for clip, e in data["clips"].items() if "channels" not in e}
-    options = Hurt.model_validate(data["hurt"])
-    every = itertools.product(frames, range(1, options.versions + 1))
-    versions = {
-        f"{clip}_hurt{number}": turn
-        for turn, (clip, number) in enumerate(every)
-        if clip not in data["held_out"]
-    }
-    assert seconds_hurt(holden31, versions, frames, lambda clip: options).min() > 15
-
-
 def test_an_injury_has_the_highest_severity_for_half_of_its_time(holden31) -> None:
     options = Hurt(links=("LeftUpLeg-LeftLeg",), at_once=1)
     out = schedule_severities(holden31, 360 * 40, 60.0, options, "a", 0)
@@ -93,28 +73,6 @@ def test_arms_are_often_hurt_beside_another_part_but_never_too_many_at_once(hold
     assert alone.sum(axis=1).max() == 1
     legs = schedule_severities(holden31, 360 * 400, 60.0, Hurt(links=("LeftUpLeg-LeftLeg",)), "a", 0)
     assert not legs[:, arms].any()
-
-
-def test_every_arm_is_hurt_at_every_severity(holden31) -> None:
-    out = schedule_severities(holden31, 360 * 400, 60.0, Hurt(), "a", 0)[::180]
-    arms = [part_of_link(holden31, link).name in ARMS for link in holden31.links]
-    for column in out[:, arms].T:
-        counts = {severity: int((column == severity).sum()) for severity in Hurt().severities}
-        lower = [counts[severity] for severity in (3.0, 5.0, 7.0)]
-        assert min(lower) > 0.5 * max(lower)
-        assert 0.7 < sum(lower) / counts[10.0] < 1.4
-    only = schedule_severities(holden31, 360 * 40, 60.0, Hurt(severities=(6.0,)), "a", 0)
-    assert set(np.unique(only)) == {0.0, 6.0}
-
-
-def test_a_clip_s_severities_are_its_own_and_always_the_same(holden31) -> None:
-    options = Hurt()
-    one = schedule_severities(holden31, 900, 60.0, options, "a_hurt1", 3)
-    assert one.tobytes() == schedule_severities(holden31, 900, 60.0, options, "a_hurt1", 3).tobytes()
-    assert not np.array_equal(one, schedule_severities(holden31, 900, 60.0, options, "a_hurt1", 4))
-    assert set(np.unique(one)) <= {0.0, *options.severities}
-    assert (one > 0).any(axis=1).all()
-    assert (one > 0).sum(axis=1).max() <= options.at_once
 
 
 def test_only_the_configured_links_are_hurt(holden31) -> None:

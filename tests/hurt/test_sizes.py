@@ -76,15 +76,6 @@ def test_a_stiff_leg_swings_low_over_a_straight_sound_leg(captured, hurting, par
 
 
 @pytest.mark.shared
-def test_the_sound_knee_hardly_sinks_when_the_other_shank_hurts(captured, hurting) -> None:
-    """In people's recordings it is bent by 6 degrees more than in healthy walks as the hurt foot leaves."""
-    clip, labels, flat = captured("105_29")
-    hurt = hurt_clip(clip, labels, hurting(len(clip), {LEG["shank"]: 10.0}), flat=flat).clip
-    healthy, limping = (mean_curves(one)["knee_flexion_L"][24:39].mean() for one in (clip, hurt))
-    assert limping - healthy <= 8.0
-
-
-@pytest.mark.shared
 def test_a_stiff_back_does_not_make_the_trunk_sway(captured, hurting) -> None:
     """CMU 105_26 hardly sways with a hurt stomach: by 2.9 degrees, and healthy by 3 to 5."""
     clip, labels, flat = captured("105_29")
@@ -112,13 +103,6 @@ def test_severity_5_has_about_two_thirds_of_the_effect_and_3_about_half(made, hu
         assert 0.5 <= change[5] / change[10] <= 0.8, (name, change)
         assert 0.4 <= change[3] / change[10] <= 0.65, (name, change)
         assert np.all(np.diff(np.abs(list(change.values()))) > 0)
-
-
-@pytest.mark.parametrize("part", ["thigh", "shank"])
-def test_the_knee_effect_at_5_is_half_to_three_quarters_of_that_at_10(made, hurting, part) -> None:
-    less = {s: 1 - seen(made("straight"), hurting, LEG[part], float(s))["knee"] for s in (3, 5, 7, 10)}
-    assert 0.4 <= less[5] / less[10] <= 0.8, less
-    assert less[3] < less[5] < less[7] < less[10] - 0.05, less
 
 
 def test_links_of_one_leg_can_be_told_apart(made, hurting) -> None:

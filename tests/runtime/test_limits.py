@@ -53,12 +53,6 @@ def test_the_target_speed_is_limited_by_all_injuries(limited: Network, hurt, spe
     assert speed_and_gait(limited, (0, 2.5), hurt, limits=False)[0] == pytest.approx(2.5, abs=1e-6)
 
 
-def test_a_slow_target_is_slowed_by_the_same_share_as_a_usual_one(limited: Network) -> None:
-    assert speed_and_gait(limited, (0, 0.8), {KNEE: 10})[0] == pytest.approx(0.4, abs=1e-6)
-    assert speed_and_gait(limited, (0, 0.8), {})[0] == pytest.approx(0.8, abs=1e-6)
-    assert speed_and_gait(limited, (0, 0.0), {KNEE: 10})[0] == 0.0
-
-
 def test_a_body_that_cannot_jog_walks_a_little_faster_instead(limited: Network) -> None:
     speed, gait = speed_and_gait(limited, (0, 7.0), {KNEE: 9})
     assert speed == pytest.approx(1.25 * 1.1, abs=1e-6)
@@ -75,13 +69,6 @@ def test_steering_does_not_exceed_the_limit(limited: Network) -> None:
     assert speed < 1.0
     speed, _ = speed_and_gait(limited, (0, 2.5), {}, steering=2.0)
     assert speed > 2.5
-
-
-def test_each_character_of_a_crowd_has_its_own_limit(limited: Network) -> None:
-    crowd = ProceduralAnimation(limited, characters=3, steering=0.0)
-    for _ in range(90):
-        crowd.next_pose((0, 2.5), injury={KNEE: np.array([0.0, 5.0, 10.0])})
-    np.testing.assert_allclose(crowd.state.smoothed_velocity[:, 1], [2.5, 1.5, 1.0], atol=1e-6)
 
 
 def test_a_network_file_keeps_its_limits(limited: Network, tmp_path) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,11 +11,9 @@ import onnxruntime
 import pytest
 
 from hobble.cli.__main__ import main
-from hobble.core.errors import InputError
 from hobble.core.skeleton import Skeleton
-from hobble.models.forward import weights_at
 from hobble.models.load import load_network
-from hobble.models.onnx_file import OPSET, TOLERANCE, check, export, write_checked
+from hobble.models.onnx_file import OPSET, TOLERANCE, export, write_checked
 from hobble.models.pfnn import OPTIONS
 from hobble.models.pfnn.release import write_release
 from hobble.rows.layout import RowLayout
@@ -43,31 +40,6 @@ def test_onnxruntime_predicts_the_same_as_the_runtime(
         np.testing.assert_allclose(y, network.predictor(mode).predict(x, phase.astype(float)), atol=1e-4)
 
 
-def test_cubic_mode_equals_blending_the_weights_first(make_network, tmp_path: Path) -> None:
-    """Weights blended first, in double precision."""
-    network = make_network(scale=20.0)
-    export(tmp_path / "network.onnx", network, "cubic")
-    x = np.random.default_rng(4).normal(0, 20, (20, network.layout.x_size)).astype(np.float32)
-    phase = np.linspace(0, 1, 20, dtype=np.float32)
-    y = run(tmp_path / "network.onnx", x, phase)
-    for row, p, found in zip(x, phase, y, strict=True):
-        h = (row - network.x_mean.astype(float)) / network.x_std
-        for i, (w, b) in enumerate(zip(network.weights, network.biases, strict=True)):
-            h = weights_at(w, p)[0] @ h + weights_at(b, p)[0]
-            h = h if i == len(network.weights) - 1 else np.where(h > 0, h, np.expm1(h))
-        np.testing.assert_allclose(found, h * network.y_std + network.y_mean, atol=2e-4)
-
-
-def test_a_column_that_never_varied_is_ignored(network, tmp_path: Path) -> None:
-    std = network.x_std.copy()
-    std[5] = 0
-    export(tmp_path / "network.onnx", replace(network, x_std=std), "cubic")
-    x = np.zeros((1, network.layout.x_size), np.float32)
-    before = run(tmp_path / "network.onnx", x, np.zeros(1))
-    x[:, 5] = 1e6
-    np.testing.assert_array_equal(run(tmp_path / "network.onnx", x, np.zeros(1)), before)
-
-
 def test_the_file_describes_its_inputs_and_outputs(hurtable, tmp_path: Path) -> None:
     export(tmp_path / "network.onnx", hurtable, "linear")
     model = onnx.load(tmp_path / "network.onnx")
@@ -81,16 +53,6 @@ def test_the_file_describes_its_inputs_and_outputs(hurtable, tmp_path: Path) -> 
     assert Skeleton.from_dict(meta["skeleton"]).joints == hurtable.skeleton.joints
     export(tmp_path / "again.onnx", hurtable, "linear")
     assert (tmp_path / "again.onnx").read_bytes() == (tmp_path / "network.onnx").read_bytes()
-
-
-def test_the_file_of_another_network_is_detected(make_network, tmp_path: Path) -> None:
-    network = make_network(scale=20.0)
-    export(tmp_path / "network.onnx", network, "cubic")
-    other = replace(network, biases=tuple(b + np.float32(1e-3) for b in network.biases))
-    with pytest.raises(InputError, match=r"network.onnx: onnxruntime and Hobble's runtime differ by"):
-        check(tmp_path / "network.onnx", other, "cubic")
-    with pytest.raises(ValueError, match="not one of constant, linear, cubic"):
-        export(tmp_path / "other.onnx", network, "quadratic")
 
 
 def test_the_command_exports_onnx(

@@ -95,14 +95,6 @@ def test_a_standing_figure_does_not_drift() -> None:
     assert phase[0] == pytest.approx(0.1 * 0.02)
 
 
-def test_a_network_of_recorded_poses_may_move_while_standing() -> None:
-    position, direction, gait = path(stand=1.0)
-    phase = move(prediction(speed=2.0, turn=-0.1), position, direction, gait, recorded_poses=True)
-    np.testing.assert_allclose(position[0, MIDDLE], [0, 2.0], atol=1e-6)
-    np.testing.assert_allclose(direction[0, MIDDLE], [np.sin(0.1), np.cos(0.1)], atol=1e-6)
-    assert phase[0] == pytest.approx(0.02)
-
-
 @pytest.mark.parametrize(
     ("target", "moved"),
     [
@@ -135,15 +127,6 @@ def test_movement_is_changed_toward_the_target_by_at_most_a_share_of_itself(targ
     position, direction, gait = path(stand=0.5)
     move(prediction(speed=2.0), position, direction, gait, target=target, recorded_poses=True, pull=0.2)
     np.testing.assert_allclose(position[0, MIDDLE], moved, atol=1e-6)
-
-
-def test_a_reached_target_needs_no_correction() -> None:
-    position, direction, gait = path(1.5, 0.4)
-    before = position.copy(), direction.copy()
-    ahead = direction[:, MIDDLE].copy()
-    trajectory.blend_future((1.5 * ahead, ahead, np.zeros(1), np.zeros((1, 2))), (position, direction, gait))
-    np.testing.assert_allclose(position, before[0], atol=1e-9)
-    np.testing.assert_allclose(direction, before[1], atol=1e-9)
 
 
 @pytest.mark.parametrize(("strafe", "position_bias", "direction_bias"), [(0.0, 0.5, 2.0), (1.0, 1.0, 0.5)])
@@ -211,36 +194,6 @@ def follow(target, facing, steering: float, frames: int = 1, speed: float = 1.5,
     return velocity[0], direction[0], correction[0]
 
 
-def test_a_steady_error_is_integrated_along_and_across_the_target() -> None:
-    for frames in (1, 40, 1000):
-        corrected, _, correction = follow((0.5, 1.5), (0.0, 1.0), 2.0, frames)
-        speed = np.hypot(0.5, 1.5)
-        ahead = np.array([0.5, 1.5]) / speed
-        lack = np.array([0.5, 0.0])
-        rate = 2.0 * trajectory.CORRECTION_RATE / speed * frames
-        along, left = lack @ ahead, lack @ [ahead[1], -ahead[0]]
-        expected = np.minimum(rate * np.array([along, left]), trajectory.MOST_CORRECTION)
-        np.testing.assert_allclose(correction, expected, atol=1e-9)
-    # Asked for from the next frame on: here all of it, and the shortfall of the moment, within the limit.
-    more = speed * (correction[0] * ahead + correction[1] * np.array([ahead[1], -ahead[0]])) + 2.0 * lack
-    more *= min(1.0, trajectory.STEERING_LIMIT * speed / np.linalg.norm(more))
-    np.testing.assert_allclose(corrected, np.array([0.5, 1.5]) + more, atol=1e-3)
-
-
-@pytest.mark.parametrize(
-    ("target", "steering", "expected"),
-    [
-        ((0.0, -1.5), 2.0, (0.3, -0.2)),  # on its way round: kept as it was
-        ((0.0, 0.0), 2.0, (0.0, 0.0)),  # it is to stand: forgotten
-        ((0.0, 1.5), 2.0, (0.3, -0.2)),  # nothing is missing
-        ((0.5, 1.5), 0.0, (0.3, -0.2)),  # the original runtime
-    ],
-)
-def test_when_the_error_is_not_integrated(target, steering: float, expected) -> None:
-    _, _, correction = follow(target, (0.0, 1.0), steering, 30, correction=(0.3, -0.2))
-    np.testing.assert_allclose(correction, expected, atol=1e-9)
-
-
 @pytest.mark.parametrize("sign", [1, -1])
 @pytest.mark.parametrize(("degrees", "beyond"), [(0, 0), (20, 20), (60, 60), (100, 37), (140, 0), (179, 0)])
 def test_steering_turns_further_than_the_remaining_angle(degrees: float, beyond: float, sign: int) -> None:
@@ -250,15 +203,6 @@ def test_steering_turns_further_than_the_remaining_angle(degrees: float, beyond:
         _, direction, _ = follow(target * speed / 1.5, (np.sin(facing), np.cos(facing)), 2.0)
         yaw = np.degrees(np.arctan2(*direction))
         assert yaw == pytest.approx(0.9 * sign * (degrees + extra), abs=1e-6)
-
-
-def test_the_ground_is_looked_up_on_both_sides() -> None:
-    position, direction, gait = path(1.0, yaw=np.pi / 2)
-    points = np.zeros((1, LAYOUT.samples, 3, 2))
-    trajectory.sample_points((position, direction, gait), LAYOUT.step, 25.0, points)
-    # Facing +X, the left is -Z.
-    for s, offset in enumerate(LAYOUT.offsets):
-        np.testing.assert_allclose(points[0, s], [[offset, -25], [offset, 0], [offset, 25]], atol=1e-9)
 
 
 @given(

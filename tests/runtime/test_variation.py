@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from hobble.runtime.animation import ProceduralAnimation
-from hobble.runtime.variation import HEALTHY, HURT, LENGTH, TIME, count_steps, step_noise, vary_step
+from hobble.runtime.variation import HEALTHY, HURT, LENGTH, TIME, step_noise, vary_step
 
 STEPS = np.arange(20_000)
 
@@ -34,15 +34,6 @@ def test_a_limp_varies_more_than_a_healthy_walk(hurt: float, spread) -> None:
     assert pace[::2].std() == pytest.approx(spread[TIME], rel=0.03)
     assert speed.std() == pytest.approx(spread[LENGTH], rel=0.03)
     assert (shown.std() > 0) == (hurt > 0)
-
-
-def test_steps_are_counted_at_half_cycles() -> None:
-    step = np.zeros(1)
-    counts = []
-    for phase in (0.1, 0.4, 0.5, 0.9, 0.0, 0.3, 0.6):
-        count_steps(step, np.array([phase]))
-        counts.append(step[0])
-    assert counts == [0, 0, 1, 1, 2, 2, 3]
 
 
 def test_the_same_seed_gives_the_same_walk_and_none_is_as_before(hurtable) -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from hobble.runtime import ProceduralAnimation
-from hobble.runtime.waypoints import TRACK, Follower, Waypoint
+from hobble.runtime.waypoints import Follower, Waypoint
 
 SQUARE = (
     Waypoint((0.0, 1000.0), "walk", 2.5),
@@ -14,13 +14,6 @@ SQUARE = (
     Waypoint((1000.0, 0.0), "crouch", 2.0),
     Waypoint((0.0, 0.0), "walk", 2.5),
 )
-
-
-def test_the_track_is_the_published_one() -> None:
-    assert [w.position for w in TRACK[:2]] == [(-3000.0, 4000.0), (-5000.0, 0.0)]
-    assert [w.gait for w in TRACK] == ["walk", "walk", "jog", "jog", "crouch", "walk"]
-    assert [w.speed for w in TRACK] == [2.5, 2.5, 10.5, 10.5, 2.0, 2.5]
-    assert [i for i, w in enumerate(TRACK) if w.facing] == [1, 5]
 
 
 def test_a_point_that_follows_its_target_reaches_all_waypoints() -> None:
@@ -45,20 +38,6 @@ def test_the_distance_from_the_path_is_that_from_its_line() -> None:
     for place, distance in (((30.0, 500.0), 30.0), ((-40.0, -30.0), 50.0), ((0.0, 10.0), 0.0)):
         follower.lead(np.array([place]))
         assert follower.off_path[0] == pytest.approx(distance)
-
-
-def test_each_character_has_its_own_waypoint() -> None:
-    follower = Follower(SQUARE, characters=2, arrived=50.0)
-    velocity, heading = follower.lead(np.array([[0.0, 990.0], [0.0, 500.0]]))
-    assert follower.reached.tolist() == [1, 0]
-    assert [w.gait for w in heading] == ["jog", "walk"]
-    np.testing.assert_allclose(velocity[1], [0, 2.5])
-    assert velocity[0, 0] > 6.9
-
-
-def test_a_track_of_one_waypoint_is_refused() -> None:
-    with pytest.raises(ValueError, match="two waypoints"):
-        Follower(SQUARE[:1])
 
 
 def test_the_character_follows_waypoints(network) -> None:

@@ -30,16 +30,6 @@ def test_footsteps_are_landings_of_the_right_and_the_left_foot_in_turn(written, 
                 assert not down[frame - 3 : frame - 1].any(), f"{side} is down before frame {frame}"
 
 
-def test_every_landing_of_the_motion_has_its_line(written):
-    clip = written("any", recipe="walk")
-    for side in ("Right", "Left"):
-        down = clip.down(side)
-        lands = np.flatnonzero(~down[:-1] & down[1:]) + 1
-        first, last = clip.footsteps.min() // 2, clip.footsteps.max() // 2
-        for frame in lands[(lands > first + 2) & (lands < last - 2)]:
-            assert np.abs(clip.landings(side) - frame).min() <= 1
-
-
 def test_the_clip_has_the_requested_frames_and_rate(written):
     for fps in (60, 120):
         clip = written("any", recipe="jog", frames=300, fps=fps)
@@ -110,11 +100,6 @@ def test_footstep_lines_pair_each_right_with_the_next_left(gaps, left_first):
     assert numbers == sorted(numbers)
     assert all(n - 1 in right for n in numbers[::2])
     assert all(n - 1 in left for n in numbers[1::2])
-
-
-def test_feet_with_fewer_than_two_landings_make_no_line():
-    assert footsteps_text([], [4]) == footsteps_text([4], []) == footsteps_text([], []) == ""
-    assert footsteps_text([4], [9]) == "5 10\n"
 
 
 def test_a_clip_too_short_for_a_step_is_refused_with_the_minimum(holden31, tmp_path):

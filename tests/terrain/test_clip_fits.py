@@ -12,7 +12,7 @@ import pytest
 from hobble.core.errors import InputError
 from hobble.core.skeleton import Skeleton
 from hobble.motion.options import ClipMotion
-from hobble.motion.root import RootFrames, root_frames
+from hobble.motion.root import RootFrames
 from hobble.terrain.clip_fits import clip_fits, heights_under, sample_points, save_fits
 from hobble.terrain.cycle_ground import IS_HEEL, find_soles, fit_cycle, heel_above_toe
 from hobble.terrain.heightmaps import heightmaps
@@ -43,15 +43,6 @@ def test_patch_and_feet_have_the_same_mean_height(made: SimpleNamespace, patches
     patch = replace(ground, surfaces=(), pits=())
     assert np.allclose(patch.height_above_soles(soles)[:, contacts].mean(axis=1), 0, atol=1e-3)
     assert np.allclose(ground.centre, soles[contacts][:, [0, 2]].mean(axis=0))
-
-
-def test_without_the_option_deepest_feet_may_be_below_the_ground(
-    made: SimpleNamespace, patches: Patches
-) -> None:
-    walk = made.walk(GROUNDS["steps"])
-    fits = clip_fits(walk.clip, walk.labels, patches, "rocky", made.options(deepest=None), made.database())
-    assert fits.foot_error[..., 0].max() < 1
-    assert fits.foot_below.max() > 1
 
 
 def test_heights_of_rows_are_those_of_the_fits_of_their_cycles(
@@ -91,21 +82,6 @@ def test_heights_are_ordered_left_centre_right_from_past_to_future() -> None:
             assert np.allclose(heights[row, 1, side], 7 + at[:, 1])
 
 
-def test_left_heights_are_on_the_left_of_the_figure(made: SimpleNamespace) -> None:
-    walk = made.walk(GROUNDS["level"])
-    left, centre, _ = sample_points(root_frames(walk.clip, 20.0), 25.0)
-    heel = walk.clip.positions[:, walk.clip.skeleton.role("left_heel")][:, [0, 2]]
-    assert np.all(np.sum((left - centre) * (heel - centre), axis=1) > 0)
-
-
-def test_the_same_clip_gives_the_same_bytes(made: SimpleNamespace, patches: Patches, tmp_path: Path) -> None:
-    walk = made.walk(GROUNDS["waves"])
-    for name in "ab":
-        fits = clip_fits(walk.clip, walk.labels, patches, "rocky", made.options(), made.database())
-        save_fits(tmp_path / name, fits)
-    assert (tmp_path / "a").read_bytes() == (tmp_path / "b").read_bytes()
-
-
 def test_the_file_holds_the_data_for_database_and_picture(
     made: SimpleNamespace, patches: Patches, tmp_path: Path
 ) -> None:
@@ -131,17 +107,6 @@ def test_a_clip_without_cycles_has_no_fits(made: SimpleNamespace, patches: Patch
         assert fits.heights.shape == (0, 36)
         assert fits.patch.shape == (0, 10)
         assert len(fits.frame) == len(fits.fits) == 0
-
-
-def test_without_contacts_the_lowest_points_count(
-    made: SimpleNamespace, patches: Patches, caplog: pytest.LogCaptureFixture
-) -> None:
-    walk = made.walk(GROUNDS["level"])
-    labels = {**walk.labels, "contacts": np.zeros((len(walk.clip), 4), bool)}
-    fits = clip_fits(walk.clip, labels, patches, "rocky", made.options(), made.database())
-    assert "no contact in frames 64 to 128" in caplog.text
-    assert np.isfinite(fits.heights).all()
-    assert fits.foot_error[..., 0].max() < 1
 
 
 def test_labels_of_another_clip_are_refused(made: SimpleNamespace, patches: Patches) -> None:
@@ -204,11 +169,6 @@ def honest_over(heightmap: dict, files: list[Path], made: SimpleNamespace) -> No
 
 def test_real_clips_can_be_fitted_to_a_real_landscape(made: SimpleNamespace) -> None:
     honest_over({"kind": "elevation"}, [], made)
-
-
-@pytest.mark.shared
-def test_clips_can_be_fitted_to_the_heightmap_of_the_original(shared: Path, made: SimpleNamespace) -> None:
-    honest_over({"kind": "file", "path": "x"}, [shared / "mocap/pfnn/hmap_001_smooth.txt"], made)
 
 
 @pytest.mark.shared

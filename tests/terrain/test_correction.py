@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -71,12 +70,6 @@ def test_only_large_residuals_are_fitted_more_closely_than_in_the_original(seed:
     assert np.array_equal(once[0].weights, met[0].weights)
 
 
-def test_points_at_one_place_give_a_flat_surface() -> None:
-    at = Stances(np.full((3, 2), 7.0), np.zeros(3), np.ones(3))
-    (surface,) = fit_surfaces(at, np.ones((1, 3)), 0.1)
-    assert np.all(surface.heights_at(np.zeros((4, 2))) == 0)
-
-
 def test_stances_are_runs_of_one_joint_of_limited_length() -> None:
     soles = np.zeros((20, 4, 3))
     soles[:, :, 0] = np.arange(4) * 10.0
@@ -106,16 +99,3 @@ def test_pits_are_below_the_feet_and_change_nothing_far_away(seed: int) -> None:
     far = distances(where, soles[:, [0, 2]]).min(axis=1) > 15 / WALL_STEEPNESS
     assert np.array_equal(dug[far], ground[far])
     assert dig_pits(soles[:0], standing, 0.5).lower(ground, where) is ground
-
-
-def test_pits_are_steep_only_beside_other_feet() -> None:
-    along = np.column_stack([np.linspace(-40, 40, 801), np.zeros(801)])
-    sole = np.array([[0.0, -8.0, 0.0]])
-    far = Stances(np.array([[30.0, 0.0]]), np.array([3.0]), np.ones(1))
-    dug = dig_pits(sole, far, 0.0).lower(np.full(801, 3.0), along)
-    assert dug.min() == pytest.approx(-8)
-    assert np.abs(np.diff(dug)).max() == pytest.approx(WALL_STEEPNESS * 0.1)
-    near = Stances(np.array([[1.0, 0.0]]), np.array([3.0]), np.ones(1))
-    dug = dig_pits(sole, near, 0.0).lower(np.full(801, 3.0), along)
-    assert dug.min() == pytest.approx(-8)
-    assert dug[410] == pytest.approx(3.0)

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from hobble.terrain.clip_fits import clip_fits
-from hobble.terrain.cycle_ground import Feet, is_above_other_joint
 from hobble.terrain.patches import Patches
 from tests.terrain.grounds import GROUNDS
 
@@ -65,14 +64,6 @@ def test_a_heel_held_up_over_its_standing_toe_is_not_on_a_flat_floor(
     fits = clip_fits(clip, walk.labels, patches, "flat", made.options(), made.database())
     assert np.all(fits.heights == 0)
     assert fits.foot_error.max() < 0.01
-
-
-def test_a_heel_is_held_up_only_over_a_toe_that_stands() -> None:
-    soles = np.zeros((2, 4, 3))
-    soles[:, 0, 1] = 5.0
-    contacts = np.array([[True, True, True, True], [True, False, True, True]])
-    up = is_above_other_joint(Feet(soles, contacts, 0.0, 0.0), 2.0)
-    assert up.tolist() == [[True, False, False, False], [False] * 4]
 
 
 def test_flat_ground_can_be_at_the_height_of_the_feet_as_in_the_original(

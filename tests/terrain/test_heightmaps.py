@@ -27,13 +27,6 @@ def test_equal_seeds_give_equal_ground_and_others_do_not(kind: str) -> None:
     assert 20 < np.ptp(one) < 400
 
 
-def test_beams_are_narrow_and_stand_more_than_40_cm_above_the_floor() -> None:
-    ground = generate_heights("beams", 0, CELL)
-    assert set(np.unique(ground)) - {0.0} == set(ground[ground > 0])
-    assert ground[ground > 0].min() > 40
-    assert (ground > 0).mean() < 0.2
-
-
 def test_the_elevation_model_has_its_real_scale() -> None:
     heights = landscape_heights(CELL)
     assert heights.shape == (
@@ -138,11 +131,3 @@ def test_a_missing_file_and_an_npz_that_could_mean_two_arrays_are_refused(tmp_pa
     np.savez(tmp_path / "two.npz", a=RAMP, b=RAMP)
     with pytest.raises(InputError, match="which array holds the heights"):
         read_heights(tmp_path / "two.npz")
-
-
-@pytest.mark.shared
-def test_the_heightmap_of_the_original_is_read(shared: Path) -> None:
-    path = shared / "mocap/pfnn/hmap_001_smooth.txt"
-    (made,) = heightmaps([HeightmapOptions(kind="file", path="x")], [path], cell=CELL, height_scale=3.0)
-    assert made.heights.shape == (504, 302)
-    assert np.allclose(made.heights, 3 * np.loadtxt(path))

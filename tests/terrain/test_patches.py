@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -73,21 +72,6 @@ def test_every_valid_view_can_be_drawn() -> None:
     assert np.all((spread < 50.1) | ((share > 1 / 6 - 0.02) & (share < 5 / 6 + 0.02)))
 
 
-def test_views_are_turned_both_ways_flipped_and_spread_over_the_map(patches: Patches) -> None:
-    one_map = patches.affine[patches.which == 0]
-    turn = one_map[:, :, :2]
-    assert np.allclose(np.linalg.det(turn) ** 2, 1, atol=1e-5)
-    assert 0.3 < (np.linalg.det(turn) > 0).mean() < 0.7
-    directions = np.degrees(np.arctan2(turn[:, 1, 0], turn[:, 0, 0]))
-    assert len(np.unique(np.floor(directions / 90))) == 4
-    assert np.all(np.ptp(one_map[:, :, 2], axis=0) > 150)
-
-
-def test_patches_are_shared_evenly_among_the_maps() -> None:
-    patches = draw(plane(0, 0), plane(0.1, 0), plane(0, 0.1), count=11)
-    assert np.bincount(patches.which).tolist() == [4, 4, 3]
-
-
 def test_a_map_with_wider_cells_keeps_its_scale() -> None:
     wide = plane(0.2, 0.0, rows=100, columns=100, cell=4 * CELL)
     patches = draw(wide, count=5)
@@ -111,14 +95,6 @@ def test_no_patch_shows_a_hole() -> None:
         rows, columns = seen[:, 0] + shift[0], seen[:, 1] + shift[1]
         assert not np.isnan(heights[rows, columns]).any()
     assert np.isfinite(patches.heights).all()
-
-
-def test_the_same_seed_draws_the_same_and_another_does_not(tmp_path: Path) -> None:
-    files = [tmp_path / f"{n}.npz" for n in "abc"]
-    for file, seed in zip(files, (1, 1, 2), strict=True):
-        save_patches(file, draw(plane(0.1, 0.2), count=20, seed=seed))
-    assert files[0].read_bytes() == files[1].read_bytes()
-    assert files[0].read_bytes() != files[2].read_bytes()
 
 
 def test_patches_round_trip_and_are_small(tmp_path: Path, patches: Patches) -> None:
@@ -145,12 +121,3 @@ def test_a_damaged_file_is_refused(tmp_path: Path, patches: Patches) -> None:
     np.savez(path, heights=np.zeros(3))
     with pytest.raises(InputError, match=r"p\.npz: has no shapes"):
         load_patches(path)
-
-
-def test_outside_a_patch_the_height_is_that_of_its_edge(patches: Patches) -> None:
-    world = np.array([[400.0, 0.0], [63 * CELL, 0.0], [0.0, -400.0], [0.0, -64 * CELL]])
-    heights = patches.heights_at([3], patches.cells(world, np.zeros(2)))[0]
-    assert heights[0] == heights[1]
-    assert heights[2] == heights[3]
-    moved = replace(patches).cells(world + 5.0, np.array([5.0, 5.0]))
-    assert np.allclose(moved, patches.cells(world, np.zeros(2)))

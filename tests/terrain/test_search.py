@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -88,11 +86,3 @@ def test_feet_on_a_plane_have_no_error_and_feet_below_it_their_depth() -> None:
         bent = table[:40].copy()
         bent[:, 2] += np.where(np.arange(40) % 2, 2, -2)
         assert patch_errors(patches, FootPoints(bent, table[40:]))[p] == pytest.approx(0.4, rel=1e-3)
-
-
-def test_among_equal_patches_the_first_are_found() -> None:
-    flat = TerrainMap("flat", np.zeros((200, 200)), CELL)
-    patches = draw_patches([flat], count=20, cell=CELL, size=128, highest=50.0, seed=1)
-    chosen, error = best_patches(patches, made_up(1), 10)
-    assert chosen.tolist() == list(range(10))
-    assert all(a <= b for a, b in pairwise(error))

@@ -27,7 +27,6 @@ from hobble.core.clip import Clip
 from hobble.core.errors import InputError
 from hobble.core.files import read_json
 from hobble.core.skeleton import Skeleton
-from hobble.motion.edit import sample_times
 
 THIGH, ARM = "LeftUpLeg-LeftLeg", "LeftArm-LeftForeArm"
 
@@ -45,12 +44,6 @@ def motion(frames: int = 600, fps: float = 120.0, start: int = 0) -> dict:
 
 def column(holden31: Skeleton, link: str) -> int:
     return holden31.link_names.index(link)
-
-
-def test_ranges_are_one_based_and_inclusive():
-    out = severity_matrix(Status(10, (InjurySpell(3, 5, ((THIGH, 7.0),)),)), (ARM, THIGH))
-    assert out[:, 0].tolist() == [0] * 10
-    assert out[:, 1].tolist() == [0, 0, 7, 7, 7, 0, 0, 0, 0, 0]
 
 
 def test_a_later_line_replaces_an_earlier_one_in_its_frames_and_links():
@@ -100,18 +93,6 @@ def test_each_frame_maps_to_the_source_frame_of_the_same_time(fps, start, expect
     assert source_rows(4, 100, motion(100, fps, start)).tolist() == expected
 
 
-@pytest.mark.parametrize("fps", [120.0, 1 / 0.00833, 1 / 0.01667, 23.976])
-def test_after_ten_minutes_each_frame_still_has_the_source_frame_of_its_moment(fps):
-    """If the file's rate is nearly a whole number, motion and severities are resampled at the exact rate."""
-    times = sample_times(72_000, fps, 60.0)
-    rows = source_rows(len(times), 72_000, motion(72_000, fps))
-    np.testing.assert_array_equal(rows, np.floor(times + 1e-6))
-
-
-def test_source_rows_never_lie_past_the_end_of_the_file():
-    assert source_rows(5, 4, motion(4, 60.0)).tolist() == [0, 1, 2, 3, 3]
-
-
 def test_a_status_file_at_its_own_rate(clip, tmp_path):
     path = tmp_path / "walk_injuries.txt"
     path.write_text(f"frames:600\n201-400 {THIGH}[8];\n")
@@ -142,11 +123,6 @@ def test_a_status_in_the_data_set_holds_in_all_frames(clip):
     assert (severity > 0).sum() == 600
 
 
-def test_a_wrong_status_of_a_data_set_names_the_clip(clip):
-    with pytest.raises(InputError, match=r"status of walk.*no such link: LeftUpLeg-LeftArm"):
-        clip_severity(clip, None, "LeftUpLeg-LeftArm[4]", motion())
-
-
 def test_on_a_skeleton_without_links_a_hurt_clip_has_no_columns(clip):
     """A data set on a skeleton without links may list hurt clips. Its networks are not trained on them."""
     figure = replace(clip, skeleton=replace(clip.skeleton, links=()))
@@ -157,13 +133,6 @@ def test_on_a_skeleton_without_links_a_hurt_clip_has_no_columns(clip):
     assert not CHANNEL.is_neutral(said)
     with pytest.raises(InputError, match="no such link"):
         CHANNEL.check(ClipSource("walk", {}, "Thigh[4]"), clip.skeleton)
-
-
-def test_the_severities_of_a_healthy_clip_are_0(clip):
-    severity, warnings = clip_severity(clip, None, None, motion())
-    assert severity.shape == (300, 30)
-    assert not severity.any()
-    assert warnings == []
 
 
 @given(st.integers(0, 29), st.floats(0, 10, width=32))

@@ -42,12 +42,6 @@ def test_a_mood_holds_in_every_frame_of_a_clip(clip: Clip, name: str, value: obj
     assert channel("mood").is_neutral(source(name, value)) is not any(expected)
 
 
-def test_a_clip_that_fits_no_pattern_gets_a_warning_and_is_neutral(clip: Clip) -> None:
-    values, warnings = read_clip_values("mood", clip, source("jump"), {})
-    assert not values.any()
-    assert warnings == ["no pattern of channels.mood fits jump; it counts as neutral."]
-
-
 @pytest.mark.parametrize("value", ["sad", {"glad": 1}, {"sad": 2}, {"sad": "much"}])
 def test_an_unknown_mood_in_a_clip_entry_is_refused(holden31: Skeleton, value: object) -> None:
     with pytest.raises(InputError, match=r"walk\.channels\.mood: cannot be .*sad"):
