@@ -248,7 +248,7 @@ STATUS: dict[str, Mutation] = _numbers(
     name: Mutation(*what)
     for name, what in {
         **EITHER,
-        "blanks everywhere": (_all(lambda t: re.sub(r"(-3|\[|\])", r" \1 ", t)), "same"),
+        "blanks everywhere": (_all(lambda t: re.sub(r"(-(?=\d)|\[|\])", r" \1 ", t)), "same"),
         "empty lines": (_all(lambda t: t.replace("\n", "\n\n")), "same"),
         "FRAMES in capitals": (_all(lambda t: t.replace("frames:", "FRAMES : ")), "same"),
         "semicolons in a row": (_all(lambda t: t.replace(";", ";;")), "same"),

@@ -62,7 +62,8 @@ def _windows(values: Array, width: int) -> Array:
 
 
 def smoothstep(x: Array) -> Array:
-    """Numbers from 0 to 1, changed so that they start and end gradually."""
+    """A curve that rises from 0 at x = 0 to 1 at x = 1, with slope 0 at both ends and beyond them."""
+    x = np.clip(x, 0.0, 1.0)
     return x * x * (3 - 2 * x)
 
 

@@ -94,116 +94,49 @@ CURVE_FACTOR: dict[str, float] = {"pelvis": 1.6, "hip": 2.3, "thigh": 1.25, "sha
 #   to the hurt side); list (pelvis up on the hurt side while that leg swings); nod (head forward).
 ADDED_CHANGES: dict[str, dict[str, float]] = {
     "pelvis": {
-        "speed": 0.74,
-        "stride": 1.15,
-        "turn": 0.8,
-        "push": 0.65,
-        "back": 0.6,
-        "lift": 0.8,
-        "lift_sound": 0.3,
-        "push_sound": 0.75,
-        "list": 2.0,
+        "speed": 0.74, "stride": 1.15, "turn": 0.8, "push": 0.65, "back": 0.6, "lift": 0.8,
+        "lift_sound": 0.3, "push_sound": 0.75, "list": 2.0,
     },
     "hip": {
-        "speed": 0.66,
-        "stride": 1.2,
-        "turn": 0.8,
-        "push": 0.7,
-        "vault": 0.9,
-        "lift": 0.75,
-        "lift_sound": 0.3,
-        "push_sound": 0.4,
-        "forward": 2.0,
-        "out": 0.02,
-        "crouch_sound": 4.0,
+        "speed": 0.66, "stride": 1.2, "turn": 0.8, "push": 0.7, "vault": 0.9, "lift": 0.75,
+        "lift_sound": 0.3, "push_sound": 0.4, "forward": 2.0, "out": 0.02, "crouch_sound": 4.0,
     },
     "thigh": {
-        "speed": 0.62,
-        "stride": 1.04,
-        "turn": 0.8,
-        "push": 0.4,
-        "vault": 1.0,
-        "lift": 0.1,
-        "lift_sound": 0.3,
-        "push_sound": 0.45,
-        "out": 0.07,
-        "strike": 0.4,
-        "list": 5.0,
-        "toe_out": 8.0,
-        "vault_sound": 0.5,
-        "crouch_sound": 3.0,
+        "speed": 0.62, "stride": 1.04, "turn": 0.8, "push": 0.4, "vault": 1.0, "lift": 0.1,
+        "lift_sound": 0.3, "push_sound": 0.45, "out": 0.07, "strike": 0.4, "list": 5.0, "toe_out": 8.0,
+        "vault_sound": 0.5, "crouch_sound": 3.0,
     },
     "shank": {
-        "speed": 0.62,
-        "stride": 1.02,
-        "turn": 0.8,
-        "push": 0.55,
-        "lift": 0.4,
-        "lift_sound": 0.3,
-        "push_sound": 0.45,
-        "strike": 0.0,
-        "crouch": 19.0,
-        "list": 2.0,
+        "speed": 0.62, "stride": 1.02, "turn": 0.8, "push": 0.55, "lift": 0.4, "lift_sound": 0.3,
+        "push_sound": 0.45, "strike": 0.0, "crouch": 19.0, "list": 2.0,
     },
     "foot": {
-        "speed": 0.66,
-        "stride": 1.03,
-        "turn": 0.8,
-        "push": 0.15,
-        "lift": 0.7,
-        "lift_sound": 0.3,
-        "push_sound": 0.62,
-        "strike": 1.0,
-        "side": 2.5,
-        "toe_out": 18.0,
+        "speed": 0.66, "stride": 1.03, "turn": 0.8, "push": 0.15, "lift": 0.7, "lift_sound": 0.3,
+        "push_sound": 0.62, "strike": 1.0, "side": 2.5, "toe_out": 18.0,
     },
     "back": {
-        "speed": 0.68,
-        "push": 0.6,
-        "push_sound": 0.6,
-        "stride": 1.12,
-        "forward": 17.0,
-        "crouch": 9.0,
-        "crouch_sound": 9.0,
-        "back": 0.3,
-        "arms": 0.4,
-        "nod": -5.0,
+        "speed": 0.68, "push": 0.6, "push_sound": 0.6, "stride": 1.12, "forward": 17.0, "crouch": 9.0,
+        "crouch_sound": 9.0, "back": 0.3, "arms": 0.4, "nod": -5.0,
     },
     "neck": {"speed": 0.85, "head": 0.25, "back": 0.6, "forward": 3.0, "nod": 8.0, "arms": 0.6},
     "shoulder": {"speed": 0.88, "side": 2.5, "forward": 2.0, "back": 0.8},
     "upper arm": {"speed": 0.88, "side": 2.0, "forward": 3.0},
     "forearm": {"speed": 0.90, "forward": 2.0},
     "hand": {"speed": 0.94},
-}
+}  # fmt: skip
 # Changes at severity 10 and guarding 1, for a leg or back that hurts on the right, in addition to the above.
 # From CMU 105_25 and the walks of Ferre et al. (2019): trunk 21 to 30 degrees forward, a nod of 12 to 24
 # degrees (`dip`) as the hurt foot bears weight, elbows bent by 40 to 77 degrees (`guard`), both knees
 # bent, eyes on the ground.
 GUARD_CHANGES: dict[str, float] = {
-    "forward": 17.0,
-    "nod": 10.0,
-    "dip": 14.0,
-    "crouch": 10.0,
-    "crouch_sound": 10.0,
-    "guard": 0.95,
+    "forward": 17.0, "nod": 10.0, "dip": 14.0, "crouch": 10.0, "crouch_sound": 10.0, "guard": 0.95,
     "guard_sound": 0.75,
-}
+}  # fmt: skip
 # The changes that are ratios.
 RATIOS = (
-    "speed",
-    "stride",
-    "turn",
-    "lift_sound",
-    "push",
-    "push_sound",
-    "lift",
-    "strike",
-    "arm",
-    "arm_sound",
-    "arms",
-    "back",
-    "head",
-)
+    "speed", "stride", "turn", "lift_sound", "push", "push_sound", "lift", "strike", "arm", "arm_sound",
+    "arms", "back", "head",
+)  # fmt: skip
 # Factor on the changes of timing in the recordings. The recordings show only half of an early landing,
 # because in them a slow ankle counts as stance. Besides, a network that is trained on hurt clips smooths the
 # effect.
@@ -226,39 +159,26 @@ def changes_of_hurt_part(part: str) -> dict[str, float | Array]:
     changes = dict(ADDED_CHANGES[part])
     out: dict[str, float | Array] = {"curves": np.zeros((len(CURVES), 1 + 2 * HARMONICS))}
     if mix := MIXES.get(part):
-        changes, out = _add_mix(part, mix, changes)
+        profiles = [(share, read_profiles()[name]) for name, share in mix.items()]
+
+        def mixed(name: str) -> float:
+            return float(sum(share * getattr(profile, name) for share, profile in profiles))
+
+        curves = CURVE_FACTOR.get(part, 1.0) * np.sum([s * p.harmonics() for s, p in profiles], axis=0)
+        # How far pelvis and shoulders turn is the change `turn`.
+        curves[CURVES.index("pelvis_turn_left") :, 1:] = 0.0
+        # The ratio of the stride's length is the product of the ratios of speed and stride time.
+        stride_length = changes["speed"] * changes.get("stride", mixed("stride"))
+        out = {
+            "curves": curves,
+            "land_sound": TIMING_FACTOR * mixed("strike"),
+            "off": TIMING_FACTOR * mixed("stance_hurt"),
+            "off_sound": TIMING_FACTOR * (mixed("strike") + mixed("stance_sound")),
+            "step": min(STEP_RATIO.get(part, mixed("step_hurt")) - stride_length, 0.25),
+            "width": mixed("width"),
+        }
+        arms = {"arm": mixed("arm_hurt"), "arm_sound": min(mixed("arm_sound"), 1.0)}
+        changes = {"stride": mixed("stride"), **arms, **changes}
     for name, value in changes.items():
         out[name] = value - 1.0 if name in RATIOS else value
     return out
-
-
-def _add_mix(
-    part: str, mix: dict[str, float], changes: dict[str, float]
-) -> tuple[dict[str, float], dict[str, float | Array]]:
-    """Mix the profiles of a part, with weights `mix`.
-
-    Returns `changes` with the ratios of the mix added (those in `changes` have priority), and the other
-    changes of the mix, which are differences from the healthy clip.
-    """
-    profile_of = read_profiles()
-
-    def mixed(name: str) -> float:
-        return float(sum(share * getattr(profile_of[p], name) for p, share in mix.items()))
-
-    curves = np.sum([share * profile_of[p].harmonics() for p, share in mix.items()], axis=0)
-    curves *= CURVE_FACTOR.get(part, 1.0)
-    curves[CURVES.index("pelvis_turn_left") :, 1:] = (
-        0.0  # how far pelvis and shoulders turn is the change `turn`
-    )
-    ratios = {"stride": mixed("stride"), "arm": mixed("arm_hurt"), "arm_sound": min(mixed("arm_sound"), 1.0)}
-    # The ratio of the stride's length is the product of the ratios of speed and stride time.
-    stride_length = changes["speed"] * changes.get("stride", mixed("stride"))
-    step = STEP_RATIO.get(part, mixed("step_hurt"))
-    return {**ratios, **changes}, {
-        "curves": curves,
-        "land_sound": TIMING_FACTOR * mixed("strike"),
-        "off": TIMING_FACTOR * mixed("stance_hurt"),
-        "off_sound": TIMING_FACTOR * (mixed("strike") + mixed("stance_sound")),
-        "step": min(step - stride_length, 0.25),
-        "width": mixed("width"),
-    }

@@ -16,8 +16,9 @@ from hobble.core.clip import Clip
 from hobble.core.errors import HobbleError
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
+from hobble.core.smooth import smoothstep
 from hobble.hurt.effects import joint_and_ancestors
-from hobble.hurt.healthy_clip import interpolate_rotations, smoothstep
+from hobble.hurt.healthy_clip import interpolate_rotations
 from hobble.labels.clip_labels import Labels
 
 # Part of the body that is taken from the second clip -> roles of the ends of its limbs.

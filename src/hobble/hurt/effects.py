@@ -84,25 +84,9 @@ WHOLE_BODY = ("speed", "stride", "turn", "back", "head", "forward", "nod")  # ch
 # Changes of one side. The last four say how much an arm is held in each way (HELD_ARMS in
 # `hobble.hurt.upper_body`).
 SIDED = (
-    *(
-        "land",
-        "off",
-        "step",
-        "push",
-        "lift",
-        "strike",
-        "out",
-        "width",
-        "toe_out",
-        "crouch",
-        "vault",
-        "arm",
-        "side",
-        "list",
-        "dip",
-    ),
-    *("upper", "fore", "carry", "guard"),
-)
+    "land", "off", "step", "push", "lift", "strike", "out", "width", "toe_out", "crouch", "vault", "arm",
+    "side", "list", "dip", "upper", "fore", "carry", "guard",
+)  # fmt: skip
 SOUND_SUFFIX = "_sound"  # names of changes of the side that is not hurt end with this
 # Factors on the CURVES (see `hobble.hurt.amounts`) that mirror the body. All curves but the first
 # are measured to the left or on the left, so their sign changes.

@@ -156,7 +156,7 @@ def _heading(clip: Clip) -> Array:
     return quat.yaw(np.arctan2(forward[:, 0], forward[:, 2]))
 
 
-# Interpolates arrays that have a value for each frame, at times between frames. Also an easing curve.
+# Interpolates arrays that have a value for each frame, at times between frames.
 
 
 def interpolate_values(values: Array, when: Array) -> Array:
@@ -184,9 +184,3 @@ def _split_times(frames: int, when: Array) -> tuple[np.ndarray, Array]:
     when = np.where(np.abs(when - nearest) < 1e-9, nearest, when)
     before = np.floor(when).astype(int)
     return before, when - before
-
-
-def smoothstep(u: Array) -> Array:
-    """A curve that rises from 0 at u = 0 to 1 at u = 1, with zero slope at both ends."""
-    u = np.clip(u, 0.0, 1.0)
-    return u * u * (3 - 2 * u)

@@ -11,7 +11,7 @@ from hobble.core import quat
 from hobble.core.clip import Clip
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton, two_bone_knee
-from hobble.core.smooth import gaussian, interpolate_curve, smooth_above
+from hobble.core.smooth import gaussian, interpolate_curve, smooth_above, smoothstep
 from hobble.hurt.effects import SIDES, Effects
 from hobble.hurt.healthy_clip import (
     UP,
@@ -19,7 +19,6 @@ from hobble.hurt.healthy_clip import (
     SourceStance,
     interpolate_rotations,
     interpolate_values,
-    smoothstep,
 )
 
 SLOPE_SECONDS = 0.3  # sigma of the Gaussian that smooths the height of the ground over time

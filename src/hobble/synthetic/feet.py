@@ -12,7 +12,7 @@ import numpy as np
 
 from hobble.core import quat
 from hobble.core.quat import Array
-from hobble.core.smooth import gaussian, interpolate_curve, smooth_above
+from hobble.core.smooth import gaussian, interpolate_curve, smooth_above, smoothstep
 from hobble.synthetic.plan import Ground, PlannedPath
 from hobble.synthetic.style import LEFT, RIGHT, SIDE_SIGN, Style
 
@@ -266,7 +266,7 @@ class _Roll:
         down = share / self.flat
         rise = np.clip((share - self.heel_off) / (1 - self.heel_off), 0, None)
         rest = interpolate_curve(self.rest_pitch, t)
-        landing = (self.land_pitch - rest) * (1 - _ease(down)) if lands else 0.0
+        landing = (self.land_pitch - rest) * (1 - smoothstep(down)) if lands else 0.0
         leaving = (self.off_pitch - rest) * rise**self.power if leaves else 0.0
         return np.asarray(rest + landing + leaving)
 
@@ -312,21 +312,21 @@ def _swing(foot: FootPoses, here: _Roll, there: _Roll, style: Style, side: int, 
     # The rate of change at the end of the stance, radians in the time READY of the swing.
     rate = (first_pitch - here.pitch(start - 0.01)) / 0.01 * (end - start) * READY
     pitch = _hermite(first_pitch, rate * FOLLOW, last_pitch, 0.0, np.minimum(u / READY, 1))
-    turn = quat.slerp(here.stance.turn, there.stance.turn, _ease(u))
+    turn = quat.slerp(here.stance.turn, there.stance.turn, smoothstep(u))
     rotation = quat.mul(turn, quat.from_axis_angle(X_AXIS, -pitch))
     # While the heel is up, the toes are bent up as in a stance, but by up to 40% less in the swing.
     bend = np.minimum(pitch, 0) * (1 - 0.4 * bump)
     toes = quat.mul(rotation, quat.from_axis_angle(X_AXIS, bend))
     # The toe joint starts at rest and is moving when it lands. Its position and the pitch give the ankle.
     along = _hermite(0.0, 0.0, 1.0, LANDING_SPEED / EARLY, u**EARLY)
-    share = np.stack([along, _ease(u), along], axis=1)  # of the way in x, y and z
+    share = np.stack([along, smoothstep(u), along], axis=1)  # of the way in x, y and z
     first_toe = here.toe(first_pitch)
     toe = first_toe + (there.toe(last_pitch) - first_toe) * share
     toe[:, 1] += style.lift[t, side] * bump
     toe[:, 1] += (
         _missing_height(toe, rotation, toes, style.clearance[t, side] * bump, ground)
-        * _ease(u / RISE)
-        * _ease((1 - u) / SETTLE)
+        * smoothstep(u / RISE)
+        * smoothstep((1 - u) / SETTLE)
     )
     foot.ankle[t], foot.foot[t], foot.toes[t] = toe - quat.rotate(rotation, ANKLE_TO_TOE), rotation, toes
 
@@ -344,12 +344,6 @@ def _missing_height(toe: Array, rotation: Array, toes: Array, clearance: Array, 
         lowest = ground(point[:, 0], point[:, 2]) + SOLE_HEIGHT + clearance
         missing = np.maximum(missing, lowest - point[:, 1])
     return smooth_above(missing, max(1, len(toe) // 14))
-
-
-def _ease(u: Array) -> Array:
-    """From 0 to 1 with zero slope at both ends."""
-    u = np.clip(u, 0, 1)
-    return u * u * (3 - 2 * u)
 
 
 def _hermite(a: Array | float, da: Array | float, b: Array | float, db: Array | float, u: Array) -> Array:

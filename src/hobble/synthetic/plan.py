@@ -10,6 +10,7 @@ from __future__ import annotations
 import zlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
@@ -36,16 +37,7 @@ class Segment:
     heading: float = 0.0
 
 
-def _walk(speed: float, turn: float = 0.0, seconds: float = 2.5, heading: float = 0.0) -> Segment:
-    return Segment(WALK, speed, turn, seconds, heading)
-
-
-def _jog(speed: float, turn: float = 0.0, seconds: float = 2.5) -> Segment:
-    return Segment(JOG, speed, turn, seconds)
-
-
-def _crouch(speed: float, turn: float = 0.0, seconds: float = 2.5, heading: float = 0.0) -> Segment:
-    return Segment(CROUCH, speed, turn, seconds, heading)
+_walk, _jog, _crouch = (partial(Segment, gait) for gait in (WALK, JOG, CROUCH))
 
 
 def _stand(seconds: float = 2.0) -> Segment:

@@ -7,7 +7,7 @@ Burnfield, Gait Analysis; Winter, The Biomechanics and Motor Control of Human Ga
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from types import SimpleNamespace
 
 import numpy as np
 
@@ -54,61 +54,20 @@ VALUES_BY_GAIT: dict[str, tuple[tuple[float, float], ...]] = {
     "abduction": ((9, 0), (9, 0), (13, 0), (14, 0)),  # angle of the upper arm, away from the body
 }
 # The names in VALUES_BY_GAIT whose curves have a value for each side of the body.
-SIDED: tuple[str, ...] = (
-    "duty",
-    "land_pitch",
-    "off_pitch",
-    "heel_off",
-    "lift",
-    "clearance",
-    "toe_out",
-    "arm_swing",
-)
-SIDED += ("arm_mean", "elbow", "elbow_swing", "abduction")
+SIDED = (
+    "duty", "land_pitch", "off_pitch", "heel_off", "lift", "clearance", "toe_out", "arm_swing", "arm_mean",
+    "elbow", "elbow_swing", "abduction",
+)  # fmt: skip
 SPIN_CADENCE = 0.6  # share by which cadence rises if the figure turns in place by a radian a second or more
 SIDE_SIGN = (1.0, -1.0)  # sign of X on the left and on the right side: +X is the figure's left
 
 
-@dataclass(frozen=True)
-class Style:
-    """How the figure moves in each of F frames.
+class Style(SimpleNamespace):
+    """How the figure moves in each of F frames: a curve for each name in VALUES_BY_GAIT, and `frequency`.
 
-    VALUES_BY_GAIT describes all fields but `frequency`. Arrays are (F,). For names in SIDED they are (F, 2),
-    left and right. frequency: (F,) cycles a second. The left foot lands half a cycle after the right foot.
+    Arrays are (F,). For names in SIDED they are (F, 2), left and right. frequency: (F,) cycles a second. The
+    left foot lands half a cycle after the right foot.
     """
-
-    duty: Array
-    land_pitch: Array
-    off_pitch: Array
-    rest_pitch: Array
-    flat: Array
-    heel_off: Array
-    roll: Array
-    lift: Array
-    clearance: Array
-    behind: Array
-    width: Array
-    toe_out: Array
-    height: Array
-    surge: Array
-    bob: Array
-    sway: Array
-    pelvis_yaw: Array
-    pelvis_list: Array
-    pelvis_tilt: Array
-    nod: Array
-    lean: Array
-    chest_yaw: Array
-    arm_swing: Array
-    arm_mean: Array
-    elbow: Array
-    elbow_swing: Array
-    abduction: Array
-    frequency: Array
-
-    def with_curves(self, **curves: Array) -> Style:
-        """A copy with some curves replaced."""
-        return Style(**{f.name: curves.get(f.name, getattr(self, f.name)) for f in fields(self)})
 
 
 def healthy_style(path: PlannedPath) -> Style:
@@ -158,18 +117,19 @@ def _adapt_to_direction(style: Style, path: PlannedPath) -> Style:
     sideways = np.abs(path.velocity[:, 0]) / speed * moving
     # A figure that turns in place takes quick steps of some 40 degrees.
     spin = np.clip(np.abs(np.gradient(path.facing)) * path.fps, 0, 1) * np.clip(1 - path.speed / 60, 0, 1)
-    return style.with_curves(
-        land_pitch=style.land_pitch * forward - 16 * back - 8 * side,
-        off_pitch=style.off_pitch * forward + 8 * back - 16 * side,
+    changed = {
+        "land_pitch": style.land_pitch * forward - 16 * back - 8 * side,
+        "off_pitch": style.off_pitch * forward + 8 * back - 16 * side,
         # In steps to the side, the distance between the feet varies by half a stride. The extra width keeps
         # them from crossing.
-        width=style.width + 0.25 * stride / (1 + 0.6 * sideways) * sideways,
-        behind=4 + (style.behind - 4) * ahead,
-        lift=style.lift - back - side,
-        frequency=style.frequency * (1 + 0.6 * sideways + 0.15 * back[:, 0] + SPIN_CADENCE * spin),
-        lean=style.lean * (1 - 0.6 * back[:, 0]),
-        surge=style.surge * np.abs(ahead),
-        pelvis_yaw=style.pelvis_yaw * ahead,
-        arm_swing=style.arm_swing * (0.25 + 0.75 * forward),
-        height=style.height - 1.5 * sideways - 1.0 * back[:, 0],
-    )
+        "width": style.width + 0.25 * stride / (1 + 0.6 * sideways) * sideways,
+        "behind": 4 + (style.behind - 4) * ahead,
+        "lift": style.lift - back - side,
+        "frequency": style.frequency * (1 + 0.6 * sideways + 0.15 * back[:, 0] + SPIN_CADENCE * spin),
+        "lean": style.lean * (1 - 0.6 * back[:, 0]),
+        "surge": style.surge * np.abs(ahead),
+        "pelvis_yaw": style.pelvis_yaw * ahead,
+        "arm_swing": style.arm_swing * (0.25 + 0.75 * forward),
+        "height": style.height - 1.5 * sideways - 1.0 * back[:, 0],
+    }
+    return Style(**{**vars(style), **changed})
