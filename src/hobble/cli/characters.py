@@ -65,7 +65,7 @@ def export(options: argparse.Namespace) -> int:
     if network.skeleton is None:
         raise HobbleError("the network has no skeleton: pass one with --skeleton")
     tracks = write_motions(network, options.target, Runtime(mode=options.mode))
-    print(f"{options.target}: {', '.join(track.scenario.name for track in tracks)}")
+    print(f"{options.target}: {', '.join(scenario.name for scenario, _ in tracks)}")
     return 0
 
 

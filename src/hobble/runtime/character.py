@@ -16,6 +16,12 @@ from hobble.core import quat
 from hobble.core.quat import Array
 from hobble.models.network import Network
 
+# Arrays of the state that start at 0 -> their shape for one character.
+AT_ZERO: dict[str, tuple[int, ...]] = {
+    "root_height": (), "smoothed_velocity": (2,), "strafe": (), "correction": (2,), "foot_lock": (2,),
+    "foot_hold": (2, 2), "foot_step": (2,), "foot_missed": (2,), "foot_lift": (2,), "body_lift": (),
+    "step": (),
+}  # fmt: skip
 SHOWN_JOINTS = ("knee", "heel", "toe")  # the joints of each leg in `Character.leg_shown`, in this order
 
 
@@ -119,28 +125,18 @@ def start_characters(
         direction=_turn_about_y(path_direction, sin, cos),
         gait=np.repeat(gait[None], count, axis=0),
         ground=np.zeros((count, layout.samples, 3)),
-        root_height=np.zeros(count),
         joint_position=np.ascontiguousarray(in_world),
         joint_velocity=np.ascontiguousarray(_turn_about_y(velocity, sin, cos)),
         joint_rotation=quat.mul(quat.yaw(yaw)[:, None], quat.exp(half_turns)),
         phase=np.full(count, 0.0 if facts is None else facts.start_phase),
         channel_values=np.tile(at_rest, (count, 1)),
         channel_targets=np.tile(at_rest, (count, 1)),
-        smoothed_velocity=np.zeros((count, 2)),
         smoothed_direction=facing.copy(),
-        strafe=np.zeros(count),
-        correction=np.zeros((count, 2)),
-        foot_lock=np.zeros((count, 2)),
-        foot_hold=np.zeros((count, 2, 2)),
-        foot_step=np.zeros((count, 2)),
-        foot_missed=np.zeros((count, 2)),
-        foot_lift=np.zeros((count, 2)),
         foot_added=np.tile([1.0, 0.0, 0.0, 0.0], (count, 2, 2, 1)),
         leg_shown=in_world[:, legs].copy(),
-        body_lift=np.zeros(count),
         placed=np.zeros(count, bool),
-        step=np.zeros(count),
         memory=np.zeros((count, network.memory_size)),
+        **{name: np.zeros((count, *shape)) for name, shape in AT_ZERO.items()},
     )
 
 

@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -38,27 +37,6 @@ class Scenario:
     frames: int
     target: Callable[[int], Target] = field(repr=False)
     swept: tuple[str, str] | None = None
-
-
-@dataclass(frozen=True)
-class Track:
-    """The motion of a scenario with F frames.
-
-    positions: (F, J, 3) world, cm. rotations: (F, J, 4) world. contacts: (F, 4) from 0 to 1, of left heel,
-    left toe, right heel and right toe. phase: (F,) cycles. target: (F, 2) target velocity, cm a frame. root:
-    (F, 3) position of the root on the ground, cm. gait: (F,) name of the target gait. swept_values: (F,)
-    value of the swept column, 0 if there is none.
-    """
-
-    scenario: Scenario
-    positions: Array
-    rotations: Array
-    contacts: Array
-    phase: Array
-    target: Array
-    root: Array
-    gait: Array
-    swept_values: Array
 
 
 def _vector(length: float, degrees: float = 0.0) -> Array:
@@ -100,68 +78,62 @@ def swept_columns(network: Network) -> dict[str, tuple[str, str]]:
     }
 
 
-def run_scenario(network: Network, scenario: Scenario, options: Runtime) -> Track:
-    """Generate one scenario on flat ground."""
-    animation = ProceduralAnimation(network, **dict(options))
-    poses, targets, gaits, values = [], [], [], np.zeros(scenario.frames, np.float32)
-    for f in range(scenario.frames):
-        velocity, facing, gait = scenario.target(f)
+def run_scenario(network: Network, scenario: Scenario, options: Runtime) -> dict[str, np.ndarray]:
+    """Generate one scenario of F frames on flat ground.
+
+    Returns positions (F, J, 3), world, cm; rotations (F, J, 4), world; contacts (F, 4) from 0 to 1, of left
+    heel, left toe, right heel and right toe; phase (F,), cycles; root (F, 3) on the ground, cm; target (F, 2)
+    velocity, cm a frame; swept_values (F,) of the swept column, 0 if there is none; gait (F,) names of the
+    target gaits.
+    """
+    animation, poses = ProceduralAnimation(network, **dict(options)), []
+    values = np.zeros(scenario.frames, np.float32)
+    targets = [scenario.target(f) for f in range(scenario.frames)]
+    for f, (velocity, facing, gait) in enumerate(targets):
         channels = {}
         if scenario.swept:
             name, column = scenario.swept
             values[f] = channel(name).highest * f / max(1, scenario.frames - 1)
             channels = {name: {column: float(values[f])}}
         poses.append(animation.next_pose(velocity, facing, gait, **channels))
-        targets.append(velocity)
-        gaits.append(gait)
-    return Track(
-        scenario,
-        np.array([p.positions for p in poses]),
-        np.array([p.rotations for p in poses]),
-        np.array([p.contacts for p in poses]),
-        np.array([p.phase for p in poses]),
-        np.array(targets),
-        np.array([p.root for p in poses]),
-        np.array(gaits),
-        values,
-    )
+    of_poses = ("positions", "rotations", "contacts", "phase", "root")
+    return {
+        **{key: np.array([getattr(pose, key) for pose in poses]) for key in of_poses},
+        "target": np.array([velocity for velocity, _, _ in targets]),
+        "swept_values": values,
+        "gait": np.array([gait for _, _, gait in targets]),
+    }
 
 
-def write_motions(network: Network, bvh: str | Path, options: Runtime) -> Iterator[Track]:
+def write_motions(
+    network: Network, bvh: str | Path, options: Runtime
+) -> Iterator[tuple[Scenario, dict[str, np.ndarray]]]:
     """Run every scenario, write each as a BVH file into the folder `bvh`, and yield its motion."""
     assert network.skeleton is not None
     for scenario in scenarios(network):
-        track = run_scenario(network, scenario, options)
-        body = network.skeleton
-        if "skeleton" not in network.meta:  # trained on a body other than this skeleton
-            body = fitted_skeleton(body, track.positions, track.rotations)
-        export_bvh(Path(bvh) / f"{scenario.name}.bvh", scenario.name, body, track.positions, track.rotations)
-        yield track
+        motion = run_scenario(network, scenario, options)
+        at = motion["positions"], motion["rotations"]
+        # A network file without a skeleton was trained on a body other than this skeleton.
+        body = network.skeleton if "skeleton" in network.meta else fitted_skeleton(network.skeleton, *at)
+        export_bvh(Path(bvh) / f"{scenario.name}.bvh", scenario.name, body, *at)
+        yield scenario, motion
 
 
 def generate_scenarios(network: Network, npz: str | Path, bvh: str | Path, options: Runtime) -> None:
     """Run every scenario; write all of them to the file `npz`, and each to a BVH file in the folder `bvh`.
 
     The file has names (N,) of the scenarios, joints (J,) names, parents (J,) and fps. For each scenario it
-    has, as float32, <name>/positions, <name>/rotations (w first), <name>/contacts, <name>/phase,
-    <name>/target, <name>/root and <name>/swept_values, which `Track` describes. It also has <name>/gait (F,)
-    str and <name>/swept (2,), channel and column, both "" if nothing is swept.
+    has <name>/<key> for the keys of `run_scenario`, numbers as float32, and <name>/swept (2,), channel and
+    column, both "" if nothing is swept.
     """
     assert network.skeleton is not None
-    arrays: dict[str, Any] = {}
+    arrays: dict[str, np.ndarray] = {}
     names = []
-    for track in write_motions(network, bvh, options):
-        name = track.scenario.name
-        names.append(name)
-        for key in ("positions", "rotations", "contacts", "phase", "target", "root", "swept_values"):
-            arrays[f"{name}/{key}"] = getattr(track, key).astype(np.float32)
-        arrays[f"{name}/gait"] = track.gait
-        arrays[f"{name}/swept"] = np.array(track.scenario.swept or ("", ""))
-    save_npz(
-        npz,
-        names=np.array(names),
-        joints=np.array(network.skeleton.joints),
-        parents=np.array(network.skeleton.parents),
-        fps=np.array(60.0),
-        **arrays,
-    )
+    for scenario, motion in write_motions(network, bvh, options):
+        names.append(scenario.name)
+        for key, values in motion.items():
+            arrays[f"{scenario.name}/{key}"] = values if key == "gait" else values.astype(np.float32)
+        arrays[f"{scenario.name}/swept"] = np.array(scenario.swept or ("", ""))
+    skeleton = network.skeleton
+    facts = {"names": names, "joints": skeleton.joints, "parents": skeleton.parents, "fps": 60.0}
+    save_npz(npz, **{key: np.array(value) for key, value in facts.items()}, **arrays)

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
-from hobble.core.compiled import njit
 from hobble.core.quat import Array
 
 
@@ -75,35 +73,16 @@ class Follower:
 
         position: (C, 2) x and z of the characters, cm. Updates `reached` and `off_path`.
         """
-        velocity = np.empty((len(position), 2))
-        _lead(self.places, self._speeds, self.arrived, position, self.reached, self.off_path, velocity)
-        return velocity, [self.track[n % len(self.track)] for n in self.reached.tolist()]
-
-
-@njit
-def _distance_to_segment(p: Any, a: Any, b: Any) -> float:
-    """Distance of point p from the segment a to b, cm. All three are (2,)."""
-    px, pz, bx, bz = p[0] - a[0], p[1] - a[1], b[0] - a[0], b[1] - a[1]
-    # The nearest point of the segment is at the share t of the way from a to b.
-    t = min(max((px * bx + pz * bz) / max(bx * bx + bz * bz, 1e-9), 0.0), 1.0)
-    return np.sqrt((px - t * bx) ** 2 + (pz - t * bz) ** 2)
-
-
-@njit
-def _lead(
-    places: Any, speeds: Any, arrived: float, position: Any, reached: Any, off_path: Any, velocity: Any
-) -> None:
-    """Write the velocities of `Follower.lead` into `velocity`, and update `reached` and `off_path`."""
-    count = len(places)
-    for c in range(position.shape[0]):
-        n = reached[c] % count  # the next waypoint; x and z lead to it
-        x, z = places[n, 0] - position[c, 0], places[n, 1] - position[c, 1]
-        distance = np.sqrt(x * x + z * z)
-        if distance < arrived:
-            reached[c] += 1
-            n = (n + 1) % count
-            x, z = places[n, 0] - position[c, 0], places[n, 1] - position[c, 1]
-            distance = np.sqrt(x * x + z * z)
-        off_path[c] = _distance_to_segment(position[c], places[n - 1], places[n])
-        scale = speeds[n] / max(distance, 1e-6)
-        velocity[c, 0], velocity[c, 1] = x * scale, z * scale
+        count = len(self.track)
+        ahead = self.places[self.reached % count] - position
+        self.reached += np.sqrt(np.sum(ahead * ahead, axis=1)) < self.arrived
+        n = self.reached % count  # the next waypoint of each character
+        ahead, way = self.places[n] - position, self.places[n] - self.places[n - 1]
+        # The nearest point of the line from the last waypoint is at the share t of the way to the next.
+        behind = position - self.places[n - 1]
+        t = np.sum(behind * way, axis=1) / np.maximum(np.sum(way * way, axis=1), 1e-9)
+        off = behind - np.clip(t, 0.0, 1.0)[:, None] * way
+        self.off_path[:] = np.sqrt(np.sum(off * off, axis=1))
+        distance = np.sqrt(np.sum(ahead * ahead, axis=1))
+        velocity = ahead * (self._speeds[n] / np.maximum(distance, 1e-6))[:, None]
+        return velocity, [self.track[i] for i in n.tolist()]
