@@ -23,6 +23,7 @@ KINDS: dict[Callable[[Lab, Random], Throw], int] = {
     throws.kill: 22,
     throws.harm: 36,
     throws.gone: 5,
+    throws.orphan: 8,
     throws.full_disk: 10,
     throws.no_permission: 8,
     throws.wrong_value: 25,

@@ -36,6 +36,7 @@ def lab() -> Iterator[Lab]:
     ("throw", "times", "refusals"),
     [
         (throws.kill, 16, 0),
+        (throws.orphan, 8, 0),
         (throws.gone, 5, 0),
         (throws.full_disk, 4, 0),
         (throws.no_permission, 4, 0),

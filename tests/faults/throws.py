@@ -8,6 +8,7 @@ import shutil
 import signal
 import subprocess
 import sys
+import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from random import Random
@@ -85,6 +86,33 @@ def _old_or_new(bench: Bench, path: str, older: bool) -> bool:
     if not here.exists():
         return not older
     return (older and here.read_bytes() == OLD) or path not in bench.unlike()
+
+
+def orphan(lab: Lab, rng: Random) -> Throw:
+    """A job lives on after its run, as on a cluster whose head node died; the next run starts it again."""
+    job = rng.choice(lab.jobs)
+    what = "a job that lives on beside its second run"
+    with lab.bench(job) as bench:
+        ends = []
+
+        def start_again() -> None:
+            time.sleep(rng.uniform(0, lab.seconds[job.name]))
+            for path in job.outputs:  # as Snakemake does before a job
+                made = bench.folder / path
+                if made.is_dir():
+                    shutil.rmtree(made, ignore_errors=True)
+                else:
+                    made.unlink(missing_ok=True)
+            ends.append(bench.run())
+
+        first = bench.run(meanwhile=start_again)
+        if ends[0].status and first.status:
+            return Throw(what, ANY, FAULT, f"{job.name}: {ends[0].said[-900:]}")
+        if unlike := bench.unlike():  # as when one of them was refused; the same command again mends it
+            if run_again(bench, what, ANY, REMADE).happened == FAULT:
+                return Throw(what, ANY, FAULT, f"{job.name} made another {unlike}")
+            return Throw(what, ANY, FAULT if not ends[0].status else REMADE, f"{job.name}: {unlike}")
+        return Throw(what, ANY, UNHARMED)
 
 
 def harm(lab: Lab, rng: Random, only: str | None = None) -> Throw:

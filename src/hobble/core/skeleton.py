@@ -46,7 +46,7 @@ NEEDED_ROLES = (
     *(f"{side}_{part}" for side in ("left", "right") for part in ("hip", "knee", "heel", "toe")),
 )
 # A coordinate of a joint from its parent, cm.
-Coordinate = Annotated[float, Field(ge=-1e5, le=1e5, allow_inf_nan=False)]
+Coordinate = Annotated[float, Field(strict=True, ge=-1e5, le=1e5, allow_inf_nan=False)]
 Offset = tuple[Coordinate, Coordinate, Coordinate]
 
 
@@ -235,7 +235,7 @@ def skeleton_from_data(
     if missing := [role for role in needed if role not in read.roles]:
         raise InputError(path, f"its skeleton has no joint for the roles {', '.join(missing)}", fix=fix)
     name = read_declared(path, "its skeleton's name", ShortName, entries.get("name"), fix)  # type: ignore[arg-type]
-    return Skeleton.from_dict({**read.model_dump(), "name": name})
+    return Skeleton.from_dict({**entries, "name": name})
 
 
 def rest_positions(skeleton: Skeleton) -> Array:
