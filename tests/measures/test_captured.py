@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hobble.measures.sample import Sample, Stratum, captured_motion
+from hobble.measures.sample import Drawn, Sample, captured_motion
 from hobble.measures.walks import acceleration, in_root_coordinates
 from hobble.rows.clip_rows import ClipRows, Excerpt, captured_stretches, save_clip_rows
 from hobble.rows.layout import GAITS, RowLayout
@@ -79,5 +79,5 @@ def test_a_gap_in_the_frames_separates_two_stretches(rows, tmp_path) -> None:
     save_clip_rows(tmp_path / "a.npz", rows)
     paths = {name: tmp_path / f"{name}.npz" for name in "ba"}
     assert [len(c) for c in captured_motion(paths, None)] == [30, 20, 30, 20]
-    part = Sample((Stratum("train", 2, 100, (Excerpt("a", 20, 15, 50),)),), 2)
+    part = Sample({"train": Drawn((Excerpt("a", 20, 15, 50),), 2, 100)}, 2)
     assert [len(c) for c in captured_motion(paths, part)] == [10, 5]

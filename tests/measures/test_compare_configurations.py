@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
-from hypothesis import strategies as st
 
 from hobble.core.errors import InputError
 from hobble.core.files import write_csv
@@ -19,7 +18,7 @@ from hobble.measures.compare import (
     comparison_tables,
     read_results,
 )
-from hobble.measures.responsivity_run import LAP_COLUMNS, parameter_counts
+from hobble.measures.responsivity_run import parameter_counts
 
 SIZES = {
     "holden": (342, 512, 512, 311),
@@ -69,7 +68,6 @@ def left_behind(folder: Path, name: str, clips: dict[str, float], sizes: tuple[i
         ms = timed(k * (0.1 + 1e-6 * counts["true"]))
         laps = [
             {
-                **dict.fromkeys(LAP_COLUMNS),
                 "lap": n,
                 "milliseconds": {**ms, "total": (n + 0.5) * ms["total"] / 2},
             }
@@ -324,6 +322,3 @@ def test_a_damaged_history_is_named(tmp_path) -> None:
     Path(files[3]).write_text("pass,train_mse\n1,half\n")
     with pytest.raises(InputError, match=r"history\.csv"):
         read_results(*files)
-
-
-NUMBER = st.floats(-1e3, 1e3)

@@ -8,8 +8,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from scipy.stats import spearmanr
 
 from hobble.measures.injury_run import (
@@ -19,7 +17,6 @@ from hobble.measures.injury_run import (
     divided_severities,
     injury_response,
     into_a_jog,
-    largest_accelerations,
     respond,
     second_sweep,
     second_thresholds,
@@ -27,15 +24,12 @@ from hobble.measures.injury_run import (
     walk_crowd,
 )
 from hobble.measures.walks import (
-    SPEEDS,
     CrowdTarget,
     channel_values,
     generate_walks,
     mean_cycle,
     settling_seconds,
-    spearman,
 )
-from hobble.rows.clip_rows import Captured
 from hobble.runtime.options import Runtime
 
 RUNTIME = Runtime(steering=1.0)
@@ -133,10 +127,6 @@ def test_every_link_is_swept_and_those_never_hurt_are_marked(hurtable) -> None:
     assert set(result["summary"]) == set(result["summary_untrained"]) == set(GAITS)
 
 
-def test_two_measurements_give_the_same_numbers(hurtable) -> None:
-    assert response(hurtable, seconds=0.5) == response(hurtable, seconds=0.5)
-
-
 def test_a_second_injury_is_swept_over_a_first_as_published(hurtable) -> None:
     """Each injury lowers the head by .4 cm and slows the walk by 3 cm/s for each unit of severity."""
     shank, thigh = "LeftLeg-LeftFoot", "RightUpLeg-RightLeg"
@@ -196,13 +186,6 @@ def test_an_injury_lasts_from_a_walk_into_a_jog(hurtable) -> None:
     assert rows[None, 0.0]["jog_from_healthy_cm"] == 0
 
 
-def test_each_gait_is_compared_with_the_healthy_figure_of_the_same_gait(hurtable) -> None:
-    """The network's jog differs from its walk."""
-    healthy, *hurt = into_a_jog(hurtable, [KNEE], [], 1.0, RUNTIME)
-    assert healthy["walk_from_healthy_cm"] == healthy["jog_from_healthy_cm"] == 0
-    assert all(row["jog_from_healthy_cm"] != row["walk_from_healthy_cm"] for row in hurt)
-
-
 def test_falling_severity_is_measured_on_its_own(hurtable) -> None:
     """The rows of rising and falling severity differ."""
     stretches = [(1, [{}]), *((1, [{KNEE: severity}]) for severity in STEPS)]
@@ -232,18 +215,6 @@ def test_a_divided_severity_has_the_effect_of_the_quotient(hurtable) -> None:
     assert away[5, 10] == pytest.approx(0.2 * away[1, 10], rel=0.03)
 
 
-def test_a_figure_of_a_crowd_walks_as_it_does_alone(hurtable) -> None:
-    """A character walks in a crowd as it does alone."""
-    hurt = channel_values(hurtable, "injury", [{}, {KNEE: 4.0}, {KNEE: 10.0}])
-    together = generate_walks(hurtable, [CrowdTarget(30, ["walk", "jog", "walk"], hurt)], RUNTIME)
-    for figure, gait in enumerate(("walk", "jog", "walk")):
-        own = {name: each[figure : figure + 1] for name, each in hurt.items()}
-        alone = generate_walks(hurtable, [CrowdTarget(30, [gait], own)], RUNTIME)
-        np.testing.assert_allclose(together.local[:, figure], alone.local[:, 0], atol=2e-3)
-        np.testing.assert_allclose(together.root[:, figure], alone.root[:, 0], atol=2e-3)
-    assert SPEEDS["jog"] > SPEEDS["walk"]
-
-
 def test_whole_cycles_are_measured(hurtable) -> None:
     unhurt = channel_values(hurtable, "injury", [{}])
     walks = generate_walks(hurtable, [CrowdTarget(n, ["walk"], unhurt) for n in (20, 400, 10)], RUNTIME)
@@ -257,39 +228,6 @@ def test_whole_cycles_are_measured(hurtable) -> None:
     assert turned == pytest.approx(np.round(turned), abs=0.014)
     assert np.round(turned) == 3  # of the three quarters that are measured, 3.9 cycles
     assert known.measured_frames(2, 0) == slice(422, 430)  # less than a cycle: all but its beginning
-
-
-def test_largest_accelerations_are_of_the_gait_and_the_hurt_link(hurtable) -> None:
-    gait = np.zeros((6, 6))
-    gait[:4, hurtable.gaits.index("walk")] = gait[4:, hurtable.gaits.index("jog")] = 1
-    severity = np.zeros((6, 30))
-    severity[2:, hurtable.channels["injury"].index(KNEE)] = 3
-    rough = np.array([9.0, 8, 2, 1, 5, 6])
-    clip = Captured(
-        "a",
-        *(np.zeros((6, 1, 3)), np.zeros((6, 4)), np.zeros(6)),
-        {"injury": severity},
-        gait,
-        np.zeros((6, 2)),
-        np.zeros((6, 3)),
-        rough,
-        None,
-    )
-    assert largest_accelerations([clip, clip], hurtable) == {
-        ("walk", None): 9.0,
-        ("walk", KNEE): 2.0,
-        ("jog", None): 6.0,
-        ("jog", KNEE): 6.0,
-    }
-    found = injury_response(
-        hurtable, [clip], configuration="x", runtime=RUNTIME, seconds=0.2, links=[KNEE, "Neck1-Head"]
-    )
-    of = {
-        (r["gait"], r["link"]): (r["clip_acceleration"], r["clip_acceleration_of"])
-        for r in found["responses"]
-    }
-    assert of["walk", KNEE] == (2.0, "link")
-    assert of["jog", "Neck1-Head"] == (6.0, "gait")
 
 
 def test_the_settling_time_of_an_exponential_is_exact() -> None:
@@ -308,15 +246,3 @@ def test_a_mean_cycle_fills_phases_without_frames() -> None:
     assert cycle[12] == cycle[10] == 1
     assert cycle[23] == cycle[20] == 2
     assert cycle[1] == 0
-
-
-@given(st.lists(st.one_of(st.none(), st.integers(-3, 3).map(float)), min_size=11, max_size=11))
-@settings(max_examples=40, deadline=None)
-def test_the_rank_correlation_equals_scipys(values: list[float | None]) -> None:
-    known = [i for i, v in enumerate(values) if v is not None]
-    found = spearman(SEVERITIES, values)
-    if len(known) < 3 or len({values[i] for i in known}) < 2:
-        assert found is None
-    else:
-        expected = spearmanr(SEVERITIES[known], [values[i] for i in known]).statistic
-        assert found == pytest.approx(expected, abs=1e-5)

@@ -13,17 +13,8 @@ import pytest
 from hobble.channels import channel
 from hobble.measures import manners as page
 from hobble.measures import manners_run as module
-from hobble.measures.manners_run import (
-    EFFECTS,
-    NONE,
-    STEP,
-    USED,
-    WINDOW,
-    MannerWindow,
-    WalkerInputs,
-    captured_windows,
-    recognise_left_out,
-)
+from hobble.measures.manners_run import NONE, captured_windows, recognise_left_out
+from hobble.measures.windows import STEP, USED, WINDOW, Window
 from hobble.models.network import Network
 from hobble.report.parts import Paragraph
 from hobble.rows.clip_rows import Captured
@@ -79,14 +70,14 @@ def measure(network: Network, motion: Sequence[Captured], people: Mapping[str, s
 def test_windows_with_an_injury_or_half_a_mood_are_left_out(both: Network) -> None:
     whole = (FRAMES - WINDOW) // STEP + 1
     found = captured_windows(clip(both, "a", "sad", lean=0), both, "mood")
-    assert [w.manner for w in found] == ["sad"] * whole
+    assert [w.label for w in found] == ["sad"] * whole
     found = captured_windows(clip(both, "a", "sad", lean=0, hurt=3.0), both, "mood")
     assert len(found) == (150 - WINDOW) // STEP + 1
     assert captured_windows(clip(both, "a", "sad", lean=0, value=0.5), both, "mood") == []
 
 
-def window(who: str, manner: str, *values: float) -> MannerWindow:
-    return MannerWindow(who, manner, dict(enumerate(map(float, values))), dict.fromkeys(EFFECTS, 0.0))
+def window(who: str, manner: str, *values: float) -> Window:
+    return Window(who, manner, dict(enumerate(map(float, values))))
 
 
 def test_whole_people_are_left_out() -> None:
@@ -128,17 +119,20 @@ def test_each_manner_is_tried_with_each_column_of_another_channel(
     """Captured windows stand for the generated figures: those of the right mood, and at one link those of no
     mood.
     """
-    real = {m: captured_windows(clip(both, f"{m}-9", m, lean=lean), both, "mood") for m, lean in LEANS}
-    walked: list[WalkerInputs] = []
+    real = {
+        m: [w.values for w in captured_windows(clip(both, f"{m}-9", m, lean=lean), both, "mood")]
+        for m, lean in LEANS
+    }
+    walked: list[Any] = []
     broken = both.channels["injury"][3]
 
-    def generated_windows(network: Network, figures: Sequence[WalkerInputs], name: str, runtime: Runtime):
-        walked.extend(figures)
-        moods = [next(iter(f.channels["mood"]), None) for f in figures]
-        lost = [broken in f.channels.get("injury", {}) for f in figures]
+    def generated_values(network: Network, walks: Sequence[Any], runtime: Runtime, features: Any):
+        walked.extend(walks)
+        moods = [next(iter(channels["mood"]), None) for channels, _ in walks]
+        lost = [broken in channels.get("injury", {}) for channels, _ in walks]
         return [real[None if gone else mood] for mood, gone in zip(moods, lost, strict=True)]
 
-    monkeypatch.setattr(module, "generated_windows", generated_windows)
+    monkeypatch.setattr(module, "generated_values", generated_values)
     [found] = measure(both, motion)["channels"]
     assert found["manners"] == ["old", "sad"]
     assert found["captured"]["right"] == 1.0
@@ -148,9 +142,9 @@ def test_each_manner_is_tried_with_each_column_of_another_channel(
     assert len(rows) == 3 * 25
     assert {r["column"] for r in rows if r["share"] != 1.0} == {broken}
     assert [r["share"] for r in rows if r["column"] == broken] == [1.0, 0.0, 0.0]
-    channels = [f.channels for f in walked if "injury" in f.channels]
-    assert {value for one in channels for value in one["injury"].values()} == {10.0}
-    assert [f.speed for f in walked if "injury" in f.channels] == pytest.approx([2.0] * 75, rel=1e-3)
+    hurt = [(channels, speed) for channels, speed in walked if "injury" in channels]
+    assert {value for channels, _ in hurt for value in channels["injury"].values()} == {10.0}
+    assert [speed for _, speed in hurt] == pytest.approx([2.0] * 75, rel=1e-3)
     effect = found["effects"][2]
     assert (effect["manner"], effect["effect"]) == ("old", "trunk")
     rest = both.y_mean[both.layout.y_joint_position].reshape(-1, 3)

@@ -7,7 +7,6 @@ import pytest
 
 from hobble.core import quat
 from hobble.core.skeleton import Skeleton, forward_kinematics
-from hobble.measures.motion_quality import skating
 from hobble.measures.walks import (
     asymmetry,
     bend,
@@ -32,20 +31,6 @@ def test_foot_slide_is_the_distance_that_the_toe_moves_in_stance() -> None:
     np.testing.assert_allclose(foot_slide(toes, contacts), [0.3 * 9, 0.0], atol=1e-9)
     assert feet_in_stance(contacts)[:, 0].sum() == 12
     assert runs_of_true(np.ones(3, bool)).tolist() == [[0, 3]]
-
-
-def test_skating_counts_a_low_toe_by_its_height() -> None:
-    toes = np.zeros((3, 2, 3))
-    toes[:, :, 1] = 4.0
-    toes[:, :, 0] = 0.6 * np.arange(3)[:, None]
-    toes[:, :, 2] = 0.8 * np.arange(3)[:, None]
-    np.testing.assert_allclose(skating(toes, 4.0), 1.0)
-    toes[2, 1, 1] = 5.25  # half way up to where nothing counts, in the second frame only
-    np.testing.assert_allclose(skating(toes, 4.0), [[1.0, 1.0], [1.0, 2 - np.sqrt(2)]])
-    toes[:, 0, 1] = 6.5
-    np.testing.assert_allclose(skating(toes, 4.0)[:, 0], 0.0, atol=1e-12)
-    toes[:, 0, 1] = 3.0  # in the ground
-    np.testing.assert_allclose(skating(toes, 4.0)[:, 0], 1.0)
 
 
 def test_largest_turn_finds_the_one_joint_and_frame() -> None:

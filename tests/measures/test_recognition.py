@@ -15,12 +15,12 @@ from hobble.gait.recognise import learn
 from hobble.measures import recognition_run as module
 from hobble.measures.recognition_run import (
     HEALTHY,
-    InjuryWindow,
     confusion_rows,
     measure_recognition,
     walking_windows,
 )
 from hobble.measures.walks import gait_features
+from hobble.measures.windows import Window, feature_table
 from hobble.rows.clip_rows import Captured
 from hobble.runtime.options import Runtime
 
@@ -151,8 +151,8 @@ def test_windows_hold_straight_walking_with_one_injury(hurtable) -> None:
     good = clip(hurtable, "a", KNEE, 5.0, 1, frames=400)
     windows = walking_windows(good, hurtable)
     # Four parts of 100 frames; windows of 60 begin every 15 frames and stay in their part.
-    assert [w.quarter for w in windows] == [quarter for quarter in range(4) for _ in range(3)]
-    assert {(w.hurt, w.severity) for w in windows} == {(KNEE, 5.0)}
+    assert [w.part for w in windows] == [quarter for quarter in range(4) for _ in range(3)]
+    assert {(w.label, w.severity) for w in windows} == {(KNEE, 5.0)}
     aside = replace(good, velocity=good.velocity[:, ::-1])
     assert walking_windows(aside, hurtable) == []
     assert walking_windows(replace(good, velocity=0.1 * good.velocity), hurtable) == []
@@ -160,12 +160,11 @@ def test_windows_hold_straight_walking_with_one_injury(hurtable) -> None:
     severity = good.channels["injury"].copy()
     severity[150:] = 0  # half way through the second part, in which no window is all of a kind
     healed = walking_windows(replace(good, channels={"injury": severity}), hurtable)
-    assert [w.hurt for w in healed] == [KNEE] * 3 + [HEALTHY] * 6
+    assert [w.label for w in healed] == [KNEE] * 3 + [HEALTHY] * 6
     severity = good.channels["injury"].copy()
     severity[:, hurtable.channels["injury"].index(ARM)] = 2
     both = walking_windows(replace(good, channels={"injury": severity}), hurtable)
-    assert {(w.hurt, w.severity) for w in both} == {(f"{KNEE} and {ARM}", 5.0)}
-    assert module.WINDOW == 60
+    assert {(w.label, w.severity) for w in both} == {(f"{KNEE} and {ARM}", 5.0)}
 
 
 def test_without_sides_both_legs_are_one_class(holden31: Skeleton) -> None:
@@ -175,7 +174,7 @@ def test_without_sides_both_legs_are_one_class(holden31: Skeleton) -> None:
     assert parts(HEALTHY) == () != parts("LowerBack-Spine")
     hurt = ["LeftLeg-LeftFoot", "LeftLeg-LeftFoot", "RightUpLeg-RightLeg", HEALTHY]
     named = ["RightLeg-RightFoot", "LeftLeg-LeftFoot", "LeftLeg-LeftFoot", HEALTHY]
-    windows = [InjuryWindow("a", link, 5.0, {}, 0) for link in hurt]
+    windows = [Window("a", link, {}, 5.0) for link in hurt]
     found = module.count_answers(sorted(set(named)), windows, named, parts)
     assert found["right"] == 0.5
     assert found["right_without_side"] == 0.75
@@ -185,18 +184,14 @@ def test_cross_validation_never_learns_from_the_windows_it_names() -> None:
     """If windows differ only in their labels, the names are guesses."""
     rng = np.random.default_rng(6)
     windows = [
-        InjuryWindow(
-            "a", f"{n % 2}", 5.0, {f"{d}": float(v) for d, v in enumerate(rng.normal(size=60))}, n // 10
-        )
+        Window("a", f"{n % 2}", {f"{d}": float(v) for d, v in enumerate(rng.normal(size=60))}, 5.0, n // 10)
         for n in range(40)
     ]
     found = module._cross_validate(windows, lambda name: (name,))
     assert found["windows"] == 40
     assert found["right"] < 0.8
-    leaked = learn(module.feature_table(windows), [w.hurt for w in windows]).likeliest_classes(
-        module.feature_table(windows)
-    )
-    assert leaked == [w.hurt for w in windows]
+    table, labels = feature_table([w.values for w in windows]), [w.label for w in windows]
+    assert learn(table, labels).likeliest_classes(table) == labels
 
 
 def test_too_little_data_is_reported_with_its_reason(hurtable, motion) -> None:

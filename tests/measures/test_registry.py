@@ -46,7 +46,6 @@ def test_each_measurement_has_known_inputs_and_the_called_functions(one: Measure
     for name, function in found.items():
         assert function is None or len(inspect.signature(function).parameters) == FUNCTIONS[name], name
     assert len(inspect.signature(one.runner().run).parameters) == 2
-    assert hasattr(one.runner(), "run_piece") == (one.pieces is not None)
 
 
 def test_names_of_measurements_are_unique() -> None:

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
 from hobble.core.quat import Array
 from hobble.measures.rollouts_run import (
     RollOutCrowd,
-    RollOutErrors,
     RollOutInputs,
-    errors_of_stretches,
+    errors_of_sums,
+    roll_out_sums,
     stretches_of,
 )
 from hobble.measures.sample import LoadedPart
@@ -33,8 +34,8 @@ def roll_out(
 
 def clip_roll_outs(
     predictor: Predictor, rows: ClipRows, joints: Sequence[int], lengths: Sequence[int]
-) -> dict[int, RollOutErrors]:
+) -> dict[int, dict[str, Any]]:
     """Length -> errors of all roll-outs of the clip."""
     stretches = stretches_of(LoadedPart(rows, 0, len(rows)), predictor.network.layout)
-    found = errors_of_stretches(predictor, stretches, joints, lengths)
-    return {n: sum((of_stretch[n] for of_stretch in found), RollOutErrors()) for n in lengths}
+    sums = {n: roll_out_sums(predictor, stretches, joints, n).sum(axis=0) for n in lengths}
+    return {n: errors_of_sums(of_length) for n, of_length in sums.items()}

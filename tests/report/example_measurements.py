@@ -121,7 +121,7 @@ def responsivity(rng: np.random.Generator, laps: int = 19) -> dict[str, Any]:
         steps = {step: ms * float(rng.uniform(0.9, 1.1)) for step, ms in cost.items()}
         total = sum(steps.values())
         spread = {"sd": 0.05, "median": total, "p99": 1.4 * total, "whole_call": 1.1 * total}
-        return {**steps, "total": total, "spread": spread}
+        return {**steps, "total": total, "spread": spread, "sd": dict.fromkeys(cost, 0.01)}
 
     entries = [
         {
@@ -135,6 +135,8 @@ def responsivity(rng: np.random.Generator, laps: int = 19) -> dict[str, Any]:
             "foot_slide_cm": float(rng.uniform(1, 2)),
             "steps": 210,
             "largest_turn_degrees": float(rng.uniform(8, 20)),
+            "predicted_turn_degrees": float(rng.uniform(8, 30)),
+            "turns_held_back": 1,
             "milliseconds": milliseconds(),
         }
         for n in range(1, laps + 1)
@@ -148,6 +150,8 @@ def responsivity(rng: np.random.Generator, laps: int = 19) -> dict[str, Any]:
         "path_overshoot_cm": 160.0,
         "foot_slide_cm": 1.4,
         "largest_turn_degrees": 19.0,
+        "predicted_turn_degrees": 29.0,
+        "turns_held_back": laps,
         "milliseconds": milliseconds(),
     }
     track = {"waypoints": 6, "metres": 260.0}
@@ -191,6 +195,7 @@ def injury_sweep(rng: np.random.Generator, links: tuple[str, ...] = LINKS) -> di
                 {
                     "gait": gait,
                     "link": link,
+                    "trained": True,
                     "spearman": rho,
                     "from_healthy_cm": sweep[-1]["from_healthy"] - sweep[0]["from_healthy"],
                     "speed_share": sweep[-1]["speed"] / sweep[0]["speed"],
@@ -206,4 +211,8 @@ def injury_sweep(rng: np.random.Generator, links: tuple[str, ...] = LINKS) -> di
         "rows": rows,
         "responses": responses,
         "summary": {},
+        **{
+            key: []
+            for key in ("falling", "strips", "second_sweep", "second_thresholds", "into_a_jog", "divided")
+        },
     }

@@ -71,8 +71,8 @@ def test_missed_waypoints_flips_and_ineffective_links_are_reported(material: Rep
     found = heads(material, responsivity=missed)
     assert found["The character reached 113 of 114 waypoints."] == "warn"
     assert found["A joint turned by 175 degrees in one frame."] == "warn"
-    deaf = {"applies": True, "responses": [{"gait": "walk", "link": "a-b", "from_healthy_cm": 0.1}]}
-    assert "1 of 1 link hardly changes the walk at severity 10" in heads(material, injury=deaf)
+    deaf = {"applies": True, "responses": [swept("a-b", True, 0.1, 0.0)]}
+    assert "1 of 1 hurt links hardly change the walk at severity 10" in heads(material, injury=deaf)
 
 
 def swept(link: str, trained: bool, pose: float, left: float, rho: float = 1.0) -> dict[str, Any]:
@@ -85,15 +85,15 @@ def test_links_never_hurt_in_training_only_show_the_drift_of_the_walk(material: 
     like_it = {"responses": [drift, swept("hurt", True, 11.0, 6.5, 0.3)]}
     found = heads(material, injury=like_it)
     assert found["Even a healthy walk changes, by 10.0 cm per joint."] == "warn"
-    assert "1 of 1 link hardly changes the walk at severity 10" in found
+    assert "1 of 1 hurt links hardly change the walk at severity 10" in found
     assert not [head for head in found if "does not recover" in head]
     caught = {"responses": [swept("never", False, 0.1, 0.1), swept("hurt", True, 11.0, 6.5)]}
     found = heads(material, injury=caught)
     assert "The walk does not recover after these links have healed: hurt." in found
-    head = "1 of 2 links was hurt in training."
+    head = "1 of 2 links were hurt in training."
     assert found[head] == "good"
     texts = {hint.head: hint.text for hint in hints(changed(material, injury=caught))}
-    assert texts[head].startswith("At severity 10, it changes the walk by 11.0 cm per joint. A link is")
+    assert texts[head].startswith("At severity 10, each changes the walk by 11.0 cm per joint. A link is")
 
 
 def test_the_time_of_a_frame_is_a_median(material: ReportMaterial) -> None:

@@ -47,7 +47,7 @@ def test_a_stage_has_a_job_for_each_batch_of_clips(workflow, tmp_path) -> None:
     assert {rule: planned.pop(rule) for rule in stages} == dict.fromkeys(stages, used)
     # Whatever is not in a batch is there once for the data set, the configuration or a measurement or its
     # piece, not once for each clip.
-    assert {rule for rule, count in planned.items() if count > 1} == {"measure", "measure_piece"}, planned
+    assert {rule for rule, count in planned.items() if count > 1} == {"measure"}, planned
 
 
 @pytest.mark.parametrize("name", ["slurm", "kubernetes", "s3"])

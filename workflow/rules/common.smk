@@ -68,7 +68,6 @@ wildcard_constraints:
     batch=r"[^/]+",
     channels=r"plain|[a-z_+]+(?<!clips)",
     measure="|".join(each.name for each in all_measures()),
-    piece="[a-z]+",
 
 
 def keep_local(files):

@@ -2,7 +2,6 @@ rule measure:
     """The results of one measurement of a network, as JSON and CSV tables. hobble.measures has the measurements."""
     input:
         unpack(lambda w: keep_local(measurements.inputs(w.configuration, w.measure))),
-        pieces=lambda w: measurements.pieces(w.configuration, w.measure),
     output:
         json="results/{configuration}/evaluation/{measure}.json",
         tables=directory("results/{configuration}/evaluation/{measure}"),
@@ -20,31 +19,6 @@ rule measure:
         ),
     script:
         "../scripts/measure.py"
-
-
-rule measure_piece:
-    """A piece of a long measurement, such as the laps with one phase mode. The pieces can run at the same time."""
-    input:
-        unpack(lambda w: keep_local(measurements.inputs(w.configuration, w.measure))),
-    output:
-        json="results/{configuration}/evaluation/pieces/{measure}/{piece}.json",
-    log:
-        "results/{configuration}/logs/evaluation/{measure}-{piece}.log",
-    benchmark:
-        "results/{configuration}/benchmarks/evaluation/{measure}-{piece}.tsv"
-    resources:
-        mem_mb=memory("measure"),
-        runtime=minutes("measure"),
-    params:
-        measured=lambda w: measurements.params(w.configuration, w.measure),
-        piece=lambda w: w.piece,
-        code=lambda w: measurements.code(
-            w.measure,
-            configurations.model_package(w.configuration),
-            script="measure_piece",
-        ),
-    script:
-        "../scripts/measure_piece.py"
 
 
 rule compare:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from hobble.report.gather import ReportMaterial
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import combinations, product
 from typing import Any
 
@@ -29,6 +29,7 @@ from hobble.measures.compare import (
     published_row,
 )
 from hobble.measures.measure import SPLITS, Cost, JointOptions, Measure, Row, SampleOptions, sample_in_words
+from hobble.measures.shown import boxes, chart, table, words
 from hobble.report.parts import SPLITS as SPLIT_LABELS
 from hobble.report.parts import (
     Chart,
@@ -70,32 +71,55 @@ MEASURE = Measure(
     # For each thousand frames: 12 MB and 0.2 s. At least 10 minutes.
     cost=Cost(mb_per_1000_frames=12, seconds_per_1000_frames=0.2, least_minutes=10),
 )
-
-
-INTRODUCTION = (
-    "The network gets its input from a frame of a clip and predicts the next frame. The error is measured on "
-    "every frame that belongs to a gait cycle. Captured motion means the motion of the clip, also if it was "
-    "generated."
-)
-# Ending of a clip's name -> a sentence that explains it. Otherwise readers may take the number in _hurt1 for
-# a severity. Another ending may follow, as in walk_hurt1_mirror.
-ENDINGS = {
-    "_hurt1": " A clip whose name ends in _hurt1 is the first hurt version of a healthy clip; the number is "
-    "not its severity.",
-    "_mirror": " A clip whose name ends in _mirror is mirrored.",
-}
 COLOURS = {"train": "@muted", "held_out": "@accent"}  # split -> its colour in the charts
 NAMES = {"held_out": "held out", "train": "training"}  # split -> its name on the page
 # The keys of the 5th to 95th percentile of the error in accuracy.json.
 QUANTILES = ("p05", "p25", "p50", "p75", "p95")
-# Columns of the table of clips.
 CLIP_COLUMNS = ("clip", "split", "frames", "mean", "sd", "position_error_cm", *QUANTILES)
+ERROR_AXIS = axis("relative error, %", rangemode="tozero")
+# Key of a difference between two configurations in compare.json -> what it is divided by (eq. 3.2).
+DEVIATIONS = {"difference_of_means": "sd of the means of clips", "difference": "sd of single frames"}
 
 
-def _rows(found: Json) -> list[dict[str, Any]]:
+def section(found: Json, material: ReportMaterial) -> PageSection:
+    """Charts, tables, and a view of captured and predicted motion. Empty without measured clips."""
+    if not found.get("clips"):
+        return PageSection("accuracy", [])
+    # Readers may take the number in _hurt1 for a severity, so endings of names are explained.
+    endings = [end for end in ("_hurt1", "_mirror") if any(end in row["clip"] for row in found["clips"])]
+    introduction = words("accuracy.introduction", *(f"accuracy.{end[1:]}" for end in endings))
+    heads = {key: "position error, cm" if key == "position_error_cm" else key for key in CLIP_COLUMNS[:6]}
+    of_clips = table(f"{material.name}-accuracy", _measured(found), heads, show={"split": NAMES.__getitem__})
+    # Only gait cycles are measured, so the clips are longer.
+    seconds = sum(found[split]["frames"] for split in NAMES) / 60
+    caveat = words("accuracy.caveat", duration=format_duration(seconds), dataset=material.dataset)
+    parts = [
+        SectionPart(0, Paragraph(introduction + _about_sample(found))),
+        SectionPart(9, Paragraph(caveat)),
+        SectionPart(10, published_table(found, material), open=True, short=True),
+        SectionPart(30, clip_boxes(found, material), tall=True),
+        SectionPart(60, of_clips),
+        SectionPart(90, TemplatePart("captured.html.j2")),
+    ]
+    return PageSection("accuracy", parts, title="Accuracy", order=10, long=True)
+
+
+def _measured(found: Json) -> list[dict[str, Any]]:
     """The entries of the clips that were measured: held-out clips first, each split by rising error."""
-    rows = [row for row in found.get("clips", ()) if row.get("mean") is not None]
+    rows = [row for row in found.get("clips", ()) if row["mean"] is not None]
     return sorted(rows, key=lambda row: (row["split"] != "held_out", row["mean"]))
+
+
+def _about_sample(found: Json) -> str:
+    """Which part of the clips was measured, with confidence intervals; empty if all clips were measured."""
+    if not found.get("sample"):
+        return ""
+    means = [
+        f"{NAMES[split]} {100 * found[split]['mean']:.2f} ± {100 * found[split]['interval']['mean']:.2f} %"
+        for split in NAMES
+        if found[split].get("interval")
+    ]
+    return " " + words("accuracy.sample", sample=sample_in_words(found), means=", ".join(means))
 
 
 def clip_boxes(found: Json, material: ReportMaterial) -> Chart:
@@ -104,61 +128,30 @@ def clip_boxes(found: Json, material: ReportMaterial) -> Chart:
     Held-out clips come first, then the others by their mean error. A line is at the published mean of all
     clips.
     """
-    rows = [row for row in _rows(found)[::-1] if has_quantiles(row)]  # plotly puts the first at the bottom
+    rows = _measured(found)[::-1]  # plotly puts the first at the bottom
     traces = []
     for split, fill, line in (("held_out", "@accent-wash", "@accent"), ("train", "@sunken", "@faint")):
         if chosen := [row for row in rows if row["split"] == split]:
-            box = boxes(NAMES[split], chosen, COLOURS[split])
-            place = {"orientation": "h", "y": [row["clip"] for row in chosen]}
-            traces.append({**box, **place, "line": {"width": 1.4, "color": line}, "fillcolor": fill})
-    theirs = _published_means(material.published, material.name)
+            place = {"orientation": "h", "y": [row["clip"] for row in chosen], "fillcolor": fill}
+            traces.append(quantile_boxes(NAMES[split], chosen, COLOURS[split], line, **place))
+    means = material.published["clip_means"].get(material.name, ())
+    theirs = dict(zip(published_clips(material.published), means, strict=False))
     if shown := [row["clip"] for row in rows if row["clip"] in theirs]:
         diamond = {"symbol": "diamond-open", "size": 7, "color": "@ink"}
         traces.append(marker_trace("published mean", [100 * theirs[clip] for clip in shown], shown, diamond))
     published = material.published_entry("accuracy")
     mean = reference_line(100 * published["mean"], f"{published['label']}, published") if published else {}
-    axes = {"xaxis": axis("relative error, %", rangemode="tozero")}
-    axes["yaxis"] = ordered_axis(row["clip"] for row in rows)
-    held_out = any(row["split"] == "held_out" for row in rows)
-    return Chart(
-        "accuracy-boxes",
-        "Error of each clip",
-        "The error of a joint is the distance between its predicted and its captured position, divided by "
-        "its distance from the root (eq. 3.1 of Segerstedt). Each box holds the middle half of the errors "
-        "of a clip. The solid line in it is the median, the dotted line the mean. Whiskers reach from the "
-        "5th to the 95th percentile. A box near zero with a long whisker means that the clip is easy except "
-        "for a few moments."
-        + (" Held-out clips come first: the network was not trained on them." if held_out else ""),
-        traces,
-        {**axes, **mean, "boxmode": "overlay"},
-        height=max(260, 110 + 21 * len(rows)),
-    )
+    clips = ordered_axis(row["clip"] for row in rows)
+    layout = {"xaxis": ERROR_AXIS, "yaxis": clips, **mean, "boxmode": "overlay"}
+    more = ["held_out"] if any(row["split"] == "held_out" for row in rows) else []
+    return chart("accuracy-boxes", traces, layout, max(260, 110 + 21 * len(rows)), more=more)
 
 
-def boxes(name: str, errors: Sequence[Json], colour: str) -> Trace:
-    """Plotly boxes of the relative error in %, one for each entry of accuracy.json in `errors`."""
-    low, q1, median, q3, high = ([100 * entry[key] for entry in errors] for key in QUANTILES)
-    fences = {"lowerfence": low, "q1": q1, "median": median, "q3": q3, "upperfence": high}
-    mean = [100 * entry["mean"] for entry in errors]
-    return {"type": "box", "name": name, **fences, "mean": mean, "marker": {"color": colour}}
-
-
-def has_quantiles(row: Json) -> bool:
-    """Whether the errors of a clip or a split have all QUANTILES."""
-    return all(row.get(key) is not None for key in QUANTILES)
-
-
-def accuracy_table(found: Json, name: str) -> Table:
-    """A row for each clip that was measured: its number of frames and its errors. name: the configuration."""
-    columns = {
-        "clip": Column("clip"),
-        "split": Column("split", lambda value: NAMES.get(value, value)),
-        "frames": Column.count("frames"),
-        "mean": Column.number("mean"),
-        "sd": Column.number("sd"),
-        "position_error_cm": Column.number("position error, cm"),
-    }
-    return Table.of(f"{name}-accuracy", columns, _rows(found))
+def quantile_boxes(name: str, errors: Sequence[Json], colour: str, line: str, **more: Any) -> Trace:
+    """Boxes of the relative error in %, one for each entry of accuracy.json in `errors`."""
+    keys = zip(("lowerfence", "q1", "median", "q3", "upperfence", "mean"), (*QUANTILES, "mean"), strict=True)
+    values = {key: [100 * entry[of_entry] for entry in errors] for key, of_entry in keys}
+    return boxes(name, line, **values, marker={"color": colour}, **more)
 
 
 def published_table(found: Json, material: ReportMaterial) -> Table:
@@ -166,157 +159,73 @@ def published_table(found: Json, material: ReportMaterial) -> Table:
 
     Ours are measured as the published ones were, see `measure_accuracy` in `hobble.measures.accuracy_run`.
     """
-    rows: list[list[Any]] = []
+    rows: list[Row] = []
     for split, name in NAMES.items():
-        part = found.get(split) or {}
-        if ours := part.get("as_published"):
-            row = [ours["mean_of_clips"], ours["sd_of_clips"], part.get("position_error_cm")]
-            rows.append([f"{material.name}, {name} clips", *row, "this report"])
-    sources = material.published["sources"]
+        if ours := found[split].get("as_published"):
+            of_split = {"mean": ours["mean_of_clips"], "sd": ours["sd_of_clips"], "source": "this report"}
+            cm = found[split]["position_error_cm"]
+            rows.append({"network": f"{material.name}, {name} clips", **of_split, "cm": cm})
     for entry in material.published["accuracy"]:
-        rows.append([entry["label"], entry["mean"], entry["sd"], None, citation(entry, sources)])
-    columns = [
-        Column("network"),
-        Column.number("mean error of the clips, as a fraction"),
-        Column.number("sd of these means"),
-        Column.number("position error, cm (all frames, exact phase)"),
-        Column("source", kind="long"),
-    ]
-    title = (
-        "Comparison with published results (phase mode constant, at most 500,000 joint positions of a clip)"
-    )
-    return Table(f"{material.name}-published", columns, rows, title)
-
-
-def _published_means(published: Json, configuration: str) -> dict[str, float]:
-    """Clip -> published mean error of the network of a configuration; {} if there are none."""
-    means = published["clip_means"].get(configuration)
-    return dict(zip(published_clips(published), means, strict=True)) if means else {}
-
-
-def section(found: Json, material: ReportMaterial) -> PageSection:
-    """Charts, tables, and a view of captured and predicted motion. Empty without measured clips."""
-    if not found.get("clips"):
-        return PageSection("accuracy", [])
-    # The first argument of each part is its place in the section, from 0 (top) to 100 (end).
-    return PageSection(
-        "accuracy",
-        [
-            SectionPart(0, Paragraph(INTRODUCTION + explain_endings(found) + describe_sample(found))),
-            SectionPart(9, Paragraph(caveat(found, material))),
-            SectionPart(10, published_table(found, material), open=True, short=True),
-            SectionPart(30, clip_boxes(found, material), tall=True),
-            SectionPart(60, accuracy_table(found, material.name)),
-            SectionPart(90, TemplatePart("captured.html.j2")),
-        ],
-        title="Accuracy",
-        order=10,
-        long=True,
-    )
-
-
-def explain_endings(found: Json) -> str:
-    """A sentence for each of the ENDINGS that a measured clip has; empty if there is none."""
-    clips = [row["clip"] for row in _rows(found)]
-    return "".join(text for ending, text in ENDINGS.items() if any(ending in clip for clip in clips))
-
-
-def caveat(found: Json, material: ReportMaterial) -> str:
-    """A paragraph: why these errors must not be compared with the published ones."""
-    # The number of measured frames, at 60 a second. Only gait cycles are measured, so the clips are longer.
-    frames = sum((found.get(split) or {}).get("frames") or 0 for split in ("held_out", "train"))
-    return (
-        "Do not compare these errors with the published ones as if the clips were the same. Ours are "
-        f"measured on {format_duration(frames / 60)} of gait cycles in the data set {material.dataset}, the "
-        "published ones on 80 clips of Holden et al. (2017). A small error may only mean that the clips are "
-        "easy to predict."
-    )
-
-
-def describe_sample(found: Json) -> str:
-    """Which part of the clips was measured, with confidence intervals; empty if all clips were measured."""
-    if not found.get("sample"):
-        return ""
-    means = [
-        f"{NAMES[split]} {100 * found[split]['mean']:.2f} ± {100 * found[split]['interval']['mean']:.2f} %"
-        for split in ("held_out", "train")
-        if (found.get(split) or {}).get("interval")
-    ]
-    return (
-        f" Measured on {sample_in_words(found)}, and weighted to represent all clips. 95 % confidence "
-        f"intervals of the means over all frames of all clips: {', '.join(means)}."
-    )
+        source = citation(entry, material.published["sources"])
+        rows.append({"network": entry["label"], **entry, "source": source})
+    heads = {
+        "network": "network",
+        "mean": "mean error of the clips, as a fraction",
+        "sd": "sd of these means",
+        "cm": "position error, cm (all frames, exact phase)",
+        "source": "source",
+    }
+    return table(f"{material.name}-published", rows, heads, words("accuracy.published"), long=["source"])
 
 
 def figures(found: Json, material: ReportMaterial) -> Iterator[KeyFigure]:
     """The key figures: the error on each split that was measured."""
-    for at, split, label in (
-        (10, "held_out", "Error on held-out clips"),
-        (11, "train", "Error on training clips"),
-    ):
+    for order, (split, label) in enumerate(SPLIT_LABELS.items(), 10):
         part = found.get(split)
-        if part and part.get("mean") is not None:
-            error = part.get("position_error_cm")
-            note = "of a joint's distance from the root"
-            note += f"; {_centimetres(error, split, material)}" if error is not None else ""
-            published = material.published_entry("accuracy") if split == "held_out" else None
-            if published:
+        if part and part["mean"] is not None:
+            note = f"of a joint's distance from the root; {_centimetres(part, split, material)}"
+            if (published := material.published_entry("accuracy")) and split == "held_out":
                 mean = 100 * published["mean"]
                 note += f"; published for {published['label']}: {mean:.2f} %, on other clips"
-            yield KeyFigure(label, f"{100 * part['mean']:.2f}", "%", note, at)
+            yield KeyFigure(f"Error on {label}", f"{100 * part['mean']:.2f}", "%", note, order)
 
 
-def _centimetres(error: float, split: str, material: ReportMaterial) -> str:
+def _centimetres(part: Json, split: str, material: ReportMaterial) -> str:
     """The mean position error in words: of the predicted joints, and of the joints as the runtime draws them.
 
     The runtime draws a joint halfway between its predicted position and its old position plus the predicted
     velocity. This error is left out if the measurement `rollouts` has no roll-outs of one frame.
-
-    error: the error of the predicted joints, cm.
     """
+    error = format_number(part["position_error_cm"])
     lengths = {entry["length"]: entry for entry in material.results_of("rollouts").get("lengths", ())}
-    drawn = (lengths.get(1, {}).get(split) or {}).get("position_error_cm")
+    drawn = lengths.get(1, {}).get(split, {}).get("position_error_cm")
     if drawn is None:
-        return f"{format_number(error)} cm per joint on average"
-    drawn_text = f"{format_number(drawn)} cm as drawn (explained under Accuracy)"
-    return f"{format_number(error)} cm per joint as predicted; {drawn_text}"
+        return f"{error} cm per joint on average"
+    return f"{error} cm per joint as predicted; {format_number(drawn)} cm as drawn (explained under Accuracy)"
 
 
 def hints(found: Json, material: ReportMaterial) -> Iterator[Hint]:
     """How well the network generalises, and which clip has the largest error."""
     # Places of hints (`Hint.order`): under 20 for advice on the data, 30 for advice on the network.
-    held_out = (found.get("held_out") or {}).get("mean")
-    yield from with_order(10 if held_out is None else 30, _generalisation(found))
-    yield from with_order(12, _worst_clip(found))
-
-
-def _generalisation(found: Json) -> Iterator[Hint]:
-    """A hint that compares the errors on held-out and training clips."""
-    train, held_out = (found.get(split) or {} for split in ("train", "held_out"))
-    if held_out.get("mean") is None:
-        yield Hint(
-            "warn",
-            "No clips were held out.",
-            "So the errors on this page do not show how well the network predicts new clips. List a few "
-            "clips under held_out in the data set.",
-        )
-    elif train.get("mean"):
-        ratio = held_out["mean"] / train["mean"]
-        words = "The error on held-out clips is {} times the error on training clips"
+    train, held_out = ((found.get(split) or {}).get("mean") for split in SPLITS)
+    if held_out is None:
+        yield Hint("warn", "No clips were held out.", words("accuracy.none-held-out"), 10)
+    elif train:
+        ratio = held_out / train
+        many = f"{ratio:.1f}" if ratio > 1.5 else f"{ratio:.2f}"
+        head = f"The error on held-out clips is {many} times the error on training clips"
         if ratio > 1.5:
-            advice = "The network overfits. Add more varied clips (speeds, turns, performers) before you "
-            advice += "make the network larger or train it longer."
-            yield Hint("warn", f"{words.format(f'{ratio:.1f}')}.", advice)
+            yield Hint("warn", f"{head}.", words("accuracy.overfits"), 30)
         elif ratio < 1.2:
-            head = f"{words.format(f'{ratio:.2f}')}, so the network does not overfit."
-            yield Hint("good", head, "A larger network may do better.")
+            head += ", so the network does not overfit."
+            yield Hint("good", head, "A larger network may do better.", 30)
         else:
-            yield Hint("fact", f"{words.format(f'{ratio:.2f}')}.", "That is usual.")
+            yield Hint("fact", f"{head}.", "That is usual.", 30)
+    yield from with_order(12, _worst_clip(_measured(found)))
 
 
-def _worst_clip(found: Json) -> Iterator[Hint]:
+def _worst_clip(rows: Sequence[Json]) -> Iterator[Hint]:
     """A hint on the clip with the largest error, if that is far above the median of all clips."""
-    rows = [row for row in found.get("clips", ()) if row.get("mean") is not None]
     if len(rows) < 4:
         return
     median = float(np.median([row["mean"] for row in rows]))
@@ -324,17 +233,8 @@ def _worst_clip(found: Json) -> Iterator[Hint]:
     if worst["mean"] > 1.8 * median:
         source = worst["clip"].removesuffix("_mirror")
         whose = "its labels" if source == worst["clip"] else f"the labels of {source}, which it mirrors,"
-        yield Hint(
-            "note",
-            f"{worst['clip']} has the largest error,",
-            f"{worst['mean'] / median:.1f} times the median over all clips. "
-            f"Look at it under Accuracy, and check {whose} with `hobble labels`.",
-        )
-
-
-NAME = "accuracy"  # name of the measurement
-# split -> its name in texts for users
-SPLIT_NAMES = {"train": "training", "held_out": "held-out"}
+        text = words("accuracy.worst", times=f"{worst['mean'] / median:.1f}", whose=whose)
+        yield Hint("note", f"{worst['clip']} has the largest error,", text)
 
 
 def compared(all_measured: Sequence[ConfigurationResults], published: Json) -> ComparisonAddition:
@@ -342,17 +242,33 @@ def compared(all_measured: Sequence[ConfigurationResults], published: Json) -> C
 
     all_measured: the results of each configuration. published: the content of published.yaml.
     """
-    differences = accuracy_differences(all_measured)
+    found = {m.name: m.results_of("accuracy") for m in all_measured}
+    differences = accuracy_differences(found)
+    ours = []
+    for row in published["accuracy"]:
+        for split in SPLITS:
+            clips, label = found.get(row["configuration"]), SPLIT_LABELS[split]
+            mean, sd = mean_and_sd(clip_means(clips, split) if clips else [])
+            ours.append(published_row(f"relative error, {label}", row, row["mean"], mean))
+            ours.append(published_row(f"standard deviation of the means of {label}", row, row["sd"], sd))
+    # Errors of the network that Holden et al. released on three clips, beside ours on these clips.
+    of_release = [
+        published_row(
+            f"relative error, {clip['clip']}",
+            {"configuration": name, "source": "release"},
+            published["released_clips"][clip["clip"]],
+            clip.get("as_published", clip)["mean"],
+        )
+        for name, of_configuration in found.items()
+        for clip in of_configuration["clips"]
+        if clip["clip"] in published["released_clips"]
+    ]
     on_training = [row for row in differences if row["over"] == "train"]
     return ComparisonAddition(
-        entries=[{"dataset": m.dataset, **m.results_of(NAME), "configuration": m.name} for m in all_measured],
-        about={m.name: {"joints": m.results_of(NAME)["joints"]} for m in all_measured},
+        entries=[{"dataset": m.dataset, **found[m.name], "configuration": m.name} for m in all_measured],
+        about={name: {"joints": of_configuration["joints"]} for name, of_configuration in found.items()},
         differences=differences,
-        against_published=[
-            *_published_splits(all_measured, published),
-            *published_differences("error", on_training, published),
-            *_published_clips(all_measured, published),
-        ],
+        against_published=[*ours, *published_differences("error", on_training, published), *of_release],
     )
 
 
@@ -363,44 +279,42 @@ def tables(compared: Json) -> dict[str, list[Row]]:
     """
     rows: list[Row] = [
         {"configuration": entry["configuration"], **{key: clip.get(key) for key in CLIP_COLUMNS}}
-        for entry in compared[NAME]
+        for entry in compared["accuracy"]
         for clip in entry["clips"]
     ]
-    return {NAME: rows, "published-clips": published_clip_rows(compared)}
+    return {"accuracy": rows, "published-clips": published_clip_rows(compared)}
 
 
 def published_clip_rows(compared: Json) -> list[Row]:
     """Tables A.4 and A.5 of Segerstedt (2021): a row for each clip and network, with ours beside it."""
-    published, ours, rows = compared["published"], {}, list[Row]()
-    for entry in compared[NAME]:
-        for clip in entry["clips"]:
-            ours[entry["configuration"], clip["clip"]] = clip.get("as_published") or {}
-    for configuration, means in published["clip_means"].items():
-        sds = published["clip_sds"].get(configuration, [None] * len(means))  # table A.5 has none for AVA
-        clips = enumerate(zip(published_clips(published), means, sds, strict=True))
-        for index, (clip, mean, sd) in clips:
-            found = ours.get((configuration, clip), {})
-            rows.append(
-                {
-                    "index": index,
-                    "clip": clip,
-                    "configuration": configuration,
-                    "published_mean": mean,
-                    "published_sd": sd,
-                    "mean": found.get("mean"),
-                    "sd": found.get("sd"),
-                }
-            )
+    published = compared["published"]
+    ours = {
+        (entry["configuration"], clip["clip"]): clip.get("as_published", {})
+        for entry in compared["accuracy"]
+        for clip in entry["clips"]
+    }
+    rows: list[Row] = []
+    for name, means in published["clip_means"].items():
+        sds = published["clip_sds"].get(name, [None] * len(means))  # table A.5 has none for AVA
+        for index, (clip, *theirs) in enumerate(zip(published_clips(published), means, sds, strict=True)):
+            found = ours.get((name, clip), {})
+            row = {"index": index, "clip": clip, "configuration": name}
+            row |= dict(zip(("published_mean", "published_sd"), theirs, strict=True))
+            rows.append(row | {key: found.get(key) for key in ("mean", "sd")})
     return rows
 
 
-def accuracy_differences(all_measured: Sequence[ConfigurationResults]) -> list[dict[str, Any]]:
+def accuracy_differences(found: Mapping[str, Json]) -> list[dict[str, Any]]:
     """The difference between the errors of each two configurations, by eq. 3.2 of Segerstedt 2021.
 
     There is a row for each split and each clip on which both configurations were measured. `over` is the name
-    of this split or clip.
+    of this split or clip. found: configuration -> content of its accuracy.json.
     """
-    series = {m.name: _series(m.results_of(NAME)) for m in all_measured}
+    series = {
+        name: {split: {**of[split], "means": clip_means(of, split)} for split in SPLITS}
+        | {entry["clip"]: entry for entry in of["clips"]}
+        for name, of in found.items()
+    }
     return [
         {"a": a, "b": b, "over": over, **compare_series(series[a][over], series[b][over])}
         for a, b in combinations(series, 2)
@@ -409,86 +323,41 @@ def accuracy_differences(all_measured: Sequence[ConfigurationResults]) -> list[d
     ]
 
 
-def _series(found: Json) -> dict[str, Json]:
-    """Split or clip -> its errors. A split also has `means`, the mean errors of its clips."""
-    splits = {split: {**found[split], "means": clip_means(found, split)} for split in SPLITS}
-    return {**splits, **{entry["clip"]: entry for entry in found["clips"]}}
-
-
 def clip_means(found: Json, split: str) -> list[float]:
-    """The mean error of each clip of a split that has one, as published ones were measured if possible.
-
-    found: the content of accuracy.json.
-    """
+    """The mean error of each clip of a split that has one, as published ones were measured if possible."""
     clips = [c for c in found["clips"] if c["split"] == split and c["mean"] is not None]
     return [c.get("as_published", c)["mean"] for c in clips]
 
 
-def _published_splits(all_measured: Sequence[ConfigurationResults], published: Json) -> list[dict[str, Any]]:
-    """Published means and standard deviations of the clips' errors, beside ours on each split."""
-    by_name = {m.name: m.results_of(NAME) for m in all_measured}
-    out = []
-    for row in published["accuracy"]:
-        found = by_name.get(row["configuration"])
-        for split in SPLITS:
-            clips = f"{SPLIT_NAMES[split]} clips"
-            mean, sd = mean_and_sd(clip_means(found, split) if found else [])
-            out.append(published_row(f"relative error, {clips}", row, row["mean"], mean))
-            out.append(published_row(f"standard deviation of the means of {clips}", row, row["sd"], sd))
-    return out
-
-
-def _published_clips(all_measured: Sequence[ConfigurationResults], published: Json) -> list[dict[str, Any]]:
-    """Errors of the network that Holden et al. released on three clips, beside ours on these clips."""
-    return [
-        published_row(
-            f"relative error, {clip['clip']}",
-            {"configuration": results.name, "source": "release"},
-            published["released_clips"][clip["clip"]],
-            clip.get("as_published", clip)["mean"],
-        )
-        for results in all_measured
-        for clip in results.results_of(NAME)["clips"]
-        if clip["clip"] in published["released_clips"]
-    ]
-
-
-# The difference between two configurations is the difference of their mean errors, divided by standard
-# deviations (sd; eq. 3.2 of Segerstedt 2021). compare.json has it twice, with different standard deviations.
-# Key of the difference -> what it is divided by, for the menu of the chart.
-DEVIATIONS = {"difference_of_means": "sd of the means of clips", "difference": "sd of single frames"}
-
-
 def compared_section(compared: Compared) -> PageSection:
     """The spread of the errors, differences between configurations, and errors of single clips."""
-    # The first argument of each part is its place in the section, from 0 (top) to 100 (end).
-    return PageSection(
-        "accuracy",
-        [
-            SectionPart(10, error_boxes(compared)),
-            SectionPart(30, difference_map(compared)),
-            SectionPart(50, clip_lines(compared)),
-            SectionPart(60, published_clips_table(compared)),
-        ],
-        title="Accuracy",
-        order=10,
-        long=True,
+    clips = table(
+        "compare-published-clips", published_clip_rows(compared), title=words("accuracy.published-clips")
     )
+    parts = [
+        SectionPart(10, error_boxes(compared)),
+        SectionPart(30, difference_map(compared)),
+        SectionPart(50, clip_lines(compared)),
+        SectionPart(60, clips),
+    ]
+    return PageSection("accuracy", parts, title="Accuracy", order=10, long=True)
 
 
 def compared_columns(compared: Compared) -> Iterator[OverviewColumn]:
     """Columns for the table of configurations: the error on each split, and the number of measured joints."""
     entries = {entry["configuration"]: entry for entry in compared["accuracy"]}
-    for at, split, label in ((10, "held_out", "held-out error"), (20, "train", "training error")):
+    for order, split, label in ((10, "held_out", "held-out error"), (20, "train", "training error")):
         values = {name: entry[split]["mean"] for name, entry in entries.items()}
-        yield OverviewColumn(at, Column(label, _percent, "n"), values)
-    yield OverviewColumn(
-        70, Column.count("joints"), {name: entry["joints"] for name, entry in entries.items()}
-    )
+        yield OverviewColumn(order, Column(label, lambda value: f"{100 * value:.2f} %", "n"), values)
+    joints = {name: entry["joints"] for name, entry in entries.items()}
+    yield OverviewColumn(70, Column.count("joints"), joints)
 
 
 def error_boxes(compared: Compared) -> Chart:
-    """A box for each configuration: the spread of its error over all frames of a split. A menu selects it."""
+    """A box for each configuration: the spread of its error over all frames of a split. A menu selects it.
+
+    With a value for each clip, boxes are of the means of clips, published ones beside ours.
+    """
     colours, options = configuration_colours(compared), {}
     published = [row for row in compared["published"]["accuracy"] if row["configuration"] in colours]
     marks = marker_trace(
@@ -499,42 +368,24 @@ def error_boxes(compared: Compared) -> Chart:
         hovertemplate="%{x}: %{y:.2f} % published<extra></extra>",
     )
     for split, label in SPLIT_LABELS.items():
-        traces = []
-        for entry in compared["accuracy"]:
-            name = entry["configuration"]
-            if has_quantiles(entry[split]):
-                line = {"width": 1.6, "color": colours[name]}
-                box = boxes(name, [entry[split]], colours[name])
-                traces.append({**box, "x": [name], "boxmean": True, "line": line})
-        if traces:
-            options[label] = [*traces, marks] if published else traces
-        options |= _boxes_of_means(compared, split, f"{label}, a value for each clip")
-    return Chart(
-        "compare-boxes",
-        "Spread of the error",
-        "Each box holds the middle half of the relative errors of all frames (eq. 3.1 of Segerstedt). The "
-        "solid line is the median, the dashed line the mean. Whiskers reach from the 5th to the 95th "
-        "percentile. Diamonds are published means, measured on other data. With a value for each clip, as in "
-        "Figure 5.8 of Segerstedt, boxes are of the means of clips, ours and those of his 80 clips.",
-        layout={"yaxis": axis("relative error, %", rangemode="tozero"), "showlegend": False},
-        height=400,
-        choose="Clips",
-        options=options,
-    )
-
-
-def _boxes_of_means(compared: Compared, split: str, label: str) -> dict[str, list[Trace]]:
-    """{label: boxes of the means of clips}, published ones beside ours; {} without clips in the split."""
-    traces: list[Trace] = []
-    for entry in compared["accuracy"]:
-        name = entry["configuration"]
-        theirs = [("published", compared["published"]["clip_means"].get(name, ()), "@muted")]
-        for whose, means, colour in [("ours", clip_means(entry, split), "@accent"), *theirs]:
-            if len(means):
-                y = [100 * mean for mean in means]
-                box = {"type": "box", "name": f"{name}, {whose}", "y": y, "boxmean": True, "boxpoints": False}
-                traces.append({**box, "line": {"width": 1.6, "color": colour}})
-    return {label: traces} if any(clip_means(entry, split) for entry in compared["accuracy"]) else {}
+        of_split = {e["configuration"]: e for e in compared["accuracy"] if e[split]["mean"] is not None}
+        if not of_split:
+            continue
+        options[label] = [
+            quantile_boxes(name, [entry[split]], colours[name], colours[name], x=[name], boxmean=True)
+            for name, entry in of_split.items()
+        ] + [marks] * bool(published)
+        options[f"{label}, a value for each clip"] = [
+            boxes(f"{name}, {whose}", colour, y=[100 * mean for mean in means], boxmean=True)
+            for name, entry in of_split.items()
+            for whose, means, colour in (
+                ("ours", clip_means(entry, split), "@accent"),
+                ("published", compared["published"]["clip_means"].get(name, ()), "@muted"),
+            )
+            if len(means)
+        ]
+    layout = {"yaxis": ERROR_AXIS, "showlegend": False}
+    return chart("compare-boxes", layout=layout, height=400, choose="Clips", options=options)
 
 
 def clip_lines(compared: Compared) -> Chart | None:
@@ -551,43 +402,21 @@ def clip_lines(compared: Compared) -> Chart | None:
     if set(colours) & set(published["clip_means"]) or {clip for _, clip in measured} & set(their_clips):
         order += their_clips
     options: dict[str, list[Trace]] = {}
+    hover = {"hovertemplate": "%{x}: %{y:.2f} %<extra>%{fullData.name}</extra>"}
     for label, key, theirs in (("mean", "mean", "clip_means"), ("standard deviation", "sd", "clip_sds")):
-        traces = options.setdefault(label, [])
+        lines = options.setdefault(label, [])
         for entry in compared["accuracy"]:
-            name, means = entry["configuration"], published[theirs].get(entry["configuration"])
-            rows = {r["clip"]: r.get("as_published", r)[key] for r in entry["clips"] if r["mean"] is not None}
+            name, colour = entry["configuration"], colours[entry["configuration"]]
+            rows = {r["clip"]: 100 * r.get("as_published", r)[key] for r in _measured(entry)}
             known = [clip for clip in order if clip in rows]
-            hover = {"hovertemplate": "%{x}: %{y:.2f} %<extra>%{fullData.name}</extra>"}
-            y = [100 * rows[clip] for clip in known]
-            traces.append(line_trace(name, known, y, colours[name], mode="lines+markers", **hover))
-            if means:
-                y = [100 * mean for mean in means]
-                whose = f"{name}, published"
-                traces.append(
-                    line_trace(whose, their_clips, y, colours[name], dash="dot", width=1.3, **hover)
-                )
-    caption = (
-        "The error of every clip in the phase mode constant, on its first 500,000 joint positions, as "
-        "Segerstedt measured it. Dotted lines are his, on the 80 clips of Holden et al. Ours are above the "
-        "same clips if we have them. (His table of standard deviations has none for AVA.)"
-    )
+            ours = [rows[clip] for clip in known]
+            lines.append(line_trace(name, known, ours, colour, mode="lines+markers", **hover))
+            if values := published[theirs].get(name):
+                y, dotted = [100 * value for value in values], {"dash": "dot", "width": 1.3, **hover}
+                lines.append(line_trace(f"{name}, published", their_clips, y, colour, **dotted))
     x = {"type": "category", **ordered_axis(order), "showticklabels": len(order) < 40}
-    layout = {"xaxis": x, "yaxis": axis("relative error, %", rangemode="tozero")}
-    return Chart(
-        "compare-clips", "Error of each clip", caption, (), layout, 420, choose="Shown", options=options
-    )
-
-
-def published_clips_table(compared: Compared) -> Table:
-    """Tables A.4 and A.5 of Segerstedt (2021), with ours of the same clips."""
-    rows = published_clip_rows(compared)
-    columns = {key: Column.number(key.replace("_", " "), 4) for key in rows[0]}
-    columns |= {
-        "clip": Column("clip"),
-        "configuration": Column("configuration"),
-        "index": Column.count("index"),
-    }
-    return Table.of("compare-published-clips", columns, rows, "Tables A.4 and A.5 of Segerstedt, and ours")
+    layout = {"xaxis": x, "yaxis": ERROR_AXIS}
+    return chart("compare-clips", layout=layout, height=420, choose="Shown", options=options)
 
 
 def difference_map(compared: Compared) -> Chart:
@@ -595,27 +424,19 @@ def difference_map(compared: Compared) -> Chart:
     names, options = configuration_names(compared), {}
     hover, look = "%{y} and %{x}: %{z:.3f}<extra></extra>", {"texttemplate": "%{z:.2f}", "xgap": 3, "ygap": 3}
     for (split, label), (key, kind) in product(SPLIT_LABELS.items(), DEVIATIONS.items()):
-        values = {(r["a"], r["b"]): r[key] for r in compared["difference"] if r["over"] == split}
+        # compare.json has each pair in one order only.
+        values = {
+            pair: r[key]
+            for r in compared["difference"]
+            if r["over"] == split
+            for pair in ((r["a"], r["b"]), (r["b"], r["a"]))
+        }
         if any(value is not None for value in values.values()):
-            # compare.json has each pair in one order only, (a, b) or (b, a).
-            cells = [[values.get((a, b), values.get((b, a))) for b in names] for a in names]
+            cells = [[values.get((a, b)) for b in names] for a in names]
             options[f"{label}, {kind}"] = [heatmap(names, names, cells, hover, **look)]
-    return Chart(
-        "compare-difference",
-        "Difference between two configurations",
-        "Eq. 3.2 of Segerstedt: twice the difference of the two means, divided by the sum of the two "
-        "standard deviations. Segerstedt uses the standard deviation of the clips' means. The standard "
-        "deviation of single frames is several times as large. A value of 1 says that the means are one "
-        "standard deviation apart. Our rule of thumb: differences under 0.2 are too small to matter.",
-        layout={
-            "xaxis": {"type": "category"},
-            "yaxis": {"type": "category", "autorange": "reversed", "automargin": True},
-        },
-        height=max(240, 90 + 42 * len(names)),
-        choose="Clips and deviation",
-        options=options,
-    )
-
-
-def _percent(value: Any) -> str:
-    return f"{100 * float(value):.2f} %"
+    layout = {
+        "xaxis": {"type": "category"},
+        "yaxis": {"type": "category", "autorange": "reversed", "automargin": True},
+    }
+    height, choose = max(240, 90 + 42 * len(names)), "Clips and deviation"
+    return chart("compare-difference", layout=layout, height=height, choose=choose, options=options)

@@ -19,7 +19,7 @@ from hobble.core.errors import HobbleError, InputError
 from hobble.core.quat import Array
 from hobble.database.statistics import Moments
 from hobble.measures.measure import SPLITS, JointOptions, MeasureInputs, Outcome, Row
-from hobble.measures.sample import Sample, clip_parts, sample_to_measure
+from hobble.measures.sample import Sample, clip_parts, sample_to_measure, with_sample
 from hobble.measures.walks import mean_of_known
 from hobble.models.load import load_network
 from hobble.models.network import Network
@@ -67,10 +67,6 @@ class Errors:
         return Errors(
             self.frames + other.frames, self.moments + other.moments, self.histogram + other.histogram
         )
-
-    def __mul__(self, weight: float) -> Errors:
-        """The same errors with `weight` times their weights. `frames` stays the number of measured frames."""
-        return Errors(self.frames, self.moments * weight, self.histogram * weight)
 
     def quantile(self, share: float) -> float:
         """The relative error below which `share` of all errors lie, accurate to about 1 % of its value."""
@@ -181,64 +177,46 @@ def measure_accuracy(
     joints, predict = joint_indices(network, joint_names), predict_function(network)
     constant, first_frames = at_stored_phases(network, predict), PUBLISHED_POSITIONS // network.layout.joints
     of_clip: dict[str, Errors] = {}
-    as_published: dict[str, Errors] = {}
+    as_published: dict[str, dict[str, Any]] = {}
     excerpts: dict[Excerpt, dict[str, Any]] = {}
-    totals = dict.fromkeys(SPLITS, Errors())
     for part in clip_parts(clips, sample):
-        loaded = part.load()
-        check_layout(part.path, loaded.rows, network)
-        errors = clip_errors(network, loaded.rows, joints, predict)
-        split = splits[part.clip]
-        totals[split] += errors * part.weight
-        of_clip[part.clip] = of_clip.get(part.clip, Errors()) + errors * part.weight
+        rows = part.load().rows
+        check_layout(part.path, rows, network)
+        errors = clip_errors(network, rows, joints, predict)
+        of_clip[part.clip] = of_clip.get(part.clip, Errors()) + errors
         values = errors.to_dict()
-        if sample is None:
-            as_published[part.clip] = clip_errors(network, loaded.rows, joints, constant, first_frames)
-        if part.excerpt is not None:
-            first, last = loaded.first_and_last_frame
-            place = {"clip": part.clip, "split": split, "first_frame": first, "last_frame": last}
-            excerpts[part.excerpt] = {**place, **values}
+        if part.excerpt is None:
+            published = clip_errors(network, rows, joints, constant, first_frames).to_dict()
+            as_published[part.clip] = {key: published[key] for key in ("frames", "mean", "sd")}
+        else:
+            place = {"first_frame": int(rows.frame[0]), "last_frame": int(rows.frame[-1])}
+            excerpts[part.excerpt] = {"clip": part.clip, "split": splits[part.clip], **place, **values}
         log.info("%s: %s", part.excerpt or part.clip, values)
-    entries = [{"clip": name, "split": splits[name], **errors.to_dict()} for name, errors in of_clip.items()]
-    for entry in entries if sample is None else ():
-        values = as_published[entry["clip"]].to_dict()
-        entry["as_published"] = {key: values[key] for key in ("frames", "mean", "sd")}
+    entries = [
+        {"clip": name, "split": splits[name], **errors.to_dict()}
+        | ({"as_published": as_published[name]} if sample is None else {})
+        for name, errors in of_clip.items()
+    ]
     result: dict[str, Any] = {"configuration": configuration, "joints": len(joints), "clips": entries}
-    for split, errors in totals.items():
-        clips_of_split = [e for e in entries if e["split"] == split and e["mean"] is not None]
-        result[split] = {
-            **errors.to_dict(),
-            "clips": len(clips_of_split),
-            "mean_of_clips": mean_of_known([e["mean"] for e in clips_of_split], 15),
-        }
+    for split in SPLITS:
+        total = sum((errors for name, errors in of_clip.items() if splits[name] == split), Errors())
+        own = [e for e in entries if e["split"] == split and e["mean"] is not None]
+        mean = mean_of_known([e["mean"] for e in own], 15)
+        result[split] = {**total.to_dict(), "clips": len(own), "mean_of_clips": mean}
         if sample is None:
-            means = [e["as_published"]["mean"] for e in clips_of_split]
+            means = [e["as_published"]["mean"] for e in own]
             sd = float(np.std(means, ddof=1)) if len(means) > 1 else None
             result[split]["as_published"] = {"mean_of_clips": mean_of_known(means, 15), "sd_of_clips": sd}
-    if sample is not None:
-        _add_intervals(result, sample, excerpts)
-        result |= {"sample": sample.to_dict(), "excerpts": list(excerpts.values())}
-    return result
-
-
-def _add_intervals(
-    result: dict[str, Any], sample: Sample, excerpts: Mapping[Excerpt, Mapping[str, Any]]
-) -> None:
-    """Add 95 % confidence intervals to the entry of each split.
-
-    `mean_of_clips` becomes a mean over the excerpts, weighted to represent all clips. excerpts: the errors of
-    each excerpt that was measured.
-    """
-    for split in SPLITS:
-        of_split = {excerpt: entry for excerpt, entry in excerpts.items() if entry["split"] == split}
-        weights = [sample.clip_weights[excerpt] for excerpt in of_split]
-        result[split]["interval"] = {}
-        if of_split:
-            means = [entry["mean"] for entry in of_split.values()]
-            result[split]["mean_of_clips"] = float(np.average(means, weights=weights))
-            for key in WITH_INTERVAL:
-                values = {excerpt: entry[key] for excerpt, entry in of_split.items()}
-                result[split]["interval"][key] = sample.confidence_half_width(split, values)
+        elif drawn := sample.splits.get(split):
+            # The mean over clips, of which each has as much weight as there is of it in the sample.
+            shares = [excerpt.rows / excerpt.clip_rows for excerpt in drawn.drawn]
+            means = [excerpts[excerpt]["mean"] for excerpt in drawn.drawn]
+            result[split]["mean_of_clips"] = float(np.average(means, weights=shares))
+            result[split]["interval"] = {
+                key: drawn.confidence_half_width({e: excerpts[e][key] for e in drawn.drawn})
+                for key in WITH_INTERVAL
+            }
+    return with_sample(result, sample) | ({"excerpts": list(excerpts.values())} if sample else {})
 
 
 def joints_to_measure(inputs: MeasureInputs, options: JointOptions) -> list[str] | None:

@@ -16,6 +16,7 @@ from hobble.core.files import Json
 from hobble.core.section import Positive, Section
 from hobble.measures.compare import ComparisonAddition, ConfigurationResults
 from hobble.measures.measure import Cost, Measure, Row
+from hobble.measures.shown import words
 from hobble.report.parts import (
     Column,
     Compared,
@@ -70,24 +71,17 @@ def section(found: Json, material: ReportMaterial) -> PageSection:
     """The table, and how each value was measured."""
     if "straight" not in found:
         return PageSection("field", [])
-    table = Table("field", COLUMNS, rows(found), "Measures of the field")
     clips = "held-out" if found["split"] == "held_out" else "training"
-    words = (
-        "The formulas are those of the papers. Their bodies, data and machines differ from ours, and their "
-        "numbers were read in notes about the papers, so compare rankings, and hold ours against captured "
-        "motion. For the columns “as asked” and “captured”, the character was asked in each frame for the "
-        f"speed, facing and gait of a captured person ({found['stretches']} stretches of {clips} clips). The "
-        "Frechet distance of captured motion is that of two halves of it."
-    )
-    parts = [SectionPart(10, Paragraph(words)), SectionPart(20, table, open=True)]
+    parts = [
+        SectionPart(10, Paragraph(words("field.introduction", stretches=found["stretches"], clips=clips))),
+        SectionPart(20, Table("field", COLUMNS, rows(found), "Measures of the field"), open=True),
+    ]
     return PageSection("field", parts, title="Measures of the field", order=35)
 
 
 COLUMNS = [
     Column("measure"),
-    Column.number("straight walk"),
-    Column.number("as asked"),
-    Column.number("captured"),
+    *map(Column.number, ("straight walk", "as asked", "captured")),
     Column("published, other bodies and data"),
 ]
 
@@ -101,9 +95,9 @@ def rows(found: Json) -> list[list[object]]:
         for key, name in OF_MOTION.items()
     ]
     for path in PATHS:
-        for unit, words in (("cm", "distance from a {}, cm"), ("degrees", "angle to a {}, degrees")):
-            out.append([words.format(path), found["paths"][path][unit], None, None, f"{path}_{unit}"])
-    out += [[words, found["response"][gait], None, None, f"response_{gait}"] for gait, words in GAITS.items()]
+        for unit, label in (("cm", "distance from a {}, cm"), ("degrees", "angle to a {}, degrees")):
+            out.append([label.format(path), found["paths"][path][unit], None, None, f"{path}_{unit}"])
+    out += [[label, found["response"][gait], None, None, f"response_{gait}"] for gait, label in GAITS.items()]
     return [[*row[:-1], _published_words(published.get(str(row[-1])))] for row in out]
 
 
@@ -115,12 +109,12 @@ def _published_words(row: Json | None) -> str:
 def hints(found: Json, material: ReportMaterial) -> Iterator[Hint]:
     """Where the character is much worse than captured people who did the same."""
     asked = found.get("asked") or {}
-    for key, words in WORTH_A_HINT.items():
+    for key, faults in WORTH_A_HINT.items():
         mine, theirs = (asked.get(who, {}).get(key) for who in ("character", "captured"))
         if mine and theirs and mine > MUCH_MORE * theirs:
             yield Hint(
                 "note",
-                f"The character's {words} more than captured people's.",
+                f"The character's {faults} more than captured people's.",
                 f"{OF_MOTION[key]}: {format_number(mine)} against {format_number(theirs)}.",
                 order=40,
             )

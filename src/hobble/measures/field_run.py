@@ -12,21 +12,7 @@ from hobble.channels import channel
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton, local_rotations
 from hobble.measures.measure import MeasureInputs, Outcome
-from hobble.measures.motion_quality import (
-    BODY,
-    FOOT_POINTS,
-    FPS,
-    Reference,
-    contact_speed,
-    diversity,
-    frechet_distance,
-    jerk,
-    joint_update,
-    joints_with,
-    skating,
-    standing_heights,
-    window_features,
-)
+from hobble.measures.motion_quality import FPS, cleanness, compare_windows, window_features
 from hobble.measures.sample import HURT_VERSION, ClipPart, clip_parts
 from hobble.models.load import load_network
 from hobble.models.network import Network
@@ -119,7 +105,7 @@ def follow_path(network: Network, runtime: Runtime, path: Array, laps: int) -> t
             angles.append(_angle(place - before, path[(at + 1) % len(path)] - path[at]))
         if passed >= (laps + 0.5) * len(path):
             break
-    return float(np.mean(distances)), float(np.mean(angles))
+    return round(float(np.mean(distances)), 3), round(float(np.mean(angles)), 3)
 
 
 def _angle(a: Array, b: Array) -> float:
@@ -147,20 +133,10 @@ def response(network: Network, runtime: Runtime, gait: str, speed: float) -> flo
 def straight_walk(network: Network, runtime: Runtime, seconds: float) -> Motion:
     """A straight walk at WALK speed, after SETTLING."""
     frames = SETTLING + round(seconds * FPS)
-    command = Command(
-        np.tile([0.0, WALK], (frames, 1)),
-        _walk_shares(network, frames),
-        np.zeros((frames, 2)),
-        Motion(*EMPTY),
-    )
+    gait = np.tile([float(name == "walk") for name in network.gaits], (frames, 1))
+    ahead = np.tile([0.0, 1.0], (frames, 1))
+    command = Command(WALK * ahead, gait, 0 * ahead, Motion(np.zeros((0, 0, 3)), np.zeros((0, 0, 4))))
     return walk_commands(network, runtime, [command])[0].part(slice(SETTLING, None))
-
-
-EMPTY = (np.zeros((0, 0, 3)), np.zeros((0, 0, 4)))
-
-
-def _walk_shares(network: Network, frames: int) -> Array:
-    return np.tile([float(name == "walk") for name in network.gaits], (frames, 1))
 
 
 def walk_commands(network: Network, runtime: Runtime, commands: Sequence[Command]) -> list[Motion]:
@@ -226,24 +202,21 @@ def _commands_of(part: ClipPart, skeleton: Skeleton) -> Iterator[Command]:
                 yield Command(velocity[frames], captured.gait[frames], ahead[frames], motion.part(frames))
 
 
-def cleanness(skeleton: Skeleton, motions: Sequence[Motion]) -> dict[str, float]:
+# Name in field.json -> name in `hobble.measures.motion_quality.cleanness`.
+CLEANNESS = {
+    "skating_cm": "skating",
+    "skating_heels_cm": "skating_heels",
+    "skating_toes_cm": "skating_toes",
+    "joint_update_degrees": "joint_update",
+    "jerk": "jerk",
+    "contact_speed": "contact_speed",
+}
+
+
+def mean_cleanness(skeleton: Skeleton, motions: Sequence[Motion]) -> dict[str, float]:
     """Skating, rotation of joints, jerk and contact speed of motions: means over them."""
-    feet, body = joints_with(skeleton, FOOT_POINTS), joints_with(skeleton, BODY)
-    found: dict[str, list[float]] = {}
-    for motion in motions:
-        points = motion.positions[:, feet].astype(float)
-        standing = standing_heights(points)
-        slid = skating(points, standing)
-        for name, value in {
-            "skating_cm": slid.mean(),
-            "skating_heels_cm": slid[:, ::2].mean(),
-            "skating_toes_cm": slid[:, 1::2].mean(),
-            "joint_update_degrees": joint_update(motion.rotations[:, body]),
-            "jerk": jerk(motion.positions[:, body].astype(float)),
-            "contact_speed": contact_speed(points, standing),
-        }.items():
-            found.setdefault(name, []).append(float(value))
-    return {name: round(float(np.nanmean(values)), 4) for name, values in found.items()}
+    found = [cleanness(skeleton, motion.positions, motion.rotations) for motion in motions]
+    return {name: round(float(np.nanmean([one[key] for one in found])), 4) for name, key in CLEANNESS.items()}
 
 
 def compare_with_captured(
@@ -259,19 +232,16 @@ def compare_with_captured(
     rest = slice(SETTLING, None)
     captured = [command.motion.part(rest) for command in commands]
     walked = [motion.part(rest) for motion in walk_commands(network, runtime, commands)]
-    features = [window_features(skeleton, motion.positions) for motion in captured]
-    basis = Reference.of(np.concatenate(features))
-    windows = basis.project(np.concatenate([window_features(skeleton, m.positions) for m in walked]))
-    halves = [basis.project(np.concatenate(features[start::2])) for start in (0, 1) if features[start::2]]
-    apart = frechet_distance(*halves) if len(halves) == 2 else None
+
+    mine, theirs = (
+        [window_features(skeleton, motion.positions) for motion in motions] for motions in (walked, captured)
+    )
+    half = np.repeat(np.arange(len(theirs)) % 2 == 0, list(map(len, theirs)))
+    windows = compare_windows(np.concatenate(mine), np.concatenate(theirs), half)
     return {
-        "character": cleanness(skeleton, walked)
-        | {
-            "frechet": round(frechet_distance(windows, basis.windows), 4),
-            "diversity": round(diversity(windows), 4),
-        },
-        "captured": cleanness(skeleton, captured)
-        | {"frechet": apart and round(apart, 4), "diversity": round(diversity(basis.windows), 4)},
+        who: mean_cleanness(skeleton, motions)
+        | {key: None if np.isnan(value) else round(value, 4) for key, value in found.items()}
+        for who, motions, found in zip(("character", "captured"), (walked, captured), windows, strict=True)
     }
 
 
@@ -282,11 +252,7 @@ def measure_field(
     assert network.skeleton is not None
     walked = {
         name: dict(
-            zip(
-                ("cm", "degrees"),
-                np.round(follow_path(network, runtime, path, options.path_laps), 3),
-                strict=True,
-            )
+            zip(("cm", "degrees"), follow_path(network, runtime, path, options.path_laps), strict=True)
         )
         for name, path in paths().items()
     }
@@ -297,7 +263,9 @@ def measure_field(
             "walk": response(network, runtime, "walk", WALK),
             "jog": response(network, runtime, "jog", JOG),
         },
-        "straight": cleanness(network.skeleton, [straight_walk(network, runtime, options.field_seconds)]),
+        "straight": mean_cleanness(
+            network.skeleton, [straight_walk(network, runtime, options.field_seconds)]
+        ),
         "split": split,
         "stretches": len(commands[split]) if split else 0,
         "asked": compare_with_captured(network, runtime, commands[split]) if split else None,

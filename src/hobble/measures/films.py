@@ -61,8 +61,7 @@ DISTANCE = 400.0  # cm: from the camera to this point
 # Of the looping picture.
 HURT_PARTS = {"left thigh": 8.0, "left shank": 8.0}  # part of the hurt character's body -> severity
 CAPTIONS = ("healthy", "left knee hurts: 8 of 10")  # of the left and the right half
-MOST_BYTES = 1_000_000  # largest allowed size of the file
-QUALITIES = (80, 65, 50, 35, 20)  # of the WebP encoder; the first that gives at most MOST_BYTES is used
+PICTURE_QUALITY = 50  # of the looping picture
 Picture = NDArray[np.uint8]
 
 
@@ -299,24 +298,15 @@ def encode_webp(pictures: Sequence[Picture]) -> bytes:
 
 def _save_webp(file: Any, images: Sequence[Image.Image], loop: int, quality: int, method: int) -> None:
     """Write an animated WebP. loop: how often it plays; 0: endlessly. method: effort of the encoder."""
-    duration = round(1000 * FRAME_STEP / FPS)  # milliseconds a picture
-    images[0].save(
-        file,
-        "WEBP",
-        save_all=True,
-        append_images=images[1:],
-        loop=loop,
-        quality=quality,
-        method=method,
-        duration=duration,
-    )
+    more = {"loop": loop, "quality": quality, "method": method, "duration": round(1000 * FRAME_STEP / FPS)}
+    images[0].save(file, "WEBP", save_all=True, append_images=images[1:], **more)
 
 
 def write_limp_picture(network: Network, path: str | Path, runtime: Runtime) -> int:
-    """Write the looping picture as a WebP of at most MOST_BYTES. Returns its size in bytes.
+    """Write the looping picture as a WebP. Returns its size in bytes.
 
     The healthy and the hurt character have the same target speed. Raises HobbleError if the network has no
-    injury channel, or if the picture is too large even at the lowest quality.
+    injury channel.
     """
     hurt = dict(zip(part_links(network, list(HURT_PARTS)), HURT_PARTS.values(), strict=True))
     assert network.skeleton is not None
@@ -328,16 +318,9 @@ def write_limp_picture(network: Network, path: str | Path, runtime: Runtime) -> 
         colours = np.array([injury.get(link, 0.0) for link in links]) / 10
         loop = make_loop(network, {INJURY: injury}, runtime)
         halves.append(draw_frames(renderer, network.skeleton, loop, colours, SIZE))
-    path, images = Path(path), put_side_by_side(*halves)
-    for quality in QUALITIES:
-        with atomic_path(path) as temporary:
-            _save_webp(temporary, images, 0, quality, 4)
-        if (size := path.stat().st_size) <= MOST_BYTES:
-            return size
-    raise HobbleError(
-        f"{path}: the picture has {size} bytes at the lowest quality. At most {MOST_BYTES} are allowed. "
-        "Make SIZE in films.py smaller"
-    )
+    with atomic_path(Path(path)) as temporary:
+        _save_webp(temporary, put_side_by_side(*halves), 0, PICTURE_QUALITY, 4)
+    return Path(path).stat().st_size
 
 
 def put_side_by_side(healthy: Sequence[Picture], hurt: Sequence[Picture]) -> list[Image.Image]:

@@ -16,9 +16,10 @@ from pydantic import Field
 
 from hobble.channels.shown import shown_names
 from hobble.core.files import Json
-from hobble.core.section import PositiveFloat
+from hobble.core.section import PositiveFloat, Section
 from hobble.measures.compare import ComparisonAddition, ConfigurationResults
-from hobble.measures.measure import Cost, Measure, SampleOptions
+from hobble.measures.measure import Cost, Measure
+from hobble.measures.shown import Records, chart, table, words
 from hobble.report.parts import (
     Chart,
     ChartGroup,
@@ -37,7 +38,6 @@ from hobble.report.parts import (
     marker_trace,
     ordered_axis,
     reference_line,
-    shows_something,
     with_order,
 )
 from hobble.runtime.options import Runtime
@@ -46,7 +46,7 @@ if TYPE_CHECKING:
     from hobble.report.gather import ReportMaterial
 
 
-class Options(SampleOptions):
+class Options(Section):
     """The keys of this measurement in the section `evaluation`."""
 
     # 3 s are enough. With 4 s, the mean effects on pose and speed differ by only 1 % (configuration `limp`).
@@ -56,11 +56,11 @@ class Options(SampleOptions):
 MEASURE = Measure(
     name="injury",
     module=__name__,
-    inputs=("weights", "clips", "summaries"),
+    inputs=("weights",),
     options=Options,
     runtime=tuple(Runtime.model_fields),
     channel="injury",
-    cost=Cost(mb_per_1000_frames=14, seconds_per_1000_frames=0.2, least_minutes=60),
+    cost=Cost(memory_mb=600, least_minutes=60),
 )
 Rows = Sequence[Mapping[str, Any]]  # rows of injury.json
 LINK_KEYS = ("link", "first", "second")  # keys whose values are labels of links
@@ -71,9 +71,8 @@ COLOURS = ("@accent", "@g2", "@g3", "@g4", "@g5", "@g0")  # of the lines in a ch
 HOLLOW = {"symbol": "circle-open", "size": 8, "line": {"width": 1.2}}
 STRIP_WIDTH, STRIP_HEIGHT = 110.0, 205.0  # cm between the figures of a strip
 SIDES = (("left", "@accent"), ("right", "@g2"))  # side of the body, colour
-# A small chart: its name, title and unit; its lines as (key of a row, label, colour); the least length of the
-# vertical axis; whether this axis starts at 0.
-Panel = tuple[str, str, str, Sequence[tuple[str, str, str]], float, bool]
+# A small chart: its name, title and unit; its lines as (key of a row, label, colour).
+Panel = tuple[str, str, str, Sequence[tuple[str, str, str]]]
 
 
 def _both_sides(key: str) -> list[tuple[str, str, str]]:
@@ -82,17 +81,21 @@ def _both_sides(key: str) -> list[tuple[str, str, str]]:
 
 POSE = [("from_healthy", "from healthy", "@accent"), ("from_worst", "from severity 10", "@muted")]
 LEAN = [("lean_forward", "forward", "@accent"), ("lean_left", "to the left", "@g2")]
-ROUGH = [("largest_acceleration", "joint", "@accent")]
 PANELS: tuple[Panel, ...] = (
-    ("pose", "Pose", "cm", POSE, 2.0, True),
-    ("speed", "Speed", "cm/s", [("speed", "speed", "@accent")], 20.0, True),
-    ("stance", "Time on each foot", "share", _both_sides("stance"), 0.2, False),
-    ("step", "Step length", "cm", _both_sides("step"), 15.0, False),
-    ("knee", "Range of the knee", "degrees", _both_sides("knee"), 15.0, False),
-    ("arm", "Swing of the arm", "degrees", _both_sides("arm"), 15.0, False),
-    ("lean", "Lean of the trunk", "degrees", LEAN, 6.0, False),
-    ("hip", "Height of the hips", "cm", [("hip_height", "hips", "@accent")], 5.0, False),
-    ("rough", "Largest acceleration of a joint", "cm per frame²", ROUGH, 2.0, True),
+    ("pose", "Pose", "cm", POSE),
+    ("speed", "Speed", "cm/s", [("speed", "speed", "@accent")]),
+    ("stance", "Time on each foot", "share", _both_sides("stance")),
+    ("step", "Step length", "cm", _both_sides("step")),
+    ("knee", "Range of the knee", "degrees", _both_sides("knee")),
+    ("arm", "Swing of the arm", "degrees", _both_sides("arm")),
+    ("lean", "Lean of the trunk", "degrees", LEAN),
+    ("hip", "Height of the hips", "cm", [("hip_height", "hips", "@accent")]),
+    (
+        "rough",
+        "Largest acceleration of a joint",
+        "cm per frame²",
+        [("largest_acceleration", "joint", "@accent")],
+    ),
 )
 # Columns of the table of responses: label, and how the value is found in a response.
 RESPONSE_COLUMNS = {
@@ -106,12 +109,6 @@ RESPONSE_COLUMNS = {
     "spearman_from_healthy": "ρ of pose",
     "spearman_speed": "ρ of speed",
 }
-INTRODUCTION = (
-    "The character walks or jogs while the severity of one link (the piece of the body between two "
-    "neighbouring joints) rises from 0 to 10 and falls again. Each value is a mean over the links that were "
-    "hurt in training, except the share that a classifier recognises. ρ is Spearman's rank correlation: "
-    "1 means that the measure always rises with severity, −1 that it always falls, 0 that it has no trend."
-)
 # Key of a summary -> label of its row in the comparison.
 ROW_LABELS = {
     "from_healthy_cm": "distance from the healthy walk at severity 10, cm per joint",
@@ -124,7 +121,6 @@ ROW_LABELS = {
     "after_healing_cm": "remaining distance after healing, cm per joint",
     "hysteresis_cm": "difference between rising and falling severity, cm per joint",
     "acceleration_share": "largest acceleration, divided by the healthy walk's",
-    "clip_acceleration_share": "largest acceleration, divided by the captured clips'",
 }
 
 
@@ -151,9 +147,9 @@ def compared(all_measured: Sequence[ConfigurationResults], published: Json) -> C
 
 def compared_section(compared: Compared) -> PageSection:
     """A table of means. It is empty if no configuration has a character that can be hurt."""
-    table = injury_table(compared)
-    introduction = Paragraph(INTRODUCTION) if table else None
-    parts = [SectionPart(0, introduction), SectionPart(10, table, open=True, short=True)]
+    means = injury_table(compared)
+    introduction = Paragraph(words("injury.introduction")) if means else None
+    parts = [SectionPart(0, introduction), SectionPart(10, means, open=True, short=True)]
     return PageSection("injury", parts, title="Injury response", order=20)
 
 
@@ -209,29 +205,26 @@ def with_spoken_links(found: Json, material: ReportMaterial) -> dict[str, Any]:
 def _parts(found: Json, material: ReportMaterial) -> list[SectionPart]:
     """The parts of the section. found: injury.json, with links renamed."""
     name, published = material.name, material.published["severities"]
-    rows, responses = (found.get(key) or [] for key in ("rows", "responses"))
-    sweep, thresholds = (found.get(key) or [] for key in ("second_sweep", "second_thresholds"))
-    untrained = {r["link"] for r in responses if not _trained(r)}
-    words = {"from_worst": "from severity 10"}
-    all_rows = table_of_rows(f"{name}-injury", rows, "Every walk and jog at rising severity", words)
-    both = (
-        "Two injuries: where the second begins to show, has its whole effect, and shows more than the first"
-    )
-    jogs = found.get("into_a_jog") or ()
+    rows, responses, jogs, sweep = (found[k] for k in ("rows", "responses", "into_a_jog", "second_sweep"))
+    untrained = {r["link"] for r in responses if not r["trained"]}
+
+    def all_of(key: str, records: Records) -> Table:
+        return table(f"{name}-{key}", records, title=words(f"injury.{key}"))
+
+    thresholds = all_of("second-thresholds", found["second_thresholds"])
+    charts = [divided_chart(found["divided"]), jog_chart(jogs, untrained)]
     return [
         SectionPart(0, ChartPair(effect_charts(responses))),
         SectionPart(10, response_table(name, responses)),
-        SectionPart(15, strip_chart(found.get("strips") or (), material.network["skeleton"])),
-        SectionPart(20, sweep_charts(rows, found.get("falling") or (), untrained) if rows else None),
+        SectionPart(15, strip_chart(found["strips"], material.network["skeleton"])),
+        SectionPart(20, sweep_charts(rows, found["falling"], untrained) if rows else None),
         SectionPart(25, range_table(name, rows, untrained, published["one_link"]), open=True, short=True),
         SectionPart(42, sweep_chart(sweep, published)),
-        SectionPart(45, table_of_rows(f"{name}-second-thresholds", thresholds, both), open=True, short=True),
-        SectionPart(51, table_of_rows(f"{name}-second-sweep", sweep, "Every step of a second injury")),
-        SectionPart(60, ChartPair([divided_chart(found.get("divided") or ()), jog_chart(jogs, untrained)])),
-        SectionPart(
-            65, table_of_rows(f"{name}-into-a-jog", jogs, "Every walk that becomes a jog", texts=["link"])
-        ),
-        SectionPart(70, all_rows),
+        SectionPart(45, thresholds, open=True, short=True),
+        SectionPart(51, all_of("second-sweep", sweep)),
+        SectionPart(60, ChartPair(charts)),
+        SectionPart(65, all_of("into-a-jog", jogs)),
+        SectionPart(70, all_of("injury", rows)),
     ]
 
 
@@ -259,14 +252,8 @@ def strip_chart(strips: Rows, skeleton: Json) -> Chart | None:
         figures = [t for p, x in zip(strip["poses"], places, strict=True) for t in figure(p, x)]
         options[first + strip["link"]] = [*figures, {**label, "showlegend": False, "hoverinfo": "skip"}]
     bare = {"showgrid": False, "zeroline": False, "showticklabels": False}
-    caption = (
-        "Poses of the walk at the severity below each, from the side (walking to the right) and, above, "
-        "from the front. They are means over gait cycles, all at the phase at which the last differs most "
-        "from the first. Ferre et al. show such strips in their Figures 3 (one link at 0, 4, 7 and 10) and "
-        "4 (a second injury at 0 and 5 over a first at 5)."
-    )
     layout = {"xaxis": {**bare, "title": {"text": "severity"}}, "yaxis": {**bare, "scaleanchor": "x"}}
-    return Chart("strips", "Poses at rising severity", caption, (), layout, 520, "Injury", options)
+    return chart("strips", layout=layout, height=520, choose="Injury", options=options)
 
 
 def range_table(name: str, rows: Rows, untrained: Collection[str], ranges: Json) -> Table | None:
@@ -285,18 +272,14 @@ def range_table(name: str, rows: Rows, untrained: Collection[str], ranges: Json)
         whole = worst - healthy
         return [(sweep[end][key] - healthy) / whole if abs(whole) > 1e-9 else None for end in ends]
 
-    table = [
+    shown = [
         [gait, link, *shares(sweep, "from_healthy"), *shares(sweep, "speed")]
         for (gait, link), sweep in sweeps.items()
         if {0, 10, *ends} <= set(sweep)
     ]
     columns = [Column("gait"), Column("link")]
     columns += [Column.number(f"{what} at {end}", 2) for what in ("pose", "speed") for end in ends]
-    title = (
-        "Shares of the whole change at the ends of the ranges that Ferre et al. saw: 0 to 3 little change, "
-        "4 to 6 speed and pose change, 7 to 10 as in the clips"
-    )
-    return Table(f"{name}-injury-ranges", columns, table, title) if table else None
+    return Table(f"{name}-injury-ranges", columns, shown, words("injury.ranges")) if shown else None
 
 
 def sweep_chart(rows: Rows, published: Json) -> Chart | None:
@@ -321,44 +304,17 @@ def sweep_chart(rows: Rows, published: Json) -> Chart | None:
                     words = key.replace("speed_of_", "only the ")
                     options[option].append(_line(words, of_pair, key, colour, dash="dot", width=1.4))
             layouts[option] = {"shapes": [_threshold(x) for x in lines[severity]], "yaxis": axis(shown[0][1])}
-    caption = (
-        "The character walks with one injury while the severity of a second one rises. Pose: distance from "
-        "the walk with only the first injury, and from that with only the second. Dotted vertical lines are "
-        "the thresholds that Ferre et al. (2019) saw: over a first injury at 5, both are blended until the "
-        "second reaches 5; over one at 10, the second begins to show at 3 and has its whole effect at 8. At "
-        "equal severities, they saw the speed of the faster of both."
-    )
+    if not options:
+        return None
     layout = {"xaxis": axis("severity of the second injury", dtick=1), "yaxis": axis("cm")}
-    chart = Chart(
-        "second-sweep", "A second injury, swept", caption, (), layout, 340, "Injuries", options, layouts
-    )
-    return chart if options else None
+    menu = {"choose": "Injuries", "options": options, "option_layouts": layouts}
+    return chart("second-sweep", layout=layout, **menu)
 
 
 def _threshold(severity: float) -> dict[str, Any]:
     """A dotted vertical line."""
     (shape,) = reference_line(severity, "")["shapes"]
     return shape
-
-
-def _trained(response: Mapping[str, Any]) -> bool:
-    """Whether the link of a response was hurt in training."""
-    return response.get("trained", True)
-
-
-def table_of_rows(
-    key: str, rows: Rows, title: str, words: Mapping[str, str] | None = None, texts: Collection[str] = ()
-) -> Table:
-    """A table with all values of the rows.
-
-    words: key of a row -> heading of its column, if it is not the key itself. texts: keys of texts, which may
-    be missing in the first row.
-    """
-    columns = {}
-    for name, value in rows[0].items() if rows else ():
-        heading = (words or {}).get(name, name.replace("_", " "))
-        columns[name] = Column(heading) if isinstance(value, str) or name in texts else Column.number(heading)
-    return Table.of(key, columns, rows, title)
 
 
 def sweep_charts(rows: Rows, falling: Rows = (), untrained: Collection[str] = ()) -> ChartGroup:
@@ -377,56 +333,27 @@ def sweep_charts(rows: Rows, falling: Rows = (), untrained: Collection[str] = ()
         return out
 
     rising_rows = by_option(sorted(rows, key=lambda row: row["link"] in untrained))
-    charts = [_panel_chart(panel, rows, rising_rows, by_option(falling)) for panel in PANELS]
-    caption = (
-        "The character moves on while the severity of one link rises from 0 to 10 and falls again. Each "
-        "point is measured over whole gait cycles at one severity. A smooth curve means that the walk "
-        "changes gradually. A gap between left and right is a limp. A jump between neighbouring points "
-        "means that the network switches between two gaits. The first chart shows how far the pose is from "
-        "the healthy walk and from the walk at severity 10: the mean distance of the joints at the same "
-        "phase. Dotted lines divide the ranges that Ferre et al. (2019) saw: little change to 3, then a "
-        "change of speed and pose, and from 7 on the walk of the clips."
-    )
-    if falling:
-        caption += " Dotted lines show falling severity."
-    if untrained:
-        caption += " Links that were never hurt in training show how much a healthy walk varies."
-    return ChartGroup("sweeps", "One link at rising severity", caption, charts, "Link and gait")
-
-
-def _panel_chart(
-    panel: Panel, rows: Rows, rising_rows: Mapping[str, Rows], falling_rows: Mapping[str, Rows]
-) -> Chart:
-    """The small chart of an entry of PANELS.
-
-    rows: the rows of all options of the menu, for the range of the axis. rising_rows, falling_rows: option of
-    the menu -> its rows of rising and of falling severity.
-    """
-    name, title, unit, lines, least_range, from_zero = panel
-    options: dict[str, list[Trace]] = {}
-    for option, rising in rising_rows.items():
-        options[option] = [
-            _line(label, rising, key, colour, mode="lines+markers") | {"marker": {"size": 5}}
-            for key, label, colour in lines
-        ] + [
-            _line(f"{label}, healing", falling, key, colour, width=1.3, dash="dot", showlegend=False)
-            for key, label, colour in lines
-            if (falling := falling_rows.get(option, ()))
-        ]
-    layout = {
-        "xaxis": axis("severity", dtick=2, range=[-0.3, 10.3]),
-        "yaxis": axis(unit),
-        "showlegend": len(lines) > 1,
-        "shapes": [_threshold(x) for x in (3.5, 6.5)] if name in ("pose", "speed") else [],
-    }
-    keys = [key for key, *_ in lines]
-    ranges = {
-        option: {"yaxis": {"range": y_range(rows, rising[0]["gait"], keys, least_range, from_zero)}}
-        for option, rising in rising_rows.items()
-    }
-    return Chart(
-        f"sweep-{name}", title, "", layout=layout, height=230, options=options, option_layouts=ranges
-    )
+    falling_rows, charts = by_option(falling), []
+    for name, title, unit, lines in PANELS:
+        options: dict[str, list[Trace]] = {}
+        for option, rising in rising_rows.items():
+            options[option] = [
+                _line(label, rising, key, colour, mode="lines+markers") | {"marker": {"size": 5}}
+                for key, label, colour in lines
+            ] + [
+                _line(f"{label}, healing", healing, key, colour, width=1.3, dash="dot", showlegend=False)
+                for key, label, colour in lines
+                if (healing := falling_rows.get(option))
+            ]
+        layout = {
+            "xaxis": axis("severity", dtick=2, range=[-0.3, 10.3]),
+            "yaxis": axis(unit, rangemode="normal" if name == "lean" else "tozero"),
+            "showlegend": len(lines) > 1,
+            "shapes": [_threshold(x) for x in (3.5, 6.5)] if name in ("pose", "speed") else [],
+        }
+        charts.append(Chart(f"sweep-{name}", title, "", layout=layout, height=230, options=options))
+    caption = words("sweeps.caption", "sweeps.falling", *(["sweeps.untrained"] if untrained else []))
+    return ChartGroup("sweeps", words("sweeps.title"), caption, charts, "Link and gait")
 
 
 def _line(label: str, rows: Rows, key: str, colour: str, **more: Any) -> Trace:
@@ -435,84 +362,44 @@ def _line(label: str, rows: Rows, key: str, colour: str, **more: Any) -> Trace:
     return line_trace(label, x, y, colour, **more)
 
 
-def y_range(
-    rows: Rows, gait: str, keys: Sequence[str], least_range: float, from_zero: bool
-) -> list[float] | None:
-    """[lowest, highest] value of the vertical axis. It is the same for all links of a gait, to compare them.
-
-    keys: keys of a row whose values the chart shows. least_range: the axis is at least this long, so that
-    noise looks small. from_zero: whether the axis starts at 0. None if no row has a value.
-    """
-    values = [row[k] for row in rows if row["gait"] == gait for k in keys if row.get(k) is not None]
-    if not values:
-        return None
-    low, high = (0.0 if from_zero else min(values)), max(values)
-    # The empty space: 8 % of the range of the values, or more to reach `least_range`. An axis from 0 has all
-    # of it at the top; another axis has one half at each end.
-    spare = max(least_range - (high - low), 0.08 * (high - low))
-    return [low if from_zero else low - spare / 2, high + spare / (1 if from_zero else 2)]
-
-
 def effect_charts(responses: Rows) -> list[Chart]:
-    """Two charts of each link at severity 10: the change of the pose, and the remaining speed."""
-    pose = "Distance from the healthy walk at the same phase, mean over joints."
-    speed = "Speed at severity 10, divided by the healthy speed."
-    if any(not _trained(r) for r in responses):
-        hollow = " Hollow dots are links that were never hurt in training."
-        pose += (
-            f"{hollow} They have no effect, so they show how much healthy walks differ. If a filled dot is "
-            "not to the right of the hollow dots, its link has no effect either."
-        )
-        speed += hollow
-    of_pose, of_speed = (
-        ("injury-pose", "Change of the pose", pose),
-        ("injury-speed", "Remaining speed", speed),
-    )
-    charts = [
-        _effect_chart(responses, "from_healthy_cm", of_pose, "cm per joint at severity 10", 2.0),
-        _effect_chart(responses, "speed_share", of_speed, "share of the healthy speed", 1.0),
-    ]
-    return [chart for chart in charts if shows_something(chart)]
+    """Two charts of each link at severity 10: the change of the pose, and the remaining speed.
 
-
-def _effect_chart(
-    responses: Rows, key: str, texts: tuple[str, str, str], axis_title: str, least_range: float
-) -> Chart:
-    """A dot for each link and gait. texts: name, title and caption of the chart."""
-    traces: list[Trace] = []
-    known = [r for r in responses if r.get(key) is not None]
-    for (gait, colour), hurt in product(GAIT_COLOURS.items(), (True, False)):
-        if dots := [r for r in known[::-1] if r["gait"] == gait and _trained(r) is hurt]:
-            name = gait if hurt else f"{gait}, {UNTRAINED}"
-            marker = {"size": 9} if hurt else HOLLOW
-            x, y = [r[key] for r in dots], [r["link"] for r in dots]
-            hover = "%{y}: %{x:.2f}<extra>%{fullData.name}</extra>"
-            traces.append(marker_trace(name, x, y, {**marker, "color": colour}, hovertemplate=hover))
-    # Links that were hurt in training are at the top. Plotly counts from below, so the list is reversed.
-    from_top = sorted(responses, key=lambda r: not _trained(r))
-    links = list(dict.fromkeys(r["link"] for r in from_top))[::-1]
-    furthest = max((r[key] for r in known), default=0.0)
-    layout = {
-        "xaxis": axis(axis_title, range=[0, 1.08 * max(least_range, furthest)]),
-        "yaxis": ordered_axis(links, type="category"),
-    }
-    return Chart(*texts, traces, layout, 150 + 21 * len(links))
+    A dot for each link and gait. Links that were hurt in training are at the top.
+    """
+    more = ["hollow"] if any(not r["trained"] for r in responses) else []
+    from_top = sorted(responses, key=lambda r: not r["trained"])
+    links = list(dict.fromkeys(r["link"] for r in from_top))[::-1]  # plotly counts from below
+    charts = []
+    for name, key, label, least_range in (
+        ("injury-pose", "from_healthy_cm", "cm per joint at severity 10", 2.0),
+        ("injury-speed", "speed_share", "share of the healthy speed", 1.0),
+    ):
+        known = [r for r in responses[::-1] if r[key] is not None]
+        traces: list[Trace] = []
+        for (gait, colour), hurt in product(GAIT_COLOURS.items(), (True, False)):
+            if dots := [r for r in known if r["gait"] == gait and r["trained"] is hurt]:
+                marker = {"size": 9} if hurt else HOLLOW
+                x, y = [r[key] for r in dots], [r["link"] for r in dots]
+                hover = {"hovertemplate": "%{y}: %{x:.2f}<extra>%{fullData.name}</extra>"}
+                title = gait if hurt else f"{gait}, {UNTRAINED}"
+                traces.append(marker_trace(title, x, y, {**marker, "color": colour}, **hover))
+        furthest = max((r[key] for r in known), default=0.0)
+        layout = {
+            "xaxis": axis(label, range=[0, 1.08 * max(least_range, furthest)]),
+            "yaxis": ordered_axis(links, type="category"),
+        }
+        if traces:
+            charts.append(chart(name, traces, layout, 150 + 21 * len(links), more=more))
+    return charts
 
 
 def response_table(name: str, responses: Rows) -> Table:
     """A row for each gait and link. name: of the configuration."""
-    columns = {
-        "gait": Column("gait"),
-        "link": Column("link"),
-        "trained": Column("in training", lambda v: "hurt" if v else "never hurt"),
-        **{key: Column.number(label) for key, label in RESPONSE_COLUMNS.items()},
-    }
-    records = [
-        {"trained": True, **r} | {f"spearman_{key}": rho for key, rho in (r.get("spearman") or {}).items()}
-        for r in responses
-    ]
-    title = "Every link at severity 10, and the rank correlation of its effects with severity (Spearman's ρ)"
-    return Table.of(f"{name}-injury-responses", columns, records, title)
+    records = [r | {f"spearman_{key}": rho for key, rho in r["spearman"].items()} for r in responses]
+    heads = {"gait": "gait", "link": "link", "trained": "in training", **RESPONSE_COLUMNS}
+    show = {"trained": lambda hurt: "hurt" if hurt else "never hurt"}
+    return table(f"{name}-injury-responses", records, heads, words("injury.responses"), show)
 
 
 def divided_chart(rows: Rows) -> Chart | None:
@@ -533,33 +420,20 @@ def divided_chart(rows: Rows) -> Chart | None:
         link: [line(link, scale, colour) for scale, colour in zip(scales, COLOURS, strict=False)]
         for link in links
     }
-    smooth, layouts = "smoothness against range", {}
-    if all("largest_acceleration" in row for row in rows):
-        options[smooth] = []
-        for scale, colour in zip(scales, COLOURS, strict=False):
-            of_scale = [row for row in rows if row["scale"] == scale]
-            x = [max(r["from_healthy_cm"] for r in of_scale if r["link"] == link) for link in links]
-            y = [max(r["largest_acceleration"] for r in of_scale if r["link"] == link) for link in links]
-            hover = {"text": links, "hovertemplate": "%{text}: %{x:.1f} cm, %{y:.2f}<extra></extra>"}
-            dots = {"size": 9, "color": colour}
-            options[smooth].append(marker_trace(f"divided by {scale:g}", x, y, dots, **hover))
-        axes = {
-            "xaxis": axis("largest change of the pose, cm"),
-            "yaxis": axis("largest acceleration, cm/frame²"),
-        }
-        layouts[smooth] = axes
-    return Chart(
-        "divided",
-        "Severities divided by a number",
-        "As in an experiment of Ferre et al., the severities are divided by a number before the network "
-        "gets them. Each line belongs to one number. Its height is the distance of the pose from the "
-        "healthy walk. Smoothness against range: a dot for each link, with the largest change of the pose "
-        "and the largest acceleration of a joint while severity rises. Division makes both smaller.",
-        layout={"xaxis": axis("severity", dtick=2), "yaxis": axis("cm per joint", rangemode="tozero")},
-        choose="Link",
-        options=options,
-        option_layouts=layouts,
-    )
+    smooth = "smoothness against range"
+    options[smooth] = []
+    for scale, colour in zip(scales, COLOURS, strict=False):
+        x, y = (
+            [max(row[key] for row in rows if (row["link"], row["scale"]) == (link, scale)) for link in links]
+            for key in ("from_healthy_cm", "largest_acceleration")
+        )
+        hover = {"text": links, "hovertemplate": "%{text}: %{x:.1f} cm, %{y:.2f}<extra></extra>"}
+        dots = {"size": 9, "color": colour}
+        options[smooth].append(marker_trace(f"divided by {scale:g}", x, y, dots, **hover))
+    axes = ("largest change of the pose, cm", "largest acceleration, cm/frame²")
+    layouts = {smooth: dict(zip(("xaxis", "yaxis"), map(axis, axes), strict=True))}
+    layout = {"xaxis": axis("severity", dtick=2), "yaxis": axis("cm per joint", rangemode="tozero")}
+    return chart("divided", layout=layout, choose="Link", options=options, option_layouts=layouts)
 
 
 def jog_chart(rows: Rows, untrained: Collection[str] = ()) -> Chart | None:
@@ -584,89 +458,48 @@ def jog_chart(rows: Rows, untrained: Collection[str] = ()) -> Chart | None:
             options[option].append(line_trace(UNTRAINED, [1, 10], mean, "@muted", dash="dot", width=1.4))
     if not any(options.values()):
         return None
-    caption = (
-        "The character walks hurt, then jogs and is still hurt. Pose: how far its jog is from the healthy "
-        "jog. Dotted vertical lines divide what Ferre et al. (2019) saw of a link that hurt in no run of "
-        "the training: little change to 3, from 4 to 7 the injury at nearly the speed of a run, from 8 on a "
-        "slower run."
-    )
-    if untrained:
-        caption += (
-            " The dotted line is the mean of links that were never hurt in training. They have no effect, so "
-            "the line shows how much two healthy jogs differ. If the line of a link is not above it, the "
-            "injury does not show in the jog."
-        )
     layout = {
         "xaxis": axis("severity", dtick=1),
         "yaxis": {"rangemode": "tozero"},
         "showlegend": True,
         "shapes": [_threshold(x) for x in (3.5, 7.5)],
     }
-    return Chart("into-a-jog", "From a hurt walk into a jog", caption, (), layout, 420, "Shown", options)
+    more = ["untrained"] if untrained else []
+    return chart("into-a-jog", layout=layout, height=420, choose="Shown", options=options, more=more)
 
 
 def injury_hints(found: Json) -> Iterator[Hint]:
     """Whether and how much each hurt link changes the walk, and whether the walk recovers.
 
     Only links that were hurt in training are judged. Their changes are compared with the drift of a healthy
-    walk, which is how much it changes although nothing hurts.
+    walk, which is how much a walk changes with the severity of a link that was never hurt in training.
     """
     responses = [r for r in found.get("responses") or () if r["gait"] == "walk"]
-    trained = [r for r in responses if _trained(r)]
+    trained = [r for r in responses if r["trained"]]
     if not trained:
         return
-    drift, drift_at_end = (_drift(responses, key) for key in ("from_healthy_cm", "after_healing_cm"))
-    if drift > 2:
-        yield Hint(
-            "warn",
-            f"Even a healthy walk changes, by {format_number(drift)} cm per joint.",
-            "So the effect of severity is hard to measure. Train for longer, or measure for longer.",
-        )
-    unchanged = [r["link"] for r in trained if (r.get("from_healthy_cm") or 0) < max(0.5, 2 * drift)]
+
+    def drift(key: str) -> float:
+        return float(np.mean([r[key] for r in responses if not r["trained"]] or [0.0]))
+
+    def named(links: Sequence[str]) -> str:
+        return ", ".join(links[:4]) + (" …" if len(links) > 4 else "")
+
+    limit = drift("from_healthy_cm")
+    if limit > 2:
+        head = f"Even a healthy walk changes, by {format_number(limit)} cm per joint."
+        yield Hint("warn", head, words("injury.drifts"))
+    unchanged = [r["link"] for r in trained if r["from_healthy_cm"] < max(0.5, 2 * limit)]
     if unchanged:
-        yield Hint(
-            "note",
-            f"{len(unchanged)} of {_plural(len(trained), 'link')} hardly "
-            f"{'changes' if len(unchanged) == 1 else 'change'} the walk at severity 10",
-            "(by less than half a centimetre per joint, or by less than twice the change of a healthy walk): "
-            f"{_first_four(unchanged)}. Add clips in which they hurt.",
-        )
-    not_healed = [
-        r["link"]
-        for r in trained
-        if r["link"] not in unchanged and (r.get("after_healing_cm") or 0) > max(2, 2 * drift_at_end)
-    ]
-    if not_healed:
-        yield Hint(
-            "note",
-            f"The walk does not recover after these links have healed: {_first_four(not_healed)}.",
-            "The character keeps limping although nothing hurts any more.",
-        )
+        head = f"{len(unchanged)} of {len(trained)} hurt links hardly change the walk at severity 10"
+        yield Hint("note", head, words("injury.unchanged", links=named(unchanged)))
+    at_end = max(2, 2 * drift("after_healing_cm"))
+    sick = [r["link"] for r in trained if r["link"] not in unchanged and r["after_healing_cm"] > at_end]
+    if sick:
+        head = f"The walk does not recover after these links have healed: {named(sick)}."
+        yield Hint("note", head, "The character keeps limping although nothing hurts any more.")
     if not unchanged:
         low, high = (format_number(f(r["from_healthy_cm"] for r in trained)) for f in (min, max))
-        yield Hint(
-            "good",
-            f"{len(trained)} of {_plural(len(responses), 'link')} {'was' if len(trained) == 1 else 'were'} "
-            "hurt in training.",
-            f"At severity 10, {'it' if len(trained) == 1 else 'each of them'} changes the walk by "
-            f"{low if low == high else f'{low} to {high}'} cm per joint. A link is the piece of the body "
-            "between two neighbouring joints.",
-        )
-
-
-def _drift(responses: Rows, key: str) -> float:
-    """The drift of a healthy walk: the mean of `key` over links that were never hurt in training, cm.
-
-    These links have no effect, so a walk that changes with their severity only drifts. 0 if there are none.
-    """
-    values = [r[key] for r in responses if not _trained(r) and r.get(key) is not None]
-    return float(np.mean(values)) if values else 0.0
-
-
-def _first_four(links: Sequence[str]) -> str:
-    return ", ".join(links[:4]) + (" …" if len(links) > 4 else "")
-
-
-def _plural(count: int, word: str) -> str:
-    """A count and its noun, in the plural unless the count is 1."""
-    return f"{count} {word}{'' if count == 1 else 's'}"
+        head = f"{len(trained)} of {len(responses)} links were hurt in training."
+        cm = low if low == high else f"{low} to {high}"
+        yield Hint("good", head, words("injury.changed", cm=cm))

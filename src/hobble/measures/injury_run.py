@@ -24,7 +24,6 @@ from hobble.channels.injury.shown import link_index_by_part
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 from hobble.measures.measure import MeasureInputs, Outcome
-from hobble.measures.sample import captured_motion, sample_to_measure, with_sample
 from hobble.measures.walks import (
     FPS,
     SPEEDS,
@@ -42,7 +41,6 @@ from hobble.measures.walks import (
 )
 from hobble.models.load import load_network
 from hobble.models.network import Network
-from hobble.rows.clip_rows import Captured
 from hobble.runtime.options import Runtime
 
 INJURY = "injury"  # the channel
@@ -73,7 +71,6 @@ SUMMARISED = (
     "settle_seconds",
     "heal_seconds",
     "acceleration_share",
-    "clip_acceleration_share",
 )
 Rows = list[dict[str, Any]]
 Injury = Mapping[str, float]  # link -> severity
@@ -131,7 +128,6 @@ def walk_crowd(
 
 def injury_response(
     network: Network,
-    motion: Iterable[Captured] = (),
     *,
     configuration: str,
     runtime: Runtime,
@@ -140,12 +136,11 @@ def injury_response(
 ) -> dict[str, Any]:
     """The content of injury.json; docs/artefacts.md explains its keys.
 
-    motion: the captured clips; their largest accelerations are compared with the character's. configuration:
-    its name. seconds: time at each severity. links: the links to hurt, by default all.
+    configuration: its name. seconds: time at each severity. links: the links to hurt, by default all.
     """
     links = list(links or network.channels[INJURY])
     trained = [link for link in links if link in network.trained_labels(INJURY)]
-    rows, falling, responses, strips = _sweep(network, links, trained, motion, seconds, runtime)
+    rows, falling, responses, strips = _sweep(network, links, trained, seconds, runtime)
     sweep, thresholds, second_strips = second_sweep(network, trained, seconds, runtime)
     return {
         "configuration": configuration,
@@ -172,12 +167,10 @@ def _sweep(
     network: Network,
     links: Sequence[str],
     trained: Sequence[str],
-    motion: Iterable[Captured],
     seconds: float,
     runtime: Runtime,
 ) -> tuple[Rows, Rows, Rows, Rows]:
     """`rows` (rising severity), `falling`, `responses` and the first `strips` of `injury_response`."""
-    captured = largest_accelerations(motion, network)
     figures = [(gait, link) for gait in GAITS for link in links]
 
     def crowd(*severities: tuple[float, float]) -> Crowd:
@@ -197,18 +190,7 @@ def _sweep(
         falling += rows[WORST + 1 :]
         largest = float(gradual.walks.acceleration[int(gradual.walks.starts[1]) :, figure].max())
         response = respond(rows, largest, _settling_times(at_once, figure))
-        # If this link hurts in no captured motion, all captured motion in this gait is compared.
-        of_clips = captured.get((gait, link), captured.get((gait, None)))
-        whose = "link" if (gait, link) in captured else "gait" if of_clips else None
-        share = round(response["largest_acceleration"] / of_clips, 5) if of_clips else None
-        responses.append(
-            {"gait": gait, "link": link, "trained": link in trained, **response}
-            | {
-                "clip_acceleration": of_clips,
-                "clip_acceleration_of": whose,
-                "clip_acceleration_share": share,
-            }
-        )
+        responses.append({"gait": gait, "link": link, "trained": link in trained, **response})
         if gait == "walk" and link in trained:
             cycles = [gradual.cycle(1 + severity, figure) for severity in STRIP_SEVERITIES]
             strips.append({"link": link, "first": None, **strip_of(cycles), "severities": STRIP_SEVERITIES})
@@ -240,7 +222,7 @@ def sweep_rows(crowd: Crowd, figure: int, gait: str, link: str) -> Rows:
             **{f"from_{n}": crowd.distance(1 + step, figure, cycles[i]) for n, i in references.items()},
             "largest_acceleration": float(crowd.walks.acceleration[span, figure].max()),
         }
-        rows.append({k: round(v, 5) if isinstance(v, float) else v for k, v in row.items()})
+        rows.append(_rounded(row))
     return rows
 
 
@@ -260,17 +242,18 @@ def respond(rows: Rows, largest: float, times: Mapping[str, float | None]) -> di
     labels = ("gait", "link", "direction", "severity", "from_rising")
     measures = {name: [row[name] for row in rows] for name in healthy if name not in labels}
     spread = healthy["from_healthy"]
-    return {
+    found = {
         "spearman": {n: spearman(SEVERITIES, values[: WORST + 1]) for n, values in measures.items()},
         "spearman_falling": {n: spearman(SEVERITIES[::-1], values[WORST:]) for n, values in measures.items()},
-        "from_healthy_cm": round(worst["from_healthy"] - spread, 5),
-        "after_healing_cm": round(healed["from_healthy"] - spread, 5),
-        "hysteresis_cm": round(max(row["from_rising"] for row in rows[WORST + 1 :]) - spread, 5),
-        "speed_share": round(worst["speed"] / healthy["speed"], 5) if healthy["speed"] > 0 else None,
+        "from_healthy_cm": worst["from_healthy"] - spread,
+        "after_healing_cm": healed["from_healthy"] - spread,
+        "hysteresis_cm": max(row["from_rising"] for row in rows[WORST + 1 :]) - spread,
+        "speed_share": worst["speed"] / healthy["speed"] if healthy["speed"] > 0 else None,
         **times,
-        "largest_acceleration": round(largest, 5),
-        "acceleration_share": round(largest / max(healthy["largest_acceleration"], 1e-9), 5),
+        "largest_acceleration": largest,
+        "acceleration_share": largest / max(healthy["largest_acceleration"], 1e-9),
     }
+    return _rounded(found)
 
 
 def _settling_times(crowd: Crowd, figure: int) -> dict[str, float | None]:
@@ -290,26 +273,6 @@ def _settling_times(crowd: Crowd, figure: int) -> dict[str, float | None]:
     settle = settling_seconds(distance[hurt_start:heal_start], healthy_cm, cycle_frames(phase[late_hurt]))
     heal = settling_seconds(distance[heal_start:end], hurt_cm, cycle_frames(phase[late_healed]))
     return {"settle_seconds": settle, "heal_seconds": heal}
-
-
-def largest_accelerations(
-    motion: Iterable[Captured], network: Network
-) -> dict[tuple[str, str | None], float]:
-    """(gait, link) -> largest acceleration of any joint in captured motion, cm per frame squared.
-
-    For (gait, link), only the motion in this gait in which this link hurts counts. For (gait, None), all
-    motion in this gait counts, hurt and healthy.
-    """
-    out: dict[tuple[str, str | None], float] = {}
-    for clip in motion:
-        hurts = dict(zip(network.channels[INJURY], clip.channels[INJURY].T > 0, strict=True))
-        for gait in GAITS:
-            in_gait = clip.gait[:, network.gaits.index(gait)] > 0.5
-            for link, frames in ((None, in_gait), *((k, in_gait & hurt) for k, hurt in hurts.items())):
-                if np.any(frames):
-                    highest = round(float(clip.acceleration[frames].max()), 5)
-                    out[gait, link] = max(highest, out.get((gait, link), 0.0))
-    return out
 
 
 def second_sweep(
@@ -352,6 +315,8 @@ def second_sweep(
             at = 1 + int(severity)
             only_second = crowd.cycle(at, alone[second])
             row = {
+                **labels,
+                "severity": float(severity),
                 "from_first_cm": crowd.distance(at, i, only_first) - crowd.distance(1, i, only_first),
                 "from_second_cm": crowd.distance(at, i, only_second)
                 - crowd.distance(at, alone[second], only_second),
@@ -359,9 +324,7 @@ def second_sweep(
                 "speed_of_first": speed_of_first,
                 "speed_of_second": crowd.speed(at, alone[second]),
             }
-            of_pair.append(
-                {**labels, "severity": float(severity), **{key: round(v, 5) for key, v in row.items()}}
-            )
+            of_pair.append(_rounded(row))
         rows += of_pair
         thresholds.append({**labels, **second_thresholds(of_pair, int(first_severity))})
         if first_severity == FIRST_SEVERITIES[0]:
@@ -426,15 +389,15 @@ def into_a_jog(
         row = {
             "link": link,
             "severity": severity,
-            "walk_speed": round(crowd.speed(1, i), 5),
-            "jog_speed": round(jog_speed, 5),
-            "reach_seconds": round(float(fast[0]) / FPS, 5) if len(fast) else None,
-            "walk_from_healthy_cm": round(walking, 5),
-            "jog_from_healthy_cm": round(jogging, 5),
-            "kept": round(jogging / walking, 5) if walking > LEAST_EFFECT_CM else None,
-            "largest_acceleration": round(float(walks.acceleration[start : start + frames, i].max()), 5),
+            "walk_speed": crowd.speed(1, i),
+            "jog_speed": jog_speed,
+            "reach_seconds": float(fast[0]) / FPS if len(fast) else None,
+            "walk_from_healthy_cm": walking,
+            "jog_from_healthy_cm": jogging,
+            "kept": jogging / walking if walking > LEAST_EFFECT_CM else None,
+            "largest_acceleration": float(walks.acceleration[start : start + frames, i].max()),
         }
-        out.append(row)
+        out.append(_rounded(row))
     return out
 
 
@@ -460,17 +423,22 @@ def divided_severities(network: Network, links: Sequence[str], seconds: float, r
                     "scale": divisor,
                     "link": link,
                     "severity": severity,
-                    "from_healthy_cm": round(crowd.distance(stretch, i, healthy) - spread, 5),
-                    "speed_share": round(crowd.speed(stretch, i) / max(speed, 1e-9), 5),
-                    "largest_acceleration": round(float(crowd.acceleration(stretch, i).max()), 5),
+                    "from_healthy_cm": crowd.distance(stretch, i, healthy) - spread,
+                    "speed_share": crowd.speed(stretch, i) / max(speed, 1e-9),
+                    "largest_acceleration": float(crowd.acceleration(stretch, i).max()),
                 }
-                out.append(row)
+                out.append(_rounded(row))
     return out
 
 
 def _frames(share: float, seconds: float) -> int:
     """Length in frames of a stretch that lasts `share` times `seconds`; at least 4."""
     return max(4, round(share * seconds * FPS))
+
+
+def _rounded(row: Mapping[str, Any]) -> dict[str, Any]:
+    """The row with its numbers rounded to five decimals."""
+    return {key: round(value, 5) if isinstance(value, float) else value for key, value in row.items()}
 
 
 def _summary(responses: Rows) -> dict[str, dict[str, float | None]]:
@@ -491,10 +459,8 @@ def _summary(responses: Rows) -> dict[str, dict[str, float | None]]:
 
 def run(inputs: MeasureInputs, options: Any) -> Outcome:
     """The content of injury.json and of the tables in injury/."""
-    sample = sample_to_measure(inputs, options)
     result = injury_response(
         load_network(inputs.weights),
-        captured_motion(inputs.clips, sample),
         configuration=inputs.configuration,
         runtime=inputs.runtime,
         seconds=options.seconds,
@@ -502,4 +468,4 @@ def run(inputs: MeasureInputs, options: Any) -> Outcome:
     names = ("second_sweep", "second_thresholds", "into_a_jog", "divided")
     tables = {name: result[name] for name in names}
     tables["sweep"] = [*result["rows"], *result["falling"]]
-    return Outcome(with_sample(result, sample), tables, str(result["summary"]))
+    return Outcome(result, tables, str(result["summary"]))

@@ -6,7 +6,7 @@ is the content of limp.json.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
 from pydantic import Field
@@ -14,11 +14,11 @@ from pydantic import Field
 from hobble.channels.shown import shown_names
 from hobble.core.files import Json
 from hobble.core.section import PositiveFloat
-from hobble.measures.injury import table_of_rows, with_spoken_links
+from hobble.measures.injury import with_spoken_links
 from hobble.measures.measure import Cost, Measure, SampleOptions, sample_sentence
+from hobble.measures.shown import Records, chart, table, words
 from hobble.report.parts import (
     Chart,
-    Column,
     PageSection,
     Paragraph,
     SectionPart,
@@ -50,18 +50,22 @@ MEASURE = Measure(
     channel="injury",
     cost=Cost(memory_mb=600, mb_per_1000_frames=14, seconds_per_1000_frames=0.1, least_minutes=20),
 )
-Rows = Sequence[Mapping[str, Any]]  # rows of limp.json
 # The effects in the chart and in the table of captured limps.
 SHOWN_EFFECTS = ("speed", "stance", "step_hurt", "knee_hurt", "hip_hurt", "lean", "pelvis_drop", "arm_hurt")
 MOST_NAMED = 8  # a sentence lists the hurt links if there are at most this many
-RECOGNISERS = (
-    "Two recognisers judge each walk in windows of four seconds. The linear recogniser learnt from people's "
-    "strong limps. The graded recogniser learnt from milder versions of these limps, too."
-)
 RECOGNISED = {  # key of a row -> heading of its column
     "impaired": "share of windows in which the linear recogniser finds a limp",
     "named": "share of windows in which the graded recogniser finds a limp, and not on the wrong side",
     "wrong_side": "share of windows in which the graded recogniser finds a limp on the wrong side",
+}
+TOGETHER = {"column": "with", "walks": "walks", "speed_share": "speed, share of the same walk without injury"}
+EXAM = {
+    "clip": "clip",
+    "hurt": "hurt",
+    "compared_with": "healthy walk of",
+    "healthy": "distance of the healthy character",
+    "distance": "distance of the hurt character",
+    "nearer": "hurt character is nearer",
 }
 # Part of the body -> colour of its lines in the chart. All other parts, such as arms, have the colour @g0.
 COLOURS = {"hip": "@g1", "pelvis": "@g1", "thigh": "@g2", "shank": "@g3", "foot": "@g4", "back": "@g5"}
@@ -74,27 +78,40 @@ def section(found: Json, material: ReportMaterial) -> PageSection:
     """
     if not found.get("applies"):
         return PageSection("injury", [])
-    name, shown_name = material.name, shown_names(material.network["skeleton"])
+    shown_name = shown_names(material.network["skeleton"])
     found = with_spoken_links(found, material)
-    words = {"called": "linear recogniser", "graded": "graded recogniser", **RECOGNISED}
-    texts = ("gait", "link", "part", "side", "called", "graded")
+
+    def of(key: str, records: Records, heads: Mapping[str, str]) -> Table:
+        show = {"nearer": lambda nearer: "yes" if nearer else "no"}
+        return table(f"{material.name}-limp-{key}", records, heads, words(f"limp.{key}"), show)
+
+    def hurt(row: Mapping[str, Any], key: str) -> dict[str, Any]:
+        """The row with the hurt links (link -> severity) in words."""
+        return {**row, "hurt": ", ".join(f"{shown_name(link)} {value:g}" for link, value in row[key].items())}
+
+    sizes = found["sizes"]
+    size_heads = {key: key.replace("_", " ") for key in (sizes[0] if sizes else ())}
+    size_heads |= {"called": "linear recogniser", "graded": "graded recogniser", **RECOGNISED}
+    captured = [hurt(row, "hurt") for row in found["captured"]]
+    effects = {key: key.replace("_", " ") for key in SHOWN_EFFECTS}
+    exam = [hurt({**row, "distance": row["hurt"]}, "hurt_links") for row in found["held_out_limps"]]
     sources = hurt_motion_in_words(found["hurt_seconds"], shown_name) + sample_sentence(found)
-    all_sizes = table_of_rows(f"{name}-limp-sizes", found["sizes"], "Sizes of all effects", words, texts)
-    title = "Speed with a second injury in addition to the first"
-    return PageSection(
-        "injury",
-        [
-            SectionPart(1, Paragraph(sources)),
-            SectionPart(2, size_chart(found)),
-            SectionPart(3, Paragraph(RECOGNISERS)),
-            SectionPart(3, recognised_table(name, found["named"])),
-            SectionPart(5, other_channel_table(name, found["named_together"])),
-            SectionPart(4, held_out_table(name, found["held_out_limps"], shown_name)),
-            SectionPart(80, all_sizes),
-            SectionPart(81, captured_table(name, found["captured"], shown_name)),
-            SectionPart(82, table_of_rows(f"{name}-limp-second", found["second"], title)),
-        ],
-    )
+    parts = [
+        SectionPart(1, Paragraph(sources)),
+        SectionPart(2, size_chart(found)),
+        SectionPart(3, Paragraph(words("limp.recognisers"))),
+        SectionPart(3, of("named", found["named"], {"severity": "severity", "walks": "walks", **RECOGNISED})),
+        SectionPart(4, of("exam", exam, EXAM)),
+        SectionPart(5, of("together", found["named_together"], TOGETHER | RECOGNISED)),
+        SectionPart(80, of("sizes", sizes, size_heads)),
+        SectionPart(
+            81,
+            of(
+                "captured", captured, {"clip": "clip", "hurt": "hurt", "healthy": "healthy walk of"} | effects
+            ),
+        ),
+    ]
+    return PageSection("injury", parts)
 
 
 def hurt_motion_in_words(
@@ -106,12 +123,12 @@ def hurt_motion_in_words(
     readers.
     """
     sentences = []
-    for key, words in (("captured", "captured"), ("made", "generated from healthy clips")):
+    for key, origin in (("captured", "captured"), ("made", "generated from healthy clips")):
         if by_link := hurt_seconds[key]:
             names = f" ({', '.join(map(shown_name, sorted(by_link)))})" if len(by_link) <= MOST_NAMED else ""
             links = f"summed over {len(by_link)} links" if len(by_link) != 1 else "of one link"
             seconds = format_number(sum(by_link.values()), 3)
-            sentences.append(f"Hurt motion in training, {words}: {seconds} s, {links}{names}.")
+            sentences.append(f"Hurt motion in training, {origin}: {seconds} s, {links}{names}.")
     if any(len(by_link) > 1 for by_link in hurt_seconds.values()):
         sentences.append("A second in which two links hurt counts twice.")
     return " ".join(sentences) or "No link was hurt in training."
@@ -127,7 +144,7 @@ def size_chart(found: Json) -> Chart:
         if row["gait"] == "walk" and (row["part"] in COLOURS or "arm" in row["part"]):
             rows_of_link.setdefault(row["link"], []).append(row)
 
-    def line(link: str, rows: Rows, effect: str) -> Trace:
+    def line(link: str, rows: Records, effect: str) -> Trace:
         x, y = [r["severity"] for r in rows], [r[effect] for r in rows]
         trace = line_trace(link, x, y, COLOURS.get(rows[0]["part"], "@g0"))
         trace["line"]["dash"] = "dot" if rows[0]["side"] == "right" else "solid"
@@ -139,76 +156,12 @@ def size_chart(found: Json) -> Chart:
         name = f"people, {gait.replace('_', ' ')}"
         return marker_trace(name, x, [mean], {"color": "@muted", "size": 8}, error_y=bars)
 
-    return Chart(
-        "limp-sizes",
-        "Size of the limp",
-        "The character walks at a target speed of 1.2 m/s with one link at severity 3, 5, 7 or 10, and is "
-        "compared with its healthy walk. Lines of links on the right side are dotted. Grey markers show mean "
-        "and standard deviation over ten people who imitated strong limps.",
-        layout={"xaxis": axis("severity", range=[2.5, 11]), "yaxis": axis("size")},
-        height=560,
-        choose="Effect",
-        options={
-            found["effects"][effect]: [
-                *(line(link, rows, effect) for link, rows in rows_of_link.items()),
-                *(people(i, gait, *sizes[effect]) for i, (gait, sizes) in enumerate(found["people"].items())),
-            ]
-            for effect in SHOWN_EFFECTS
-        },
-    )
-
-
-def recognised_table(name: str, rows: Rows) -> Table:
-    """How well limps of hurt legs are recognised at each severity. rows: `named` of limp.json."""
-    columns = {"severity": Column.number("severity"), "walks": Column.count("walks"), **_shares()}
-    return Table.of(f"{name}-limp-named", columns, rows, "Is the limp of a hurt leg recognised?")
-
-
-def _shares() -> dict[str, Column]:
-    return {key: Column.number(label) for key, label in RECOGNISED.items()}
-
-
-def other_channel_table(name: str, rows: Rows) -> Table:
-    """How well limps of hurt legs are recognised while another channel has its highest value.
-
-    rows: `named_together` of limp.json.
-    """
-    columns = {
-        "column": Column("with"),
-        "walks": Column.count("walks"),
-        "speed_share": Column.number("speed, share of the same walk without injury"),
-        **_shares(),
+    options = {
+        found["effects"][effect]: [
+            *(line(link, rows, effect) for link, rows in rows_of_link.items()),
+            *(people(i, gait, *sizes[effect]) for i, (gait, sizes) in enumerate(found["people"].items())),
+        ]
+        for effect in SHOWN_EFFECTS
     }
-    title = "Is the limp of a hurt leg (severity 10) recognised while another channel has its highest value?"
-    return Table.of(f"{name}-limp-together", columns, rows, title)
-
-
-def held_out_table(name: str, rows: Rows, shown_name: Callable[[str], str]) -> Table:
-    """Compares captured limps, which were held out of training, with the character.
-
-    rows: `held_out_limps` of limp.json.
-    """
-    columns = {
-        "clip": Column("clip"),
-        "hurt_links": Column("hurt"),
-        "compared_with": Column("healthy walk of"),
-        "healthy": Column.number("distance of the healthy character"),
-        "hurt": Column.number("distance of the hurt character"),
-        "nearer": Column("hurt character is nearer", lambda v: "yes" if v else "no"),
-    }
-    records = [{**r, "hurt_links": _in_words(r["hurt_links"], shown_name)} for r in rows]
-    title = "Held-out captured limps: is the hurt character nearer to them than the healthy character?"
-    return Table.of(f"{name}-limp-exam", columns, records, title)
-
-
-def captured_table(name: str, rows: Rows, shown_name: Callable[[str], str]) -> Table:
-    """A table of the SHOWN_EFFECTS of captured limps. rows: `captured` of limp.json."""
-    columns = {"clip": Column("clip"), "hurt": Column("hurt"), "healthy": Column("healthy walk of")}
-    columns |= {key: Column.number(key.replace("_", " ")) for key in SHOWN_EFFECTS}
-    records = [{**r, "hurt": _in_words(r["hurt"], shown_name)} for r in rows]
-    return Table.of(f"{name}-limp-captured", columns, records, "Effects of captured limps")
-
-
-def _in_words(hurt: Mapping[str, float], shown_name: Callable[[str], str]) -> str:
-    """hurt: link -> severity."""
-    return ", ".join(f"{shown_name(link)} {severity:g}" for link, severity in hurt.items())
+    layout = {"xaxis": axis("severity", range=[2.5, 11]), "yaxis": axis("size")}
+    return chart("limp-sizes", layout=layout, height=560, choose="Effect", options=options)

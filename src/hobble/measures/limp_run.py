@@ -47,10 +47,9 @@ INJURY = "injury"  # the channel
 NO_CYCLE = "the network's healthy character does not walk a whole cycle"
 SEVERITIES = (3.0, 5.0, 7.0, 10.0)  # of the link that hurts; only one link hurts in a walk
 SPEEDS = {"walk": 2.0, "jog": 7.0}  # target speeds, cm a frame; 2 is 1.2 m/s, a usual walking speed
-TWO_SEVERITIES = (5.0, 10.0)  # of both injuries in walks with two injuries
 LEG = ("hip", "thigh", "shank", "foot")  # parts of the body that belong to a leg
 WARM_UP_FRAMES = 5 * FPS  # frames that are not measured, while figures reach their speed and begin to limp
-RECOGNISED = ("impaired", "named", "named_by_either", "wrong_side")  # keys of a row: shares of its windows
+RECOGNISED = ("impaired", "named", "wrong_side")  # keys of a row: shares of its windows
 MIRROR = "_mirror"  # end of the name of a mirrored clip
 Rows = list[dict[str, Any]]
 Injury = Mapping[str, float]  # link -> severity
@@ -243,7 +242,6 @@ def measure_limps(
             _row_of_clip(network.skeleton, clip, captured) for clip in captured if clip.severity_by_link
         ],
         "held_out_limps": compare_held_out(network, captured, splits, seconds, runtime),
-        "second": second_injuries(network, links, seconds, runtime),
         "together": together,
         "named_together": _recognition_by_column(together),
     }
@@ -289,9 +287,8 @@ def _row_of_walk(
     called: label and side that the linear recogniser gives to the whole walk. graded: label and side that the
     graded recogniser gives to it. impaired: share of windows in which the linear recogniser finds a limp. The
     wrong side is the side opposite to `hurt_side`. named: share of windows in which the graded recogniser
-    finds a limp, and not on the wrong side. named_by_either: share of windows in which at least one of the
-    two recognisers does. wrong_side: share of windows in which the graded recogniser finds a limp on the
-    wrong side; None for a link on the midline. speed_share: speed, divided by the speed of the healthy walk.
+    finds a limp, and not on the wrong side. wrong_side: share of windows in which it finds one on the wrong
+    side; None for a link on the midline. speed_share: speed, divided by the speed of the healthy walk.
     If the figure does not walk a whole cycle, all but `speed_share` is None.
     """
     assert network.skeleton is not None
@@ -304,18 +301,13 @@ def _row_of_walk(
     row |= _rounded_values(measure_effects(figure.profile, healthy.profile, side or RIGHT))
     found = compare_walk(figure.walk, figure.frames, healthy.profile)
     wrong_side = SIDES[1 - SIDES.index(side or RIGHT)]
-    by_linear, by_graded = (
-        [answer.is_impaired and answer.side != wrong_side for answer in answers]
-        for answers in (found.window_answers, found.window_grades)
-    )
-    wrong = [grade.is_impaired and grade.side == wrong_side for grade in found.window_grades]
+    answers = [(grade.is_impaired, grade.side == wrong_side) for grade in found.window_grades]
     return row | {
         "called": found.answer.name,
         "graded": found.grade.name,
         "impaired": share_of_true([answer.is_impaired for answer in found.window_answers]),
-        "named": share_of_true(by_graded),
-        "named_by_either": share_of_true([a or b for a, b in zip(by_linear, by_graded, strict=True)]),
-        "wrong_side": share_of_true(wrong) if side else None,
+        "named": share_of_true([limps and not wrong for limps, wrong in answers]),
+        "wrong_side": share_of_true([limps and wrong for limps, wrong in answers]) if side else None,
     }
 
 
@@ -462,37 +454,6 @@ def compare_held_out(
     return out
 
 
-def second_injuries(network: Network, links: Sequence[str], seconds: float, runtime: Runtime) -> Rows:
-    """A row with the speed of each walk with two injuries. Empty if `links` has no right thigh.
-
-    The first injury is the right thigh at severity 5 or 10. The second is any other link at severity 5 or 10.
-    `speed_share`: speed, divided by the speed of the healthy walk. `from_first`: speed, divided by the speed
-    with the first injury alone. This should be at most 1, because a second injury must not make the walk
-    faster.
-    """
-    assert network.skeleton is not None
-    skeleton = network.skeleton
-    first = next((link for link in links if _part_and_side(skeleton, link) == ("thigh", "right")), None)
-    if first is None:
-        return []
-    # (severity of the first injury, link of the second injury, its severity)
-    cases = [(a, link, b) for a in TWO_SEVERITIES for link in links if link != first for b in TWO_SEVERITIES]
-    injuries = [{}, *({first: a} for a in TWO_SEVERITIES), *({first: a, link: b} for a, link, b in cases)]
-    healthy, *figures = walk_figures(network, injuries, SPEEDS["walk"], "walk", seconds, runtime)
-    alone = dict(zip(TWO_SEVERITIES, figures, strict=False))  # severity of the first injury -> its walk
-    return [
-        {
-            "first": first,
-            "first_severity": a,
-            "second": link,
-            "severity": b,
-            "speed_share": round(figure.speed / max(healthy.speed, 1e-9), 5),
-            "from_first": round(figure.speed / max(alone[a].speed, 1e-9), 5),
-        }
-        for (a, link, b), figure in zip(cases, figures[len(TWO_SEVERITIES) :], strict=True)
-    ]
-
-
 def run(inputs: MeasureInputs, options: Any) -> Outcome:
     """Measure the limps. The outcome has the content of limp.json and its tables."""
     network = load_network(inputs.weights)
@@ -508,7 +469,7 @@ def run(inputs: MeasureInputs, options: Any) -> Outcome:
         runtime=inputs.runtime,
         seconds=options.limp_seconds,
     )
-    tables = {name: result.get(name, []) for name in ("sizes", "trends", "named", "second", "together")}
+    tables = {name: result.get(name, []) for name in ("sizes", "trends", "named", "together")}
     log_line = str(result.get("reason", ""))
     if result["applies"]:
         share = result["named"][-1]["impaired"]

@@ -18,6 +18,7 @@ from typing import Literal
 from hobble.channels.shown import shown_names
 from hobble.core.files import Json
 from hobble.measures.measure import Cost, Measure, SampleOptions, sample_sentence
+from hobble.measures.shown import chart
 from hobble.report.parts import Chart, PageSection, Paragraph, SectionPart, heatmap
 from hobble.runtime.options import Runtime
 
@@ -106,14 +107,9 @@ def together_chart(result: Json, shown_name: Callable[[str], str] = str) -> Char
         "xaxis": {"type": "category", "side": "top", "automargin": True, "showgrid": False},
         "yaxis": {"type": "category", "automargin": True, "dtick": 1, "showgrid": False},
     }
-    words = (
-        f"The share of windows in which the recogniser names the right {result['title'].lower()} while the "
-        "value named at the left is at its highest. The darker a field, the larger the share. "
-        f'The mean of all columns but "{NONE}" is {_percent(right / total)}.'
-    )
-    return Chart(
-        f"{result['channel']}-together", "Two at once", words, [trace], layout, 120 + 20 * len(columns)
-    )
+    height, right = 120 + 20 * len(columns), _percent(right / total)
+    name, title = f"{result['channel']}-together", result["title"].lower()
+    return chart(name, [trace], layout, height, entry="manners-together", title=title, right=right)
 
 
 def effect_chart(result: Json, effect: str) -> Chart:

@@ -7,7 +7,6 @@ generated walks.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
 from itertools import combinations
 from typing import Any
 
@@ -19,129 +18,62 @@ from hobble.core.skeleton import Skeleton
 from hobble.gait.recognise import Discriminant, learn
 from hobble.measures.measure import MeasureInputs, Outcome, Row, SampleOptions
 from hobble.measures.sample import captured_motion, sample_to_measure, with_sample
-from hobble.measures.walks import (
-    FPS,
-    CrowdTarget,
-    channel_values,
-    gait_features,
-    generate_walks,
-    share_of_true,
+from hobble.measures.walks import FPS, gait_features, share_of_true
+from hobble.measures.windows import (
+    Values,
+    Window,
+    captured_values,
+    feature_table,
+    generated_values,
+    straight_windows,
 )
 from hobble.models.load import load_network
 from hobble.models.network import Network
 from hobble.rows.clip_rows import Captured
-from hobble.rows.layout import GAITS
 from hobble.runtime.options import Runtime
 
 NONE = "none"  # the manner of a clip whose values are all 0
-WALK = GAITS.index("walk")
-WINDOW, STEP = 60, 15  # frames: length of a window (about a cycle), and from one start to the next
-LEAST_AHEAD = 0.9  # a window is straight if at least this share of its mean velocity points forward
-LEAST_SPEED = 0.5  # cm a frame; a slower window does not count as walking
-WARM_UP, USED = 4 * FPS, 6 * FPS  # frames skipped at the start of a generated walk, and frames used
-# Quantities that are compared between walks with and without a manner. `MannerWindow` has their units.
-EFFECTS = ("speed", "stride", "trunk", "arms", "head")
+# Quantities that are compared between walks with and without a manner: m/s, cm, degrees forward, standard
+# deviation of the arms' swing in degrees, degrees forward.
+EFFECTS = {
+    "speed": lambda values: values["speed"] / 100,
+    "stride": lambda values: values["step_left"] + values["step_right"],
+    "trunk": lambda values: -values["trunk_forward_mean"],  # the feature has the direction down the trunk
+    "arms": lambda values: (values["upper_arm_left_sd"] + values["upper_arm_right_sd"]) / 2,
+    "head": lambda values: values["head"],
+}
 
 
-@dataclass(frozen=True)
-class MannerWindow:
-    """A stretch of straight walking, WINDOW frames long.
-
-    clip: empty for a generated walk. manner: a column of the channel, or NONE; in a generated walk with two
-    manners, "<one> and <other>". values: feature -> value, for the recogniser: those of
-    `gait_features`, and "head". effects: name in EFFECTS -> value: speed (m/s), stride
-    (cm), trunk and head (degrees forward), arms (standard deviation of their swing, degrees).
-    """
-
-    clip: str
-    manner: str
-    values: Mapping[str, float] = field(repr=False)
-    effects: Mapping[str, float] = field(repr=False)
+def manner_features(skeleton: Skeleton, local: Array, contacts: Array, root: Array) -> dict[str, float]:
+    """The `gait_features`, and how far the head leans forward, in degrees."""
+    head, neck = (local[:, skeleton.role(part)].astype(float) for part in ("head", "neck"))
+    up = (head - neck).mean(axis=0)  # from the neck to the head
+    lean = float(np.degrees(np.arctan2(up[2], up[1])))
+    return {**gait_features(skeleton, local, contacts, root), "head": lean}
 
 
-@dataclass(frozen=True)
-class WalkerInputs:
-    """The inputs of a generated walk.
-
-    channels: name of a channel -> name of a column -> value; all other values are 0. speed: target speed, cm
-    a frame.
-    """
-
-    channels: Mapping[str, Mapping[str, float]]
-    speed: float
-
-
-def captured_windows(clip: Captured, network: Network, name: str) -> list[MannerWindow]:
+def captured_windows(stretch: Captured, network: Network, name: str) -> list[Window]:
     """The windows of straight walking in a captured stretch of a clip.
 
     In each window there is no manner, or one manner at its highest value, and all other channels are 0.
     name: the channel of the manners.
     """
-    assert network.skeleton is not None
     columns, highest = network.channels[name], channel(name).highest
-    # For each other channel, bool for each frame: whether it has a value above 0.
-    others = [np.any(values > 0, axis=1) for other, values in clip.channels.items() if other != name]
+    others = [values for other, values in stretch.channels.items() if other != name]
     out = []
-    for start in range(0, len(clip) - WINDOW + 1, STEP):
-        span = slice(start, start + WINDOW)
-        speed = np.hypot(*clip.velocity[span].mean(axis=0))
-        values = clip.channels[name][start]  # the same in all frames of a clip
+    for span in straight_windows(stretch):
+        values = stretch.channels[name][span.start]  # the same in all frames of a clip
         manners = [columns[i] for i in np.flatnonzero(values)]
-        straight = clip.velocity[span, 1].mean() >= LEAST_AHEAD * speed and speed >= LEAST_SPEED
-        walks = clip.gait[span, WALK].mean() > 0.5
         at_most_one = len(manners) < 2 and np.isin(values, (0, highest)).all()
-        if not (straight and walks and at_most_one) or any(np.any(other[span]) for other in others):
-            continue
-        parts = clip.local[span], clip.contacts[span], clip.root[span]
-        out.append(_window(network.skeleton, clip.clip, manners[0] if manners else NONE, *parts))
+        if at_most_one and not any(np.any(other[span]) for other in others):
+            features = captured_values(network, stretch, span, manner_features)
+            out.append(Window(stretch.clip, manners[0] if manners else NONE, features))
     return out
 
 
-def generated_windows(
-    network: Network, walkers: Sequence[WalkerInputs], name: str, runtime: Runtime
-) -> list[list[MannerWindow]]:
-    """For each walker, the windows of a generated straight walk. name: the channel of the manners."""
-    assert network.skeleton is not None
-    channels: dict[str, Array] = {}
-    for key in network.channels:
-        channels |= channel_values(network, key, [walker.channels.get(key, {}) for walker in walkers])
-    speeds = [walker.speed for walker in walkers]
-    script = CrowdTarget(WARM_UP + USED, ["walk"] * len(walkers), channels, speeds)
-    walks = generate_walks(network, [script], runtime)
-    out = []
-    for i, walker in enumerate(walkers):
-        manner = " and ".join(walker.channels.get(name, {})) or NONE
-        spans = [slice(s, s + WINDOW) for s in range(WARM_UP, WARM_UP + USED - WINDOW + 1, STEP)]
-        parts = [(walks.local[span, i], walks.contacts[span, i], walks.root[span, i]) for span in spans]
-        out.append([_window(network.skeleton, "", manner, *part) for part in parts])
-    return out
-
-
-def feature_table(windows: Sequence[MannerWindow]) -> Array:
-    """(n, D) values of the D features in n windows."""
-    return np.array([list(w.values.values()) for w in windows])
-
-
-def mean_effect(windows: Iterable[MannerWindow], effect: str) -> float:
-    """The mean over the windows of the quantity `effect`, one of EFFECTS."""
-    return float(np.mean([w.effects[effect] for w in windows]))
-
-
-def _window(
-    skeleton: Skeleton, clip: str, manner: str, local: Array, contacts: Array, root: Array
-) -> MannerWindow:
-    """A window from its motion. local, contacts, root: as for `gait_features`."""
-    values = gait_features(skeleton, local, contacts, root)
-    head, neck = (local[:, skeleton.role(part)].astype(float) for part in ("head", "neck"))
-    up = (head - neck).mean(axis=0)  # from the neck to the head
-    effects = {
-        "speed": values["speed"] / 100,
-        "stride": values["step_left"] + values["step_right"],
-        "trunk": -values["trunk_forward_mean"],  # the feature measures the direction down the trunk
-        "arms": (values["upper_arm_left_sd"] + values["upper_arm_right_sd"]) / 2,
-        "head": float(np.degrees(np.arctan2(up[2], up[1]))),
-    }
-    return MannerWindow(clip, manner, {**values, "head": effects["head"]}, effects)
+def mean_effect(windows: Iterable[Values], effect: str) -> float:
+    """The mean over windows of the quantity `effect`, one of EFFECTS."""
+    return float(np.mean([EFFECTS[effect](values) for values in windows]))
 
 
 # The recogniser shrinks the covariance of the features towards its diagonal by one of these shares (0 to 1).
@@ -151,7 +83,7 @@ SHRINKAGES = (0.02, 0.1, 0.3, 0.6)
 
 
 def recognise_left_out(
-    windows: Sequence[MannerWindow], people: Mapping[str, str], shrinkages: Sequence[float] = SHRINKAGES
+    windows: Sequence[Window], people: Mapping[str, str], shrinkages: Sequence[float] = SHRINKAGES
 ) -> dict[str, Any]:
     """Recognise the manner in each person's windows after learning from the windows of all other people.
 
@@ -160,10 +92,8 @@ def recognise_left_out(
     manner that only one person has is never recognised, because it cannot be learnt while this person is left
     out.
     """
-    values = feature_table(windows)
-    manner, person = (
-        np.array(names) for names in ([w.manner for w in windows], [people[w.clip] for w in windows])
-    )
+    values = feature_table([w.values for w in windows])
+    manner, person = np.array([w.label for w in windows]), np.array([people[w.clip] for w in windows])
     results = [_recognise_with_shrinkage(values, manner, person, shrinkage) for shrinkage in shrinkages]
     return max(results, key=lambda result: (result["right"] or 0.0, result["shrinkage"]))
 
@@ -220,7 +150,7 @@ def measure_manners(
     names = [name for name in network.channels if channel(name).manner]
     if not names or network.skeleton is None:
         return {"applies": False, "reason": NO_MANNERS}
-    windows: dict[str, list[MannerWindow]] = {name: [] for name in names}
+    windows: dict[str, list[Window]] = {name: [] for name in names}
     for stretch in motion:
         for name, channel_windows in windows.items():
             channel_windows += captured_windows(stretch, network, name)
@@ -232,7 +162,7 @@ def measure_manners(
 def measure_channel(
     network: Network,
     name: str,
-    windows: Sequence[MannerWindow],
+    windows: Sequence[Window],
     splits: Mapping[str, str],
     people: Mapping[str, str],
     runtime: Runtime,
@@ -243,30 +173,32 @@ def measure_channel(
     who walks in it.
     """
     training = [w for w in windows if splits[w.clip] == "train"]
-    learnt = sorted({w.manner for w in training} - {NONE})
+    learnt = sorted({w.label for w in training} - {NONE})
     if len(learnt) < 2:
         return None
     captured = recognise_left_out(windows, people)
-    recogniser = learn(feature_table(training), [w.manner for w in training], captured["shrinkage"])
+    of_manner = {m: [w.values for w in training if w.label == m] for m in (NONE, *learnt)}
+    table = feature_table([w.values for w in training])
+    recogniser = learn(table, [w.label for w in training], captured["shrinkage"])
     # The target speed at pace 1, cm a frame.
-    speed = float(np.median([w.values["speed"] for w in training if w.manner == NONE] or [USUAL_SPEED])) / FPS
-    # What is generated, as manner -> value: no manner, each manner at HALF, each at FULL, each pair at FULL.
-    single = [{}, *({manner: value} for value in (HALF, FULL) for manner in learnt)]
-    cases = [*single, *(dict.fromkeys(pair, FULL) for pair in combinations(learnt, 2))]
-    walkers = [WalkerInputs({name: values}, speed * pace) for values in cases for pace in PACES]
-    walks = generated_windows(network, walkers, name, runtime)
-    paces = len(PACES)
+    speed = float(np.median([values["speed"] for values in of_manner[NONE]] or [USUAL_SPEED])) / FPS
+    # What is generated, as manners and their value: none, each at HALF, each at FULL, each pair at FULL.
+    cases: list[tuple[tuple[str, ...], float]] = [((), 0.0)]
+    cases += [((manner,), value) for value in (HALF, FULL) for manner in learnt]
+    cases += [(pair, FULL) for pair in combinations(learnt, 2)]
+    asked = [({name: dict.fromkeys(some, value)}, speed * pace) for some, value in cases for pace in PACES]
+    walks = generated_values(network, asked, runtime, manner_features)
     # The windows of each of the `cases`, at all PACES.
-    by_case = [[w for walk in walks[i : i + paces] for w in walk] for i in range(0, len(walks), paces)]
-    # manner -> its windows at HALF, and at FULL. In `cases`, these follow the case without a manner.
-    half, full = (dict(zip(learnt, by_case[1 + k * len(learnt) :], strict=False)) for k in (0, 1))
+    by_case = {
+        case: [w for walk in walks[len(PACES) * i : len(PACES) * (i + 1)] for w in walk]
+        for i, case in enumerate(cases)
+    }
     rows = []
-    for values, of_case in zip(cases, by_case, strict=True):
-        value = next(iter(values.values()), 0.0) if len(values) < 2 else None
-        named = _name_windows(recogniser, of_case, set(values) or {NONE})
-        rows.append({"manners": list(values), "value": value, **named})
-        if len(values) == 2:
-            alone = (_mean_features(full[manner]) for manner in values)
+    for (some, value), of_case in by_case.items():
+        named = _name_windows(recogniser, of_case, set(some) or {NONE})
+        rows.append({"manners": list(some), "value": value if len(some) < 2 else None, **named})
+        if len(some) == 2:
+            alone = (_mean_features(by_case[(manner,), FULL]) for manner in some)
             rows[-1]["between"] = _position_between(_mean_features(of_case), *alone)
     at_full = [row for row in rows if row["value"] == FULL]
     total = sum(row["windows"] for row in at_full)
@@ -284,8 +216,8 @@ def measure_channel(
             {"channel": name, "manner": manner, "effect": effect}
             | _measure_effect(
                 effect,
-                [[w for w in training if w.manner == which] for which in (NONE, manner)],
-                [by_case[0], half[manner], full[manner]],
+                [of_manner[NONE], of_manner[manner]],
+                [by_case[case] for case in (((), 0.0), ((manner,), HALF), ((manner,), FULL))],
             )
             for manner in learnt
             for effect in EFFECTS
@@ -316,11 +248,11 @@ def recognise_together(
     cases = [(manner, other, column) for manner in (NONE, *learnt) for other, column in others]
     if not cases:
         return []
-    walkers = [
-        WalkerInputs({name: {} if m == NONE else {m: FULL}, other: {column: channel(other).highest}}, speed)
+    asked = [
+        ({name: {} if m == NONE else {m: FULL}, other: {column: channel(other).highest}}, speed)
         for m, other, column in cases
     ]
-    walks = generated_windows(network, walkers, name, runtime)
+    walks = generated_values(network, asked, runtime, manner_features)
     return [
         {"channel": name, "manner": manner, "other": other, "column": column}
         | _name_windows(recogniser, windows, {manner})
@@ -345,9 +277,7 @@ def run(inputs: MeasureInputs, options: SampleOptions) -> Outcome:
     return Outcome(with_sample(result, sample), tables, log_line or result.get("reason", ""))
 
 
-def _name_windows(
-    recogniser: Discriminant, windows: Sequence[MannerWindow], right: set[str]
-) -> dict[str, Any]:
+def _name_windows(recogniser: Discriminant, windows: Sequence[Values], right: set[str]) -> dict[str, Any]:
     """The names that the recogniser gives to windows of generated walks, and the share of `right` ones."""
     names = recogniser.likeliest_classes(feature_table(windows))
     return {
@@ -358,7 +288,7 @@ def _name_windows(
 
 
 def _measure_effect(
-    effect: str, captured: Sequence[Sequence[MannerWindow]], generated: Sequence[Sequence[MannerWindow]]
+    effect: str, captured: Sequence[Sequence[Values]], generated: Sequence[Sequence[Values]]
 ) -> dict[str, float | None]:
     """How much a manner changes the quantity `effect`.
 
@@ -384,6 +314,6 @@ def _position_between(pair: Array, first: Array, second: Array) -> float:
     return round(float((pair - first) @ line / max(float(line @ line), 1e-9)), 4)
 
 
-def _mean_features(windows: Sequence[MannerWindow]) -> Array:
+def _mean_features(windows: Sequence[Values]) -> Array:
     """(D,) mean of each feature over the windows."""
     return np.asarray(feature_table(windows).mean(axis=0))

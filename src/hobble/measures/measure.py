@@ -15,9 +15,7 @@ The module `hobble.measures.<name>` holds MEASURE and may define these functions
 (`hobble.report.gather.ReportMaterial`), `compared` is the content of compare.json, and `all_measured` has the
 results of each configuration (`hobble.measures.compare`).
 
-The module `hobble.measures.<name>_run` has `run(inputs, options) -> Outcome`. A long measurement may be split
-into pieces, which run as jobs of their own: `run_piece(inputs, options, piece) -> Json` measures one piece,
-and `run` puts their results together.
+The module `hobble.measures.<name>_run` has `run(inputs, options) -> Outcome`.
 """
 
 from __future__ import annotations
@@ -29,7 +27,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import ModuleType
-from typing import Any, Literal, Protocol
+from typing import Any, Literal
 
 import yaml
 from pydantic import Field, create_model
@@ -54,8 +52,8 @@ class SampleOptions(Section):
     sample_frames: int = Field(
         500_000,
         gt=0,
-        description="about how many frames are measured at most; if the clips have more, a sample of "
-        "excerpts is drawn, so that each split, gait, speed and channel is in it",
+        description="about how many frames are measured at most; if the clips have more, a random sample of "
+        "excerpts is drawn, half of it from held-out clips",
     )
 
 
@@ -84,20 +82,6 @@ class Cost:
     least_minutes: int = 10
 
 
-class Pieces(Protocol):
-    """The type of a function that returns the names of a measurement's pieces (letters only).
-
-    A piece is a part of a long measurement that runs as a job of its own.
-    """
-
-    def __call__(self, options: Any, runtime: Runtime, modes: Sequence[str]) -> tuple[str, ...]:
-        """The names of the pieces.
-
-        options: of the type `Measure.options`. modes: names of the ways to evaluate the measured network,
-        such as constant, linear and cubic (`Network.modes`).
-        """
-
-
 @dataclass(frozen=True)
 class Measure:
     """A measurement. Its JSON file and its folder of tables have its `name`, too.
@@ -105,9 +89,8 @@ class Measure:
     module: full name of the module that holds it (`__name__`). inputs: what it reads, as names of INPUTS or
     of other measurements. options: the model of its keys in a configuration's section `evaluation`. runtime:
     the keys of the section `runtime` that it depends on. channel: it is only made for configurations with
-    this channel; "": for all. pieces: for a measurement that is split, the function that returns the names of
-    its pieces. people: whether it has to know who walks in which clip. cost: what its job requests on a
-    cluster.
+    this channel; "": for all. people: whether it has to know who walks in which clip. cost: what its job
+    requests on a cluster.
     """
 
     name: str
@@ -116,7 +99,6 @@ class Measure:
     options: type[Section] = Section
     runtime: tuple[str, ...] = ()
     channel: str = ""
-    pieces: Pieces | None = None
     people: bool = False
     cost: Cost = Cost()
 
@@ -126,7 +108,7 @@ class Measure:
         return f"{self.module}_run"
 
     def runner(self) -> ModuleType:
-        """The module with `run` and, if there are pieces, `run_piece`."""
+        """The module with `run`."""
         return importlib.import_module(self.run_module)
 
     def function(self, name: str) -> Callable[..., Any] | None:
@@ -186,8 +168,7 @@ class MeasureInputs:
     measurement. clips: clip -> its file of rows. splits: clip -> "train" or "held_out". people: clip -> the
     person who walks in it. If the person is not known, the clip, its mirror and the hurt clips made from it
     count as one more person. summaries: the `hobble.rows.clip_rows` file of each clip. runtime: the values of
-    the keys in `Measure.runtime`; the other keys have defaults. pieces: if the measurement was split into
-    pieces that ran as jobs of their own, name of a piece -> its JSON file.
+    the keys in `Measure.runtime`; the other keys have defaults.
     """
 
     configuration: str
@@ -197,7 +178,6 @@ class MeasureInputs:
     people: Mapping[str, str] = field(default_factory=dict, repr=False)
     summaries: Sequence[Path] = field(default=(), repr=False)
     runtime: Runtime = field(default_factory=Runtime)
-    pieces: Mapping[str, Path] = field(default_factory=dict, repr=False)
 
     def file(self, name: str) -> Path:
         """The file of the input `name`. Raises HobbleError if the measurement's `inputs` do not list it."""
@@ -222,10 +202,6 @@ class MeasureInputs:
     def published(self) -> Json:
         """The content of published.yaml: published results with which ours are compared."""
         return yaml.safe_load(self.file("published").read_text(encoding="utf-8"))
-
-    def measured_pieces(self) -> dict[str, Json]:
-        """Name of a piece -> its result, for each piece that ran as a job of its own."""
-        return {name: read_json(path) for name, path in self.pieces.items()}
 
     def results_of(self, name: str) -> Json:
         """The content of the JSON file of another measurement."""

@@ -176,3 +176,39 @@ def diversity(windows: Array, pairs: int = 5000) -> float:
     """Mean distance of two windows (N, C) drawn at random with a fixed seed; 0 for one window."""
     first, second = np.random.default_rng(0).integers(0, len(windows), (2, pairs))
     return float(np.linalg.norm(windows[first] - windows[second], axis=1).mean())
+
+
+def cleanness(skeleton: Skeleton, positions: Array, rotations: Array) -> dict[str, float]:
+    """How clean a motion is: skating (of all points of the feet, of heels, of toes), joint_update, jerk and
+    contact_speed.
+
+    positions: (F, J, 3) cm, in the world. rotations: (F, J, 4) quaternions relative to the parent.
+    """
+    body, feet = joints_with(skeleton, BODY), positions[:, joints_with(skeleton, FOOT_POINTS)].astype(float)
+    standing = standing_heights(feet)
+    slid = skating(feet, standing)
+    return {
+        "skating": float(slid.mean()),
+        "skating_heels": float(slid[:, ::2].mean()),
+        "skating_toes": float(slid[:, 1::2].mean()),
+        "joint_update": joint_update(rotations[:, body]),
+        "jerk": jerk(positions[:, body].astype(float)),
+        "contact_speed": contact_speed(feet, standing),
+    }
+
+
+def compare_windows(
+    features: Array, reference: Array, first_half: np.ndarray
+) -> tuple[dict[str, float], dict[str, float]]:
+    """Frechet distance to a reference and diversity, of windows and of the reference itself.
+
+    features, reference: (N, D) and (M, D) from `window_features`. first_half: (M,) which windows are one half
+    of the reference. Its own Frechet distance is that of its halves; nan if one has fewer than two windows.
+    """
+    basis = Reference.of(reference)
+    windows, halves = basis.project(features), (basis.windows[first_half], basis.windows[~first_half])
+    between = frechet_distance(*halves) if min(map(len, halves)) > 1 else float("nan")
+    return (
+        {"frechet": frechet_distance(windows, basis.windows), "diversity": diversity(windows)},
+        {"frechet": between, "diversity": diversity(basis.windows)},
+    )

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from hobble.core.files import Json
 from hobble.measures.compare import ComparisonAddition, ConfigurationResults, published_row
 from hobble.measures.measure import Cost, Measure, Row, SampleOptions, sample_sentence
+from hobble.measures.shown import chart
 from hobble.report.parts import Chart, PageSection, SectionPart, heatmap
 from hobble.runtime.options import Runtime
 
@@ -45,29 +46,24 @@ def recognition_chart(found: Json) -> Chart | None:
         return None
     generated, captured = found["generated"], found["captured"]
     tables = {
-        "generated walks, whole": generated.get("by_walk"),
+        "generated walks, whole": generated["by_walk"],
         "generated walks, by window": generated,
-        "captured clips, cross-validated": captured.get("cross_validated"),
-        "captured clips held out of training": captured.get("held_out"),
+        "captured clips, cross-validated": captured["cross_validated"],
+        "captured clips held out of training": captured["held_out"],
     }
-    people = found.get("people")
-    note = (
-        f" People recognised the part {100 * (people or 0):.0f} % of the time (Ferre 2019, on the motion of "
-    )
-    return Chart(
+    return chart(
         "recognition",
-        "Is the hurt part recognised?",
-        "A classifier trained on captured clips says which part hurts. Rows: the part that hurts. Columns: "
-        "the answer of the classifier. Answers on the diagonal are right. A random guess is right "
-        f"{100 * (found.get('chance') or 0):.0f} % of the time.{note}{sample_sentence(found)}",
         layout=NAMED_AXES,
-        height=max(300, 190 + 20 * len(found.get("classes") or ())),
+        height=max(300, 190 + 20 * len(found["classes"])),
         choose="Walks",
         options={
-            _title(label, table): [_confusion(table)]
-            for label, table in tables.items()
-            if table and table.get("confusion")
+            _title(label, shown): [_confusion(shown)]
+            for label, shown in tables.items()
+            if shown.get("confusion")
         },
+        chance=f"{100 * found['chance']:.0f}",
+        people=f"{100 * found['people']:.0f}",
+        sample=sample_sentence(found),
     )
 
 

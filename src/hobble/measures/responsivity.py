@@ -26,12 +26,12 @@ from hobble.measures.compare import (
     ConfigurationResults,
     compare_series,
     fit_line,
-    flatten,
     mean_and_sd,
     published_differences,
     published_row,
 )
 from hobble.measures.measure import Cost, Measure, Row
+from hobble.measures.shown import boxes, chart, table, words
 from hobble.report.parts import (
     Chart,
     Column,
@@ -81,21 +81,12 @@ class Options(Section):
     )
 
 
-def pieces(options: Options, runtime: Runtime, modes: Sequence[str]) -> tuple[str, ...]:
-    """The names of this measurement's pieces. Each piece is the laps in one phase mode, named after the mode.
-
-    modes: all phase modes of the network. If there is only one, it is the only piece.
-    """
-    return tuple(dict.fromkeys((*options.modes, runtime.mode))) if len(modes) > 1 else tuple(modes)
-
-
 MEASURE = Measure(
     name="responsivity",
     module=__name__,
     inputs=("weights",),
     options=Options,
     runtime=tuple(Runtime.model_fields),
-    pieces=pieces,
     cost=Cost(memory_mb=200, least_minutes=60),
 )
 
@@ -118,32 +109,21 @@ def lap_chart(found: Json, material: ReportMaterial) -> Chart | None:
     if not found.get("laps"):
         return None
     # The configured phase mode comes first, because the chart begins with the first option.
-    entries = sorted(found.get("modes", [found]), key=lambda entry: entry["mode"] != found["mode"])
+    entries = sorted(found["modes"], key=lambda entry: entry["mode"] != found["mode"])
     options = {f"{entry['mode']} phase": _lap_bars(entry["laps"]) for entry in entries}
     line = {}
     if published := material.published_entry("responsivity"):
         text = f"{published['label']}: published mean"
         line = reference_line(published["milliseconds"], text, vertical=False)
     laps, fewest = (pick(len(entry["laps"]) for entry in entries) for pick in (max, min))
-    fewer_laps = f" In the other phase modes there are only {fewest} laps, to save time."
-    return Chart(
-        "laps",
-        "Milliseconds per frame, lap by lap",
-        "Each bar is one lap of the track. Its segments are the stages of computing a frame, averaged over "
-        "the lap. Prepare: the target, the path and the ground; input: collect the "
-        "network's input; insert: standardise this input; predict: evaluate the network; output: turn its "
-        "output into a pose; update: move on by a frame. A diamond is the median time of a whole frame. If "
-        "another program delays a few frames, the bar becomes higher, but the diamond hardly moves. At 60 "
-        "Hz, a frame may take 16.7 ms." + (fewer_laps if fewest < laps else ""),
-        layout={
-            "barmode": "stack",
-            "xaxis": axis("lap", dtick=1 if laps < 25 else None),
-            "yaxis": axis("ms per frame", rangemode="tozero"),
-            **line,
-        },
-        choose="Phase mode" if len(options) > 1 else None,
-        options=options,
-    )
+    layout = {
+        "barmode": "stack",
+        "xaxis": axis("lap", dtick=1 if laps < 25 else None),
+        "yaxis": axis("ms per frame", rangemode="tozero"),
+        **line,
+    }
+    more, choose = ["fewer"] if fewest < laps else [], "Phase mode" if len(options) > 1 else None
+    return chart("laps", layout=layout, choose=choose, options=options, more=more, fewest=fewest)
 
 
 def track_chart(found: Json) -> Chart | None:
@@ -154,9 +134,9 @@ def track_chart(found: Json) -> Chart | None:
     closed_x, closed_z = [*track["x"], track["x"][0]], [*track["z"], track["z"][0]]
     traces = [line_trace("track", closed_x, closed_z, "@faint", dash="dash", width=1.2, hoverinfo="skip")]
     for run in runs:
-        name = "laps" if run is runs[0] else f"lap {run['lap']}"
-        shown = {"legendgroup": "runs", "showlegend": run is runs[0]}
-        traces.append(line_trace(name, run["x"], run["z"], "@accent", width=1.5, hoverinfo="skip", **shown))
+        name, shown = "laps" if run is runs[0] else f"lap {run['lap']}", run is runs[0]
+        style = {"width": 1.5, "hoverinfo": "skip", "legendgroup": "runs", "showlegend": shown}
+        traces.append(line_trace(name, run["x"], run["z"], "@accent", **style))
     places = [
         (x, z, [cm, run["lap"]])
         for run in runs
@@ -176,21 +156,13 @@ def track_chart(found: Json) -> Chart | None:
         "textfont": {"size": 11, "color": "@soft"},
     }
     traces.append(marker_trace("waypoints", track["x"], track["z"], circle, hoverinfo="skip", **labels))
-    largest = max(place[2][0] for place in places)
-    where = f"Places more than {OFF_TRACK:.0f} cm from the track are red. " if off_track else ""
-    return Chart(
-        "track",
-        "The track, and the path of the character",
-        "From above. Dashed lines join the waypoints. The label of a waypoint is its number and the gait on "
-        "the way to it. A waypoint is reached when the character is within a metre of it. Solid lines are "
-        "the paths of the first laps. "
-        f"{where}On these laps, the largest distance from the track was {largest:.0f} cm.",
-        traces,
-        {
-            "xaxis": axis("x, m", constrain="domain", zeroline=False),
-            "yaxis": axis("z, m", scaleanchor="x", autorange="reversed", zeroline=False),
-        },
-        height=520,
+    layout = {
+        "xaxis": axis("x, m", constrain="domain", zeroline=False),
+        "yaxis": axis("z, m", scaleanchor="x", autorange="reversed", zeroline=False),
+    }
+    largest, more = f"{max(place[2][0] for place in places):.0f}", ["off"] if off_track else []
+    return chart(
+        "track", traces, layout, 520, more=[*more, "largest"], limit=f"{OFF_TRACK:.0f}", largest=largest
     )
 
 
@@ -209,41 +181,39 @@ def _lap_bars(laps: Sequence[Json]) -> list[Trace]:
 FEWEST_STEPS = 10  # if the character takes fewer steps, the mean foot slide is not shown
 FRAME_BUDGET_MS = 1000 / 60  # the time that a frame may take at 60 Hz
 FLIP_DEGREES = 60  # if a joint turns by more than this in one frame, it flips visibly
-# Columns of the table of laps, by the keys of `LapWalk` in hobble.measures.responsivity.results.
-LAP_COLUMNS = {
-    "lap": Column.count("lap"),
-    "finished": Column("finished", lambda finished: "yes" if finished else "no"),
-    "waypoints_reached": Column.count("waypoints reached"),
-    "seconds": Column.number("seconds", 4),
-    "frames": Column.count("frames"),
-    "path_distance_cm": Column.number("mean distance from the track, cm"),
-    "path_overshoot_cm": Column.number("largest distance from the track, cm"),
-    "steps": Column.count("steps"),
-    "foot_slide_cm": Column.number("mean foot slide of a step, cm"),
-    "predicted_turn_degrees": Column.number("largest turn of a joint in a frame as predicted, °"),
-    "largest_turn_degrees": Column.number("largest turn of a joint in a frame as drawn, °"),
-    "turns_held_back": Column.count("frames in which a turn was limited"),
+# Columns of the table of laps, by the keys of a lap in responsivity.json.
+LAP_HEADS = {
+    "lap": "lap",
+    "finished": "finished",
+    "waypoints_reached": "waypoints reached",
+    "seconds": "seconds",
+    "frames": "frames",
+    "path_distance_cm": "mean distance from the track, cm",
+    "path_overshoot_cm": "largest distance from the track, cm",
+    "steps": "steps",
+    "foot_slide_cm": "mean foot slide of a step, cm",
+    "predicted_turn_degrees": "largest turn of a joint in a frame as predicted, °",
+    "largest_turn_degrees": "largest turn of a joint in a frame as drawn, °",
+    "turns_held_back": "frames in which a turn was limited",
+    **{step: f"{step}, mean ms" for step in STEPS},
+    "median": "whole frame, median ms",
 }
-TRACK = "The character is steered around a track of six waypoints: it walks, side-steps, jogs and crouches."
 
 
 def section(found: Json, material: ReportMaterial) -> PageSection:
     """The track, the times of the laps, the published times, and a table of the laps."""
-    figures_of_track = track_figures(found)
-    return PageSection(
-        "speed",
-        [
-            SectionPart(0, Paragraph(TRACK) if figures_of_track else None),
-            SectionPart(10, KeyFigures(figures_of_track)),
-            SectionPart(15, track_chart(found)),
-            SectionPart(20, lap_chart(found, material)),
-            SectionPart(30, speed_table(found, material), open=True, short=True),
-            SectionPart(60, lap_table(found, material.name)),
-        ],
-        title="Steering and time per frame",
-        order=30,
-        nav="Steering and time",
-    )
+    if not found.get("laps"):
+        return PageSection("speed", [])
+    parts = [
+        SectionPart(0, Paragraph(words("speed.track"))),
+        SectionPart(10, KeyFigures(track_figures(found))),
+        SectionPart(15, track_chart(found)),
+        SectionPart(20, lap_chart(found, material)),
+        SectionPart(30, speed_table(found, material), open=True, short=True),
+        SectionPart(60, lap_table(found, material.name)),
+    ]
+    title, nav = "Steering and time per frame", "Steering and time"
+    return PageSection("speed", parts, title=title, order=30, nav=nav)
 
 
 def figures(found: Json, material: ReportMaterial) -> Iterator[KeyFigure]:
@@ -261,85 +231,75 @@ def figures(found: Json, material: ReportMaterial) -> Iterator[KeyFigure]:
 
 def hints(found: Json, material: ReportMaterial) -> Iterator[Hint]:
     """Whether a frame fits into 1/60 s, and whether the character followed the track."""
-    yield from with_order(60, _speed_hints(found))
-    yield from with_order(40, _track_hints(found))
+    if found.get("laps"):
+        yield from with_order(60, _speed_hints(found))
+        yield from with_order(40, _track_hints(found))
 
 
 def lap_table(found: Json, name: str) -> Table:
     """A row per lap: how it went, the mean time of each step of a frame, and the median time of a frame."""
-    laps = found.get("laps") or [{}]
-    columns = {key: column for key, column in LAP_COLUMNS.items() if key in laps[0]}
-    columns |= {step: Column.number(f"{step}, mean ms") for step in STEPS}
-    columns["median"] = Column.number("whole frame, median ms")
     records = [
-        lap
-        | {step: lap["milliseconds"][step] for step in STEPS}
-        | {"median": lap["milliseconds"]["spread"]["median"]}
+        {**lap, **lap["milliseconds"], "median": lap["milliseconds"]["spread"]["median"]}
         | ({"foot_slide_cm": None} if lap["steps"] < FEWEST_STEPS else {})
-        for lap in found.get("laps", ())
+        for lap in found["laps"]
     ]
-    return Table.of(f"{name}-responsivity", columns, records)
+    show = {"finished": lambda finished: "yes" if finished else "no"}
+    return table(f"{name}-responsivity", records, LAP_HEADS, show=show)
 
 
 def track_figures(found: Json) -> list[KeyFigure]:
     """Key figures: how well the character followed the track."""
-    if not found.get("laps"):
-        return []
-    spread, laps = found["milliseconds"]["spread"], found["laps"]
-    reached = f"{found['waypoints_reached']} of {found['waypoints']}"
+    from hobble.runtime.network_rows import FASTEST_TURN  # here, because planning need not load numba
+
+    laps = found["laps"]
     steps = sum(lap["steps"] for lap in laps)
     slide = None if steps < FEWEST_STEPS else found["foot_slide_cm"]
-    slide_note = f"mean slide of a toe during a stance, averaged over the laps ({steps:,} steps)"
-    finished = f"{found['laps_finished']} of {len(laps)} laps finished"
-    overshoot = format_number(found["path_overshoot_cm"])
+    turn = words(
+        "speed.turn",
+        limit=f"{np.degrees(FASTEST_TURN):.0f}",
+        limited=f"{found['turns_held_back']:,} of {sum(lap['frames'] for lap in laps):,} frames",
+        drawn=format_number(found["largest_turn_degrees"]),
+    )
+    reached = f"{found['waypoints_reached']} of {found['waypoints']}"
+    overshoot, slow = format_number(found["path_overshoot_cm"]), found["milliseconds"]["spread"]["p99"]
     return [
-        KeyFigure("Waypoints reached", reached, "", finished),
+        KeyFigure("Waypoints reached", reached, "", f"{found['laps_finished']} of {len(laps)} laps finished"),
         KeyFigure("Largest distance from the track", overshoot, "cm", "the largest of all laps"),
-        KeyFigure("Foot slide", format_number(slide), "cm" if slide is not None else "", slide_note),
-        _turn_figure(found),
-        KeyFigure("Slow frames", format_number(spread["p99"]), "ms", "1 % of the frames are slower"),
+        KeyFigure(
+            "Foot slide",
+            format_number(slide),
+            "cm" if slide is not None else "",
+            words("speed.slide", steps=f"{steps:,}"),
+        ),
+        KeyFigure("Largest predicted turn", format_number(found["predicted_turn_degrees"]), "°", turn),
+        KeyFigure("Slow frames", format_number(slow), "ms", "1 % of the frames are slower"),
     ]
 
 
-def _turn_figure(found: Json) -> KeyFigure:
-    """The largest turn of a joint in one frame: as predicted, and as drawn after the runtime's limit."""
-    drawn, predicted = (
-        format_number(found.get(key)) for key in ("largest_turn_degrees", "predicted_turn_degrees")
-    )
-    from hobble.runtime.network_rows import FASTEST_TURN  # here, because planning need not load numba
-
-    limit = f"{np.degrees(FASTEST_TURN):.0f}°"
-    if found.get("predicted_turn_degrees") is None:
-        return KeyFigure(
-            "Largest turn of a joint", drawn, "°", f"in one frame, as drawn; the runtime limits it to {limit}"
-        )
-    frames = sum(lap.get("frames") or 0 for lap in found["laps"])
-    limited_frames = f"{found['turns_held_back']:,} of {frames:,} frames"
-    note = f"of a joint in one frame, as predicted; the runtime limited it to {limit} in {limited_frames}; "
-    note += f"after the feet were put on the ground, the largest turn was {drawn}°"
-    return KeyFigure("Largest predicted turn", predicted, "°", note)
-
-
-def speed_table(found: Json, material: ReportMaterial) -> Table | None:
+def speed_table(found: Json, material: ReportMaterial) -> Table:
     """A table of milliseconds per frame: ours in each phase mode, followed by the published means.
 
     Mean and standard deviation (n - 1) are those of the means of the laps, as published.
     """
-    if not found.get("milliseconds"):
-        return None
-    sources = material.published["sources"]
-    rows: list[list[Any]] = []
-    for entry in found.get("modes", [found]):
-        whose = f"{material.name}, {entry['mode']} phase"
-        rows.append([whose, frame_milliseconds(entry), *mean_and_sd(lap_means(entry)), "this report"])
+    rows: list[Row] = []
+    for entry in found["modes"]:
+        mean, sd = mean_and_sd(lap_means(entry))
+        name = f"{material.name}, {entry['mode']} phase"
+        times = {"median": frame_milliseconds(entry), "milliseconds": mean, "sd": sd}
+        rows.append({"network": name, **times, "source": "this report"})
     for entry in (*material.published["responsivity"], *material.published["modes"]):
-        what = entry.get("label") or f"prediction alone, {entry['configuration']}, {entry['mode']} phase"
-        what += ", constant phase" if "label" in entry else ""
-        rows.append([what, None, entry["milliseconds"], entry.get("sd"), citation(entry, sources)])
-    columns = [Column("network"), Column.number("median of all frames, ms")]
-    columns += [Column.number("mean of the laps, ms per frame"), Column.number("sd of the laps, ms")]
-    columns.append(Column("source", kind="long"))
-    return Table(f"{material.name}-published-speed", columns, rows, "Comparison with published results")
+        name = entry.get("label") or f"prediction alone, {entry['configuration']}, {entry['mode']} phase"
+        name += ", constant phase" if "label" in entry else ""
+        rows.append({**entry, "network": name, "source": citation(entry, material.published["sources"])})
+    heads = {
+        "network": "network",
+        "median": "median of all frames, ms",
+        "milliseconds": "mean of the laps, ms per frame",
+        "sd": "sd of the laps, ms",
+        "source": "source",
+    }
+    title = "Comparison with published results"
+    return table(f"{material.name}-published-speed", rows, heads, title, long=["source"])
 
 
 def frame_milliseconds(found: Json) -> float:
@@ -348,56 +308,33 @@ def frame_milliseconds(found: Json) -> float:
 
 
 def _speed_hints(found: Json) -> Iterator[Hint]:
-    if not found.get("milliseconds"):
-        return
     milliseconds, slow = frame_milliseconds(found), found["milliseconds"]["spread"]["p99"]
     if milliseconds > FRAME_BUDGET_MS:
-        yield Hint(
-            "warn",
-            f"A frame takes {milliseconds:.1f} ms, too slow for 60 Hz.",
-            "Try mode: linear in the section runtime.",
-        )
+        head = f"A frame takes {milliseconds:.1f} ms, too slow for 60 Hz."
+        yield Hint("warn", head, "Try mode: linear in the section runtime.")
     elif slow > FRAME_BUDGET_MS:
-        yield Hint(
-            "warn",
-            f"1 % of the frames take {slow:.1f} ms or more, too slow for 60 Hz.",
-            f"The median is {milliseconds:.2f} ms. Measure again while nothing else runs on the machine.",
-        )
+        head = f"1 % of the frames take {slow:.1f} ms or more, too slow for 60 Hz."
+        yield Hint("warn", head, words("speed.slow", median=f"{milliseconds:.2f}"))
     else:
-        share = 100 * milliseconds / FRAME_BUDGET_MS
-        yield Hint(
-            "good",
-            f"A frame takes {share:.1f} % of the 16.7 ms that 60 Hz allows. 99 of 100 frames take at "
-            f"most {math.ceil(100 * slow / FRAME_BUDGET_MS)} % of that time.",
-            "That is fast enough for a game.",
-        )
+        share, most = 100 * milliseconds / FRAME_BUDGET_MS, math.ceil(100 * slow / FRAME_BUDGET_MS)
+        head = words("speed.fast", share=f"{share:.1f}", most=most)
+        yield Hint("good", head, "That is fast enough for a game.")
 
 
 def _track_hints(found: Json) -> Iterator[Hint]:
-    reached, total = (found.get(key) for key in ("waypoints_reached", "waypoints"))
-    if total and reached is not None and reached < total:
-        yield Hint(
-            "warn",
-            f"The character reached {reached} of {total} waypoints.",
-            "It circles around a waypoint or stops before it. See the laps in the section on steering.",
-        )
-    drawn, predicted = (found.get(key) for key in ("largest_turn_degrees", "predicted_turn_degrees"))
-    if drawn is not None and drawn > FLIP_DEGREES:
-        yield Hint(
-            "warn",
-            f"A joint turned by {drawn:.0f} degrees in one frame.",
-            "It flips, which is visible on a skinned character.",
-        )
-    elif predicted is not None and predicted > FLIP_DEGREES:
-        yield Hint(
-            "note",
-            f"The network predicted a turn of a joint by {predicted:.0f} degrees in one frame.",
-            f"As drawn, no joint turned by more than {drawn:.0f} degrees. Check whether joint rotations flip "
-            "in the clips.",
-        )
+    reached, total = found["waypoints_reached"], found["waypoints"]
+    if reached < total:
+        head = f"The character reached {reached} of {total} waypoints."
+        yield Hint("warn", head, words("speed.circles"))
+    drawn, predicted = found["largest_turn_degrees"], found["predicted_turn_degrees"]
+    if drawn > FLIP_DEGREES:
+        head = f"A joint turned by {drawn:.0f} degrees in one frame."
+        yield Hint("warn", head, "It flips, which is visible on a skinned character.")
+    elif predicted > FLIP_DEGREES:
+        head = f"The network predicted a turn of a joint by {predicted:.0f} degrees in one frame."
+        yield Hint("note", head, words("speed.flips", drawn=f"{drawn:.0f}"))
 
 
-NAME = "responsivity"
 # Three ways to count the weights and biases that one frame uses, explained at `parameter_counts` in
 # hobble.measures.responsivity.run. compare.json calls such a count "computations".
 COUNTS = ("true", "table_6_1", "table_6_1_as_printed")
@@ -428,7 +365,7 @@ def tables(compared: Json) -> dict[str, Sequence[Row]]:
     """Three tables: every lap; the published laps; the lines of time over size, without their points."""
     fit = compared["milliseconds"]["fit"]
     return {
-        NAME: [lap for entry in compared[NAME] for lap in _lap_rows(entry)],
+        "responsivity": [lap for entry in compared["responsivity"] for lap in _lap_rows(entry)],
         "published-laps": published_lap_rows(compared["published"]),
         "fit": [{k: v for k, v in row.items() if k not in ("x", "y")} for row in fit],
     }
@@ -436,12 +373,12 @@ def tables(compared: Json) -> dict[str, Sequence[Row]]:
 
 def mode_entries(results: ConfigurationResults) -> list[Json]:
     """A configuration's results in each phase mode that was run. The key `configuration` has its name."""
-    found = results.results_of(NAME)
-    return [{**entry, "configuration": results.name} for entry in found.get("modes", [found])]
+    modes = results.results_of("responsivity")["modes"]
+    return [{**entry, "configuration": results.name} for entry in modes]
 
 
 def _sizes(results: ConfigurationResults) -> dict[str, Any]:
-    found = results.results_of(NAME)
+    found = results.results_of("responsivity")
     counts = found["parameters"]
     return {
         "computations": {key: counts[key] if counts else None for key in COUNTS},
@@ -453,21 +390,20 @@ def _sizes(results: ConfigurationResults) -> dict[str, Any]:
 def time_differences(all_measured: Sequence[ConfigurationResults]) -> list[dict[str, Any]]:
     """How much the frame times of any two configurations differ, in each phase mode that both have run.
 
-    The difference is computed by eq. 3.2 of Segerstedt (2021), see `pair`.
+    The difference is computed by eq. 3.2 of Segerstedt (2021), see `compare_series`.
     """
-    series = {m.name: {e["mode"]: _time_series(e) for e in mode_entries(m)} for m in all_measured}
+    series: dict[str, dict[str, Json]] = {}
+    for results in all_measured:
+        for entry in mode_entries(results):
+            times = entry["milliseconds"]
+            of_mode = {"mean": times["total"], "sd": times["spread"]["sd"], "means": lap_means(entry)}
+            series.setdefault(results.name, {})[entry["mode"]] = of_mode
     return [
         {"a": a, "b": b, "over": mode, **compare_series(series[a][mode], series[b][mode])}
         for a, b in combinations(series, 2)
         for mode in series[a]
         if mode in series[b]
     ]
-
-
-def _time_series(entry: Json) -> Json:
-    """The times of a frame in one phase mode, as `compare_series` takes them."""
-    times = entry["milliseconds"]
-    return {"mean": times["total"], "sd": times["spread"]["sd"], "means": lap_means(entry)}
 
 
 def fit_lines(all_measured: Sequence[ConfigurationResults], published: Json) -> list[dict[str, Any]]:
@@ -479,26 +415,33 @@ def fit_lines(all_measured: Sequence[ConfigurationResults], published: Json) -> 
     slope: milliseconds per computation. Configurations with the same network are separate points. Networks
     without layers are left out.
     """
-    points: dict[tuple[str, str | None, str, str], list[tuple[int, float]]] = {}  # (computations, ms)
-    entries = [(m.results_of(NAME)["parameters"], entry) for m in all_measured for entry in mode_entries(m)]
+    entries = [
+        (m.results_of("responsivity")["parameters"], entry) for m in all_measured for entry in mode_entries(m)
+    ]
     entries = [(sizes, entry) for sizes, entry in entries if sizes]
     modes = dict.fromkeys(entry["mode"] for _, entry in entries)
+    out = []
+
+    def add(
+        whose: str, mode: str | None, step: str, counts: str, points: Sequence[tuple[int, float]]
+    ) -> None:
+        """points: (computations, milliseconds)."""
+        labels = {"whose": whose, "mode": mode, "step": step, "computations": counts}
+        x, y = [size for size, _ in points], [time for _, time in points]
+        out.append({**labels, "x": x, "y": y, **fit_line(x, y)})
+
     for counts, mode, step in product(COUNTS, modes, ("total", "predict", "median")):
-        points["hobble", mode, step, counts] = [
-            (sizes[counts], (e["milliseconds"]["spread"] if step == "median" else e["milliseconds"])[step])
+        times = [
+            (sizes[counts], (e["milliseconds"] | e["milliseconds"]["spread"])[step])
             for sizes, e in entries
             if e["mode"] == mode
         ]
-    times = {row["configuration"]: row["milliseconds"] for row in published["responsivity"]}
+        add("hobble", mode, step, counts, times)
+    published_times = {row["configuration"]: row["milliseconds"] for row in published["responsivity"]}
     for counts, key in (("true", "parameters"), ("table_6_1_as_printed", "table_6_1")):
-        rows = [row for row in published["computations"] if row["configuration"] in times]
-        points["published", None, "total", counts] = [(r[key], times[r["configuration"]]) for r in rows]
-    keys = ("whose", "mode", "step", "computations")
-    return [
-        {**dict(zip(keys, head, strict=True)), "x": x, "y": y, **fit_line(x, y)}
-        for head, some in points.items()
-        for x, y in [([x for x, _ in some], [y for _, y in some])]
-    ]
+        rows = [row for row in published["computations"] if row["configuration"] in published_times]
+        add("published", None, "total", counts, [(r[key], published_times[r["configuration"]]) for r in rows])
+    return out
 
 
 def lap_means(entry: Json) -> list[float]:
@@ -556,12 +499,11 @@ def _lap_rows(entry: Json) -> list[Row]:
     rows: list[Row] = []
     for lap in entry["laps"]:
         times = lap["milliseconds"]
-        row = {key: value for key, value in lap.items() if key != "milliseconds"}
         of_steps = {f"milliseconds_{key}": times[key] for key in (*STEPS, "total")}
         of_steps |= {f"milliseconds_{key}_sd": sd for key, sd in times["sd"].items()}
-        spread = {f"milliseconds_{key}": value for key, value in flatten(times["spread"]).items()}
-        head = {"configuration": entry["configuration"], "mode": entry["mode"]}
-        rows.append({**head, **row, **of_steps, **spread})
+        of_steps |= {f"milliseconds_{key}": value for key, value in times["spread"].items()}
+        row = {key: value for key, value in lap.items() if key != "milliseconds"}
+        rows.append({"configuration": entry["configuration"], "mode": entry["mode"], **row, **of_steps})
     return rows
 
 
@@ -575,11 +517,12 @@ def published_lap_rows(published: Json) -> list[Row]:
 
 def compared_section(compared: Compared) -> PageSection:
     """Charts of the times of the laps, and of the time of a frame over the size of the network."""
+    rows, title = published_lap_rows(compared["published"]), "Table A.3 of Segerstedt, ms per frame"
     parts = [
         SectionPart(10, lap_lines(compared)),
         SectionPart(15, lap_boxes(compared)),
         SectionPart(20, fit_chart(compared)),
-        SectionPart(30, published_laps(compared)),
+        SectionPart(30, table("compare-published-laps", rows, title=title)),
     ]
     return PageSection("speed", parts, title="Time per frame", order=30)
 
@@ -662,40 +605,22 @@ def lap_lines(compared: Compared) -> Chart:
             x, label = list(range(1, len(laps) + 1)), f"{name}, published"
             published = line_trace(label, x, laps, colours[name], dash="dot", width=1.2)
             options.setdefault("constant phase", []).append(published)
-    return Chart(
-        "compare-laps",
-        "Milliseconds per frame, lap by lap",
-        "Mean time of a whole frame in each lap of the track. Dotted lines are the laps of Segerstedt "
-        "(2021), who used the mode constant, on another machine.",
-        layout={"xaxis": axis("lap", dtick=1), "yaxis": axis("ms per frame", rangemode="tozero")},
-        choose="Phase mode",
-        options=options,
-    )
+    layout = {"xaxis": axis("lap", dtick=1), "yaxis": axis("ms per frame", rangemode="tozero")}
+    return chart("compare-laps", layout=layout, choose="Phase mode", options=options)
 
 
 def lap_boxes(compared: Compared) -> Chart:
     """A box over the laps of each configuration in the mode constant, ours and published (Figure 5.2)."""
     ours = {e["configuration"]: lap_means(e) for e in compared["responsivity"] if e["mode"] == "constant"}
-    theirs, traces = compared["published"]["laps"], []
-    for name in configuration_names(compared):
-        for whose, laps, colour in (("ours", ours, "@accent"), ("published", theirs, "@muted")):
-            if name in laps:
-                box: Trace = {"type": "box", "name": f"{name}, {whose}", "y": laps[name], "boxmean": True}
-                traces.append({**box, "line": {"width": 1.6, "color": colour}})
-    return Chart(
-        "compare-lap-boxes",
-        "Spread of the laps",
-        "Boxes over the mean times of laps in the phase mode constant. Grey boxes are those of Segerstedt.",
-        traces,
-        {"yaxis": axis("ms per frame", rangemode="tozero"), "showlegend": False},
-    )
-
-
-def published_laps(compared: Compared) -> Table:
-    """Table A.3, unfolded on demand."""
-    rows = published_lap_rows(compared["published"])
-    columns = {key: Column.number(key, 6) for key in rows[0]} | {"lap": Column.count("lap")}
-    return Table.of("compare-published-laps", columns, rows, "Table A.3 of Segerstedt, ms per frame")
+    theirs = compared["published"]["laps"]
+    traces = [
+        boxes(f"{name}, {whose}", colour, y=laps[name], boxmean=True)
+        for name in configuration_names(compared)
+        for whose, laps, colour in (("ours", ours, "@accent"), ("published", theirs, "@muted"))
+        if name in laps
+    ]
+    layout = {"yaxis": axis("ms per frame", rangemode="tozero"), "showlegend": False}
+    return chart("compare-lap-boxes", traces, layout)
 
 
 def fit_chart(compared: Compared) -> Chart | None:
@@ -723,8 +648,4 @@ def fit_chart(compared: Compared) -> Chart | None:
         "xaxis": axis("parameters of one frame", tickformat="~s", rangemode="tozero"),
         "yaxis": axis("ms per frame", rangemode="tozero"),
     }
-    caption = (
-        "If the dots lie on a straight line, the time of a frame is a constant plus a time proportional to "
-        "the number of parameters."
-    )
-    return Chart("compare-fit", "Frame time over network size", caption, traces, layout, 340)
+    return chart("compare-fit", traces, layout)

@@ -1,18 +1,16 @@
 """Laps of the waypoint track: how closely the character follows it, and the time of each step of a frame.
 
-All laps are walked at the same time, each by its own character. Lap 1 begins and ends at one waypoint, lap 2
-at the next, and so on around the track. If there are more laps than waypoints, several laps begin at the same
-waypoint. Their characters start at different distances before this waypoint. So they reach it at different
-moments of their gait and by slightly different paths, and no two laps are the same.
-
-To measure the times, one character alone walks each lap again.
+Lap 1 begins and ends at one waypoint, lap 2 at the next, and so on around the track. If there are more laps
+than waypoints, several laps begin at the same waypoint. Their characters start at different distances before
+this waypoint. So they reach it at different moments of their gait and by slightly different paths, and no two
+laps are the same.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from itertools import pairwise
+from collections.abc import Sequence
+from itertools import pairwise, starmap
+from math import dist
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
@@ -37,142 +35,102 @@ PATH_STEP = 15  # of a path, the place in every 15th frame is stored
 STORED_PATHS = 5  # the paths of this many laps are stored
 RUN_UP = 1000.0  # cm; a character starts at most this far before the waypoint where its lap begins
 WARM_UP = 60  # the first frames are not measured, because compiled code is loaded in them
-# The first columns of the table of laps, and the statistics of a frame's time that come last.
-LAP_COLUMNS = (
-    "lap",
-    "finished",
-    "frames",
-    "seconds",
-    "waypoints_reached",
-    "path_overshoot_cm",
-    "path_distance_cm",
-    "foot_slide_cm",
-    "steps",
-    "largest_turn_degrees",
-    "predicted_turn_degrees",
-    "turns_held_back",
-)
-SPREAD = ("sd", "median", "p99", "whole_call")
 
 
-@dataclass(frozen=True)
-class LapStarts:
-    """Where the characters of C laps start.
+def lap_starts(track: Sequence[Waypoint], laps: int) -> list[tuple[Array, Array, int]]:
+    """Where the characters of `laps` laps start: place and facing direction (x and z, cm), and waypoint.
 
-    places: (C, 2) x and z, cm. facing: (C, 2) direction in which the character looks. waypoints: (C,) index
-    of the waypoint where the lap begins.
+    A lap begins at this waypoint, given by its index in the track: the first lap at the last waypoint, the
+    second lap at the first waypoint.
     """
-
-    places: Array
-    facing: Array
-    waypoints: np.ndarray
-
-    def place_characters(self, animation: ProceduralAnimation, laps: slice) -> None:
-        """Put the characters of `animation` at the starts of the laps in the slice `laps`, one at each.
-
-        The characters must follow the track.
-        """
-        animation.reset(self.places[laps], self.facing[laps])
-        assert animation.follower is not None
-        animation.follower.reached[:] = self.waypoints[laps]
-
-
-def lap_starts(track: Sequence[Waypoint], laps: int) -> LapStarts:
-    """The starts of `laps` laps.
-
-    The first lap begins at the last waypoint of the track, the second lap at the first waypoint.
-    """
-    count = len(track)
-    waypoints = (np.arange(laps) - 1) % count
     corners = np.array([waypoint.position for waypoint in track], float)
     ways = corners - np.roll(corners, 1, axis=0)  # way n leads to waypoint n
-    lengths = np.hypot(ways[:, 0], ways[:, 1])
-    # Laps that begin at the same waypoint start at evenly spaced distances before it.
-    rounds = -(-laps // count)  # the largest number of laps that begin at one waypoint
-    distances = np.arange(laps) // count / rounds * np.minimum(lengths, RUN_UP)[waypoints]
-    places = (
-        corners[waypoints] - (distances / np.maximum(lengths[waypoints], 1e-9))[:, None] * ways[waypoints]
-    )
-    # A character faces the waypoint where its lap begins, or the next one if it starts there.
-    facing = ways[np.where(distances > 0, waypoints, (waypoints + 1) % count)]
-    return LapStarts(places, facing, waypoints)
+    lengths = np.hypot(*ways.T)
+    rounds = -(-laps // len(track))  # the largest number of laps that begin at one waypoint
+    starts = []
+    for lap in range(laps):
+        waypoint = (lap - 1) % len(track)
+        # Laps that begin at the same waypoint start at evenly spaced distances before it.
+        distance = lap // len(track) / rounds * min(lengths[waypoint], RUN_UP)
+        place = corners[waypoint] - distance / max(lengths[waypoint], 1e-9) * ways[waypoint]
+        # A character faces the waypoint where its lap begins, or the next one if it starts there.
+        facing = ways[waypoint if distance > 0 else (waypoint + 1) % len(track)]
+        starts.append((place, facing, waypoint))
+    return starts
 
 
 def walk_laps(
     network: Network, runtime: Runtime, laps: int, longest: int, track: Sequence[Waypoint]
-) -> list[tuple[Json, Json, int]]:
-    """Walk `laps` laps of at most `longest` frames.
+) -> list[tuple[Json, Json, Array]]:
+    """Walk `laps` laps of at most `longest` frames, one after another.
 
-    Returns how each lap went, its path, and how many frames its character walked before it began. If a
-    character does not reach the waypoint where its lap begins within `longest` frames, its lap begins at the
-    character's start, with no waypoint reached.
+    Returns how each lap went, its path, and (F, steps + 1) the seconds of each step in each of its frames,
+    then of the whole call.
     """
-    starts = lap_starts(track, laps)
-    animation = ProceduralAnimation(network, characters=laps, waypoints=track, **dict(runtime))
-    starts.place_characters(animation, slice(None))
-    recorded = _record(animation, starts.waypoints + 1, longest)
-    return [_measure_lap(recorded, c, int(starts.waypoints[c]) + 1, len(track), longest) for c in range(laps)]
+    animation = ProceduralAnimation(network, waypoints=track, **dict(runtime))
+    for _ in range(WARM_UP):
+        animation.next_pose()
+    return [
+        _walk_lap(animation, lap, *start, longest) for lap, start in enumerate(lap_starts(track, laps), 1)
+    ]
 
 
-@dataclass(frozen=True)
-class _Recorded:
-    """F frames of C characters.
+def _walk_lap(
+    animation: ProceduralAnimation, lap: int, place: Array, facing: Array, waypoint: int, longest: int
+) -> tuple[Json, Json, Array]:
+    """Walk one lap, see `walk_laps`. lap: its number. place, facing, waypoint: from `lap_starts`.
 
-    toes: (F, C, 2, 3) positions of the toe joints, cm. contacts: (F, C, 4) of left heel, left toe, right
-    heel, right toe. places: (F, C, 2) x and z of the root, cm. The other fields are (F, C). off_track:
-    distance from the track, cm. reached: index of the next waypoint; after the last waypoint of the track it
-    goes on rising. drawn_turn, predicted_turn: the largest turn of a joint since the frame before, as drawn
-    and as predicted, degrees (0 in the first frame). limited: whether the runtime limited the turn of any
-    joint, between the prediction and the placing of the feet, which gives the drawn rotation.
+    The way to the waypoint where the lap begins does not belong to it. If the character does not get there
+    within `longest` frames, its lap begins at the character's start, with no waypoint reached.
     """
-
-    toes: Array
-    contacts: Array
-    places: Array
-    off_track: Array
-    reached: np.ndarray
-    drawn_turn: Array
-    predicted_turn: Array
-    limited: np.ndarray
-
-
-def _record(animation: ProceduralAnimation, first: np.ndarray, longest: int) -> _Recorded:
-    """Walk until the laps of all characters are over.
-
-    first: (C,) value of `reached` with which each lap begins. longest: a lap lasts at most this many frames.
-    """
-    follower, skeleton, count = animation.follower, animation.skeleton, animation.characters
+    animation.reset(place, facing)
+    follower, skeleton = animation.follower, animation.skeleton
     assert follower is not None
-    goal = first + len(follower.track)  # value of `reached` at the end of each lap
+    follower.reached[:] = waypoint
     toes = [skeleton.role("left_toe"), skeleton.role("right_toe")]
-    recorded: list[tuple[Array, ...]] = []  # for each frame, the fields of `_Recorded`
+    first, waypoints = waypoint + 1, len(follower.track)
+    recorded: list[tuple[Any, ...]] = []
+    begin = None  # number of frames before the lap
     before: tuple[Array, Array] | None = None  # drawn and predicted rotations in the frame before
-    lap_frames = np.zeros(count, int)
     while True:
-        begun = follower.reached >= first
-        lap_frames[begun] += 1
-        # A lap is over at its goal or after `longest` frames, or if it has not begun after `longest` frames.
-        late = ~begun & (len(recorded) >= longest)
-        if np.all((follower.reached >= goal) | (lap_frames >= longest) | late):
+        reached = int(follower.reached[0])  # index of the next waypoint; after the last it goes on rising
+        if begin is None and reached >= first:
+            begin = len(recorded) - 1 if recorded else 0
+        if reached >= first + waypoints or len(recorded) >= (begin or 0) + longest:
             break
+        began = perf_counter()
         pose = animation.next_pose()
-        drawn = pose.rotations.reshape(count, -1, 4)
-        predicted = world_rotations(*animation.predicted_turns)
+        seconds = [*animation.seconds, perf_counter() - began]
+        drawn, predicted = pose.rotations, world_rotations(*animation.predicted_turns)[0]
         before = before or (drawn, predicted)
+        turns = [turns_between(np.stack(pair))[0] for pair in ((before[0], drawn), (before[1], predicted))]
+        limited = turn_was_limited(predicted, animation.state.joint_rotation[0])
+        off, now = float(follower.off_path[0]), int(follower.reached[0])
         recorded.append(
-            (
-                pose.positions.reshape(count, -1, 3)[:, toes],
-                np.atleast_2d(pose.contacts),
-                np.atleast_2d(pose.root)[:, ::2],
-                follower.off_path.copy(),
-                follower.reached.astype(int),
-                turns_between(np.stack([before[0], drawn]))[0],
-                turns_between(np.stack([before[1], predicted]))[0],
-                turn_was_limited(predicted, animation.state.joint_rotation),
-            )
+            (pose.positions[toes], pose.contacts, pose.root[::2], off, now, *turns, limited, seconds)
         )
         before = drawn, predicted
-    return _Recorded(*(np.array(values) for values in zip(*recorded, strict=True)))
+    of_lap = recorded[begin or 0 :]
+    toe, contacts, places, off_track, reached_at, drawn_turn, predicted_turn, limited, times = (
+        np.array(values) for values in zip(*of_lap, strict=True)
+    )
+    slides, passed = foot_slide(toe, contacts), max(0, int(reached_at[-1]) - first)
+    result = {
+        "lap": lap,
+        "finished": passed == waypoints,
+        "frames": len(of_lap),
+        "seconds": round(len(of_lap) / FPS, 3),
+        "waypoints_reached": passed,
+        "path_overshoot_cm": round(float(np.max(off_track)), 3),
+        "path_distance_cm": round(float(np.mean(off_track)), 3),
+        "foot_slide_cm": round(float(slides.mean()), 4) if len(slides) else None,
+        "steps": len(slides),
+        # Without the lap's first frame, because its turn is since the frame before the lap.
+        "largest_turn_degrees": round(float(drawn_turn[1:].max(initial=0.0)), 3),
+        "predicted_turn_degrees": round(float(predicted_turn[1:].max(initial=0.0)), 3),
+        "turns_held_back": int(limited.sum()),
+    }
+    return result, _path(lap, places, off_track), times
 
 
 def turn_was_limited(predicted: Array, limited: Array) -> np.ndarray:
@@ -183,39 +141,6 @@ def turn_was_limited(predicted: Array, limited: Array) -> np.ndarray:
     # The dot product of two unit quaternions is 1 or -1 if they are the same rotation.
     same = np.abs(np.sum(predicted * limited, axis=-1)) > 1 - 1e-6
     return np.asarray((~same).any(axis=-1))
-
-
-def _measure_lap(
-    recorded: _Recorded, c: int, first: int, waypoints: int, longest: int
-) -> tuple[Json, Json, int]:
-    """How the lap of character c went, its path, and its first frame.
-
-    first: the value of `reached` with which the lap begins. waypoints: number of waypoints of the track.
-    longest: the lap lasts at most this many frames.
-    """
-    reached = recorded.reached[:, c]
-    begin = int(np.searchsorted(reached, first))
-    begin = 0 if begin == len(reached) else begin  # 0: the character never reached the lap's first waypoint
-    end = min(int(np.searchsorted(reached, first + waypoints)) + 1, begin + longest, len(reached))
-    # `turned` leaves out the lap's first frame, because its turn is since the frame before the lap.
-    span, turned = slice(begin, end), slice(begin + 1, end)
-    slides = foot_slide(recorded.toes[span, c], recorded.contacts[span, c])
-    off_track, reached_in_lap = recorded.off_track[span, c], max(0, int(reached[end - 1]) - first)
-    lap = {
-        "lap": c + 1,
-        "finished": reached_in_lap == waypoints,
-        "frames": end - begin,
-        "seconds": round((end - begin) / FPS, 3),
-        "waypoints_reached": reached_in_lap,
-        "path_overshoot_cm": round(float(np.max(off_track)), 3),
-        "path_distance_cm": round(float(np.mean(off_track)), 3),
-        "foot_slide_cm": round(float(slides.mean()), 4) if len(slides) else None,
-        "steps": len(slides),
-        "largest_turn_degrees": round(float(recorded.drawn_turn[turned, c].max(initial=0.0)), 3),
-        "predicted_turn_degrees": round(float(recorded.predicted_turn[turned, c].max(initial=0.0)), 3),
-        "turns_held_back": int(recorded.limited[span, c].sum()),
-    }
-    return lap, _path(c + 1, recorded.places[span, c], off_track), begin
 
 
 def _path(lap: int, places: Array, off_track: Array) -> dict[str, Any]:
@@ -234,33 +159,6 @@ def _path(lap: int, places: Array, off_track: Array) -> dict[str, Any]:
     }
 
 
-def timed_frames(
-    network: Network, runtime: Runtime, spans: Sequence[tuple[int, int]], track: Sequence[Waypoint]
-) -> list[Array]:
-    """For each lap, (F, steps + 1) seconds: of each step in each of its frames, then of the whole call.
-
-    The laps are those of `walk_laps`, but are walked one after another. A character alone does the same as
-    among others, to the last bit. spans: for each lap, the number of frames before it and of its own frames.
-    """
-    starts = lap_starts(track, len(spans))
-    animation = ProceduralAnimation(network, waypoints=track, **dict(runtime))
-    for _ in range(WARM_UP):
-        animation.next_pose()
-    out: list[Array] = []
-    for lap, (before, frames) in enumerate(spans):
-        starts.place_characters(animation, slice(lap, lap + 1))
-        for _ in range(before):
-            animation.next_pose()
-        times = np.empty((frames, len(STEPS) + 1))
-        for row in times:
-            began = perf_counter()
-            animation.next_pose()
-            row[-1] = perf_counter() - began
-            row[:-1] = animation.seconds
-        out.append(times)
-    return out
-
-
 def laps_in_mode(options: Options, mode: str, own: str) -> int:
     """The number of laps in a phase mode. own: that of the section `runtime`.
 
@@ -270,7 +168,7 @@ def laps_in_mode(options: Options, mode: str, own: str) -> int:
 
 
 def milliseconds(seconds: Array) -> dict[str, Any]:
-    """Statistics of frame times. seconds: (F, steps + 1), see `timed_frames`."""
+    """Statistics of frame times. seconds: (F, steps + 1), see `walk_laps`."""
 
     def of_steps(values: Array) -> dict[str, float]:
         return {step: round(float(v), 6) for step, v in zip(STEPS, values, strict=False)}
@@ -297,11 +195,8 @@ def measure_responsivity(
     configuration: str,
     runtime: Runtime,
     track: Sequence[Waypoint] = TRACK,
-    done: Mapping[str, Json] | None = None,
 ) -> dict[str, Any]:
     """Laps of the track of Segerstedt (2021), in the phase mode of `runtime` and in other modes.
-
-    done: mode -> what `laps_of_mode` returned for it, if its laps have already been walked.
 
     The result is described in docs/artefacts.md. Its key `modes` has the laps and the summary of each mode.
     The laps and the summary of the mode of `runtime` are also at the top level. Only the values under
@@ -311,22 +206,20 @@ def measure_responsivity(
     first STORED_PATHS laps in the mode of `runtime`.
     """
     own = network.resolve_mode(runtime.mode)
-    of_mode = dict(done or {})
+    of_mode = {}
     for mode in dict.fromkeys((*map(network.resolve_mode, options.modes), own)):
-        if mode not in of_mode:
-            in_mode = runtime.model_copy(update={"mode": mode})
-            laps = laps_in_mode(options, mode, own)
-            of_mode[mode] = laps_of_mode(network, in_mode, laps, options.lap_seconds, track)
+        in_mode = runtime.model_copy(update={"mode": mode})
+        laps = laps_in_mode(options, mode, own)
+        of_mode[mode] = laps_of_mode(network, in_mode, laps, options.lap_seconds, track)
+    places = [waypoint.position for waypoint in track]
     return {
         "configuration": configuration,
         "track": {
             "waypoints": len(track),
-            "metres": round(
-                sum(np.hypot(*(np.subtract(a.position, b.position))) for a, b in _segments(track)) / 100, 3
-            ),
+            "metres": round(sum(starmap(dist, pairwise([*places, places[0]]))) / 100, 3),
             "gaits": [waypoint.gait for waypoint in track],
-            "x": [waypoint.position[0] / 100 for waypoint in track],
-            "z": [waypoint.position[1] / 100 for waypoint in track],
+            "x": [x / 100 for x, _ in places],
+            "z": [z / 100 for _, z in places],
         },
         "runs": of_mode[own]["runs"],
         "parameters": parameter_counts(network.sizes) if network.sizes else None,
@@ -348,11 +241,7 @@ def laps_of_mode(
 ) -> dict[str, Any]:
     """All laps in the mode of `runtime`. lap_seconds: simulated time after which a lap is stopped."""
     walked = walk_laps(network, runtime, laps, int(lap_seconds * FPS), track)
-    times = timed_frames(network, runtime, [(before, lap["frames"]) for lap, _, before in walked], track)
-    results = [
-        {**lap, "milliseconds": milliseconds(seconds)}
-        for (lap, *_), seconds in zip(walked, times, strict=True)
-    ]
+    results = [{**lap, "milliseconds": milliseconds(seconds)} for lap, _, seconds in walked]
     entry = {
         "mode": runtime.mode,
         "laps": results,
@@ -365,7 +254,7 @@ def laps_of_mode(
         "largest_turn_degrees": max(lap["largest_turn_degrees"] for lap in results),
         "predicted_turn_degrees": max(lap["predicted_turn_degrees"] for lap in results),
         "turns_held_back": sum(lap["turns_held_back"] for lap in results),
-        "milliseconds": milliseconds(np.concatenate(times)),
+        "milliseconds": milliseconds(np.concatenate([seconds for *_, seconds in walked])),
     }
     return {"laps": entry, "runs": [path for _, path, _ in walked[:STORED_PATHS]]}
 
@@ -395,18 +284,11 @@ def lap_rows(result: Json) -> list[Row]:
     for entry in result["modes"]:
         for lap in entry["laps"]:
             times = lap["milliseconds"]
-            row = {"mode": entry["mode"], **{key: lap[key] for key in LAP_COLUMNS}}
+            row = {"mode": entry["mode"], **{key: v for key, v in lap.items() if key != "milliseconds"}}
             row |= {f"milliseconds_{key}": times[key] for key in (*STEPS, "total")}
             row |= {f"milliseconds_{key}_sd": times["sd"][key] for key in STEPS}
-            rows.append(row | {f"milliseconds_{key}": times["spread"][key] for key in SPREAD})
+            rows.append(row | {f"milliseconds_{key}": value for key, value in times["spread"].items()})
     return rows
-
-
-def run_piece(inputs: MeasureInputs, options: Options, piece: str) -> dict[str, Any]:
-    """The laps in one phase mode. piece: the name of the mode."""
-    runtime = inputs.runtime.model_copy(update={"mode": piece})
-    laps = laps_in_mode(options, piece, inputs.runtime.mode)
-    return laps_of_mode(load_network(inputs.weights), runtime, laps, options.lap_seconds)
 
 
 def run(inputs: MeasureInputs, options: Options) -> Outcome:
@@ -416,14 +298,8 @@ def run(inputs: MeasureInputs, options: Options) -> Outcome:
         options,
         configuration=inputs.configuration,
         runtime=inputs.runtime,
-        done=inputs.measured_pieces(),
     )
     reached = [
         f"{m['mode']}: {m['waypoints_reached']} of {m['waypoints']} waypoints" for m in result["modes"]
     ]
     return Outcome(result, {"laps": lap_rows(result)}, "; ".join(reached))
-
-
-def _segments(track: Sequence[Waypoint]) -> list[tuple[Waypoint, Waypoint]]:
-    """The two ends of each segment of the closed track. The last segment ends at the first waypoint."""
-    return list(zip(track, [*track[1:], track[0]], strict=True))

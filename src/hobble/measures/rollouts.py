@@ -8,7 +8,6 @@ if TYPE_CHECKING:
     from hobble.report.gather import ReportMaterial
 
 from collections.abc import Iterable, Iterator, Sequence
-from functools import partial
 from typing import Annotated, Any
 
 from pydantic import AfterValidator, Field
@@ -18,6 +17,7 @@ from hobble.core.section import Positive
 from hobble.measures.accuracy import COLOURS, NAMES
 from hobble.measures.compare import ComparisonAddition, ConfigurationResults
 from hobble.measures.measure import SPLITS, Cost, JointOptions, Measure, Row, SampleOptions, sample_in_words
+from hobble.measures.shown import chart
 from hobble.report.parts import SPLITS as SPLIT_LABELS
 from hobble.report.parts import (
     Chart,
@@ -61,38 +61,14 @@ MEASURE = Measure(
 
 
 def section(found: Json, material: ReportMaterial) -> PageSection:
-    """The chart, which is added to the section on accuracy."""
-    return PageSection("accuracy", [SectionPart(50, rollout_chart(found))])
-
-
-def sample_note(found: Json) -> str:
-    """Sentences about the measured sample and the error bars; empty if all clips were measured as a whole."""
-    words = sample_in_words(found)
-    return f" Measured on {words}. Whiskers are 95 % confidence intervals." if words else ""
-
-
-def rollout_chart(found: Json) -> Chart:
-    """How the error grows when the network continues from its own poses."""
-    traces: list[Trace] = []
-    for split, name in NAMES.items():
-        sampled = bool(found.get("sample"))
-        traces += _error_line(name, found.get("lengths", ()), split, COLOURS[split], sampled)
-    return Chart(
-        "rollouts",
-        "Error when the network continues from its own poses",
-        "Mean distance between a joint and its captured position. In a roll-out, the network continues from "
-        "its own poses, as at run time. The horizontal axis shows the length of the roll-outs (60 frames are "
-        "one second). If the line flattens, the character stays stable. A joint is drawn halfway between its "
-        "predicted position and the position to which its predicted velocity takes it. This chart measures "
-        "the drawn positions, before the feet are put on the ground. The charts above measure only the "
-        "predicted position, so their error differs from the value at 1 frame in this chart."
-        + sample_note(found),
-        traces,
-        _layout(traces),
-    )
-
-
-NAME = "rollouts"
+    """The chart, which is added to the section on accuracy: how the error grows in roll-outs."""
+    traces = [
+        trace
+        for split, name in NAMES.items()
+        for trace in _error_line(name, found.get("lengths", ()), split, COLOURS[split], "sample" in found)
+    ]
+    sample = {"more": ["sample"], "sample": sample_in_words(found)} if "sample" in found else {}
+    return PageSection("accuracy", [SectionPart(50, chart("rollouts", traces, _layout(traces), **sample))])
 
 
 def compared(all_measured: Sequence[ConfigurationResults], published: Json) -> ComparisonAddition:
@@ -101,7 +77,7 @@ def compared(all_measured: Sequence[ConfigurationResults], published: Json) -> C
         entries=[
             {"configuration": m.name, **{k: v for k, v in entry.items() if k != "clips"}}
             for m in all_measured
-            for entry in m.results_of(NAME)["lengths"]
+            for entry in m.results_of("rollouts")["lengths"]
         ]
     )
 
@@ -110,10 +86,10 @@ def tables(compared: Json) -> dict[str, list[Row]]:
     """One table, with a row for each configuration, length and split."""
     rows: list[Row] = [
         {"configuration": entry["configuration"], "length": entry["length"], "split": split, **entry[split]}
-        for entry in compared[NAME]
+        for entry in compared["rollouts"]
         for split in SPLITS
     ]
-    return {NAME: rows}
+    return {"rollouts": rows}
 
 
 FRAMES_PER_SECOND = 60
@@ -140,14 +116,9 @@ def compared_verdicts(compared: Compared) -> Iterator[Verdict]:
                 10,
                 "Closest to captured motion",
                 errors,
-                partial(_distance_words, ending),
+                lambda name, cm, ending=ending: f"the joints of {name} are {format_number(cm, 3)} {ending}",
             )
             return
-
-
-def _distance_words(ending: str, name: str, value: float) -> str:
-    """Half of a sentence: the mean distance `value` of the configuration `name`, followed by `ending`."""
-    return f"the joints of {name} are {format_number(value, 3)} {ending}"
 
 
 def compared_chart(compared: Compared) -> Chart:
@@ -158,15 +129,8 @@ def compared_chart(compared: Compared) -> Chart:
             rows = [r for r in compared.get("rollouts", ()) if r["configuration"] == name]
             if line := _error_line(name, rows, split, colour, bars=False):
                 options[label] = options.get(label, []) + line
-    return Chart(
-        "compare-rollouts",
-        "Error when a network continues from its own poses",
-        "Mean distance between a joint and its captured position. In a roll-out, a network continues from "
-        "its own poses. The horizontal axis shows the length of the roll-outs (60 frames are one second).",
-        layout=_layout(trace for traces in options.values() for trace in traces),
-        choose="Clips",
-        options=options,
-    )
+    layout = _layout(trace for traces in options.values() for trace in traces)
+    return chart("compare-rollouts", layout=layout, choose="Clips", options=options)
 
 
 def _error_line(name: str, entries: Iterable[Json], split: str, colour: str, bars: bool) -> list[Trace]:

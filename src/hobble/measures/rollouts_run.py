@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -21,7 +21,6 @@ import numpy as np
 
 from hobble.core.files import Json
 from hobble.core.quat import Array
-from hobble.database.statistics import Moments
 from hobble.measures.accuracy_run import check_layout, joint_indices, joints_to_measure
 from hobble.measures.measure import SPLITS, MeasureInputs, Outcome, Row
 from hobble.measures.sample import ClipPart, LoadedPart, Sample, clip_parts, sample_to_measure, with_sample
@@ -165,48 +164,6 @@ class RollOutCrowd:
 
 
 @dataclass(frozen=True)
-class RollOutErrors:
-    """Errors over `frames` frames of roll-outs.
-
-    moments: of the relative error and of the position error (cm). last: moments of the position error (cm)
-    and of the phase error (cycles) in the last frame of the `ended` roll-outs that reached their full length.
-    """
-
-    frames: int = 0
-    moments: Moments = field(default_factory=lambda: Moments.of_no_rows(2), repr=False)
-    last: Moments = field(default_factory=lambda: Moments.of_no_rows(2), repr=False)
-    ended: int = 0
-
-    def __add__(self, other: RollOutErrors) -> RollOutErrors:
-        return RollOutErrors(
-            self.frames + other.frames,
-            self.moments + other.moments,
-            self.last + other.last,
-            self.ended + other.ended,
-        )
-
-    def __mul__(self, weight: float) -> RollOutErrors:
-        """The same errors with each frame counted `weight` times."""
-        return RollOutErrors(self.frames, self.moments * weight, self.last * weight, self.ended)
-
-    def to_dict(self, phase: bool = True) -> dict[str, Any]:
-        """Plain data. Values are None if there are no frames, or no roll-outs that reached their full length.
-
-        phase: whether the network uses the phase. If not, the phase error has no meaning and is None.
-        """
-        has_frames, ended = self.frames > 0, self.ended > 0
-        return {
-            "frames": self.frames,
-            "mean": float(self.moments.mean[0]) if has_frames else None,
-            "sd": float(self.moments.std[0]) if has_frames else None,
-            "position_error_cm": float(self.moments.mean[1]) if has_frames else None,
-            "ended": self.ended,
-            "last_cm": float(self.last.mean[0]) if ended else None,
-            "last_phase": float(self.last.mean[1]) if ended and phase else None,
-        }
-
-
-@dataclass(frozen=True)
 class Stretch:
     """Consecutive frames of a clip or an excerpt. Roll-outs begin in its frames `first` to `stop` - 1."""
 
@@ -233,65 +190,59 @@ def stretches_of(loaded: LoadedPart, layout: RowLayout) -> list[Stretch]:
     return out
 
 
-def errors_of_stretches(
-    predictor: Predictor, stretches: Sequence[Stretch], joints: Sequence[int], lengths: Sequence[int]
-) -> list[dict[int, RollOutErrors]]:
-    """For each stretch: length -> errors of its roll-outs. Those of all stretches are computed together.
+def roll_out_sums(
+    predictor: Predictor, stretches: Sequence[Stretch], joints: Sequence[int], length: int
+) -> Array:
+    """(S, 7) for each of S stretches, sums over its roll-outs of a length. All are computed together.
 
-    joints: indices of the joints to measure.
+    Over the frames: 1, and means over the joints of the relative error, its square, and the position error
+    (cm). Over the roll-outs that reach their full length: 1, and in the last frame the position error (cm)
+    and the phase error (cycles). joints: indices of the joints to measure.
     """
+    sums = np.zeros((len(stretches), 7))
     if not stretches:
-        return []
+        return sums
     inputs = RollOutInputs(
         *(np.concatenate([getattr(s.inputs, f.name) for s in stretches]) for f in fields(RollOutInputs))
     )
     bounds = np.cumsum([0, *(len(s.inputs.x) for s in stretches)])  # in `inputs`
-    out: list[dict[int, RollOutErrors]] = [{} for _ in stretches]
-    for length in lengths:
-        starts = [stretch.starts(length) for stretch in stretches]
-        first = np.concatenate([begin + s for begin, s in zip(bounds[:-1], starts, strict=True)])
-        ends = np.repeat(bounds[1:], [len(s) for s in starts])
-        crowd = RollOutCrowd(predictor, inputs, first, np.minimum(first + length, ends))
-        parts = np.cumsum([0, *(len(s) for s in starts)])  # which roll-outs begin in which stretch
-        for by_length, errors in zip(out, _errors_of_crowd(crowd, parts, ends, joints, length), strict=True):
-            by_length[length] = errors
-    return out
-
-
-def _errors_of_crowd(
-    crowd: RollOutCrowd, parts: np.ndarray, ends: np.ndarray, joints: Sequence[int], length: int
-) -> list[RollOutErrors]:
-    """The errors of the roll-outs of S stretches.
-
-    parts: (S + 1,) index of the first roll-out of each stretch, then R. ends: (R,) index of the frame after
-    the stretch of a roll-out. length: of those that do not end with their stretch.
-    """
-    inputs, block = crowd.inputs, crowd.predictor.network.layout.y_joint_position
-    truth = inputs.y[:, block].reshape(len(inputs.y), -1, 3)[:, joints]
-    moments = [Moments.of_no_rows(2) for _ in parts[1:]]
-    last_cm = np.zeros(len(crowd.first))  # mean position error in the last frame
-    for alive, at, joint_positions in crowd.frames():
-        errors = relative_and_distance(truth[at].astype(float), joint_positions[:, joints])
-        last_cm[alive] = errors[..., 1].mean(axis=1)
-        bounds = np.searchsorted(alive, parts)
-        for s in np.flatnonzero(np.diff(bounds)).tolist():
-            own = errors[bounds[s] : bounds[s + 1]].reshape(-1, 2)
-            moments[s] = moments[s] + Moments.of_rows(own, np.full(len(own), 1 / len(joints)))
+    starts = [stretch.starts(length) for stretch in stretches]
+    which = np.repeat(np.arange(len(stretches)), list(map(len, starts)))  # stretch of each roll-out
+    first, ends = np.concatenate(starts) + bounds[which], bounds[which + 1]
+    crowd = RollOutCrowd(predictor, inputs, first, np.minimum(first + length, ends))
+    truth = inputs.y[:, predictor.network.layout.y_joint_position].reshape(len(inputs.y), -1, 3)[:, joints]
+    last_cm = np.zeros(len(first))
+    for alive, at, positions in crowd.frames():
+        relative, cm = np.moveaxis(
+            relative_and_distance(truth[at].astype(float), positions[:, joints]), -1, 0
+        )
+        last_cm[alive] = cm.mean(axis=1)
+        of_frames = (np.ones(len(at)), relative.mean(axis=1), (relative**2).mean(axis=1), last_cm[alive])
+        np.add.at(sums[:, :4], which[alive], np.column_stack(of_frames))
     # `phase` is that of the frame after a roll-out. Roll-outs that end with the stretch are not counted as
     # ended, because there is no captured phase for this frame.
-    ended = crowd.first + length < ends
-    truth_after = inputs.phase[np.where(ended, crowd.stop, 0)]
-    phase_error = np.abs(np.mod(crowd.phase - truth_after + 0.5, 1.0) - 0.5)  # 0 to half a cycle
-    last, frames = np.stack([last_cm, phase_error], axis=1), crowd.stop - crowd.first
-    out = []
-    for s, span in enumerate(map(slice, parts[:-1], parts[1:])):
-        full = ended[span]
-        out.append(
-            RollOutErrors(
-                int(frames[span].sum()), moments[s], Moments.of_rows(last[span][full]), int(full.sum())
-            )
-        )
-    return out
+    ended = first + length < ends
+    phase_error = np.abs(np.mod(crowd.phase[ended] - inputs.phase[crowd.stop[ended]] + 0.5, 1.0) - 0.5)
+    of_ended = np.column_stack([np.ones(ended.sum()), last_cm[ended], phase_error])
+    np.add.at(sums[:, 4:], which[ended], of_ended)
+    return sums
+
+
+def errors_of_sums(sums: Array, phase: bool = True) -> dict[str, Any]:
+    """Plain data from the sums (7,) of `roll_out_sums`. Values of no frames or no ended roll-outs are None.
+
+    phase: whether the network uses the phase. If not, the phase error has no meaning and is None.
+    """
+    frames, ended = sums[0], sums[4]
+    mean, squared, cm = sums[1:4] / max(frames, 1)
+    values = {"mean": mean, "sd": float(np.sqrt(max(0.0, squared - mean**2))), "position_error_cm": cm}
+    return {
+        "frames": int(frames),
+        **{key: float(value) if frames else None for key, value in values.items()},
+        "ended": int(ended),
+        "last_cm": float(sums[5] / ended) if ended else None,
+        "last_phase": float(sums[6] / ended) if ended and phase else None,
+    }
 
 
 def measure_roll_outs(
@@ -313,34 +264,36 @@ def measure_roll_outs(
     """
     network = load_network(weights)
     predictor, joints = network.predictor(mode), joint_indices(network, equivalents)
-    total = {length: dict.fromkeys(SPLITS, RollOutErrors()) for length in lengths}
-    of_clip: dict[int, dict[str, RollOutErrors]] = {length: {} for length in lengths}
-    excerpts: dict[int, dict[Excerpt, float | None]] = {length: {} for length in lengths}
+    # For each length, in the order of the clips: clip or excerpt -> sums.
+    of_parts: dict[int, dict[tuple[str, Excerpt | None], Array]] = {length: {} for length in lengths}
     for batch in _part_batches(clip_parts(clips, sample), network, lengths):
-        found = iter(errors_of_stretches(predictor, [s for _, some in batch for s in some], joints, lengths))
-        for part, stretches in batch:
-            of_part = [next(found) for _ in stretches]
-            for length in lengths:
-                errors = sum((by_length[length] for by_length in of_part), RollOutErrors())
-                weighed, clip_errors = errors * part.weight, of_clip[length]
-                total[length][splits[part.clip]] += weighed
-                clip_errors[part.clip] = clip_errors.get(part.clip, RollOutErrors()) + weighed
-                if part.excerpt is not None:
-                    excerpts[length][part.excerpt] = errors.to_dict()["position_error_cm"]
-            log.info("%s: %s", part.excerpt or part.clip, errors.to_dict(network.uses_phase))
-    entries = [
-        {
-            "length": length,
-            **{split: errors.to_dict(network.uses_phase) for split, errors in total[length].items()},
-            "clips": [
-                {"clip": name, "split": splits[name], **errors.to_dict(network.uses_phase)}
-                for name, errors in of_clip[length].items()
-            ],
-        }
-        for length in lengths
-    ]
-    if sample is not None:
-        _add_intervals(entries, sample, excerpts, splits)
+        stretches = [stretch for _, some in batch for stretch in some]
+        parts = np.cumsum([0, *(len(some) for _, some in batch)])
+        for length, sums_of_parts in of_parts.items():
+            sums = roll_out_sums(predictor, stretches, joints, length)
+            for (part, _), first, stop in zip(batch, parts[:-1], parts[1:], strict=True):
+                sums_of_parts[part.clip, part.excerpt] = sums[first:stop].sum(axis=0)
+        log.info("rolled out: %s", ", ".join(str(part.excerpt or part.clip) for part, _ in batch))
+    entries = []
+    for length, sums_of_parts in of_parts.items():
+        of_clip: dict[str, Array] = {}
+        for (clip, _), sums in sums_of_parts.items():
+            of_clip[clip] = of_clip.get(clip, np.zeros(7)) + sums
+        entry: dict[str, Any] = {"length": length}
+        for split in SPLITS:
+            total = sum((sums for clip, sums in of_clip.items() if splits[clip] == split), np.zeros(7))
+            entry[split] = errors_of_sums(total, network.uses_phase)
+            if sample and (drawn := sample.splits.get(split)) and total[0]:
+                # An excerpt that is too short for a roll-out counts with the mean of the split.
+                of_parts_drawn = {e: sums_of_parts[e.clip, e] for e in drawn.drawn}
+                known = {e: sums if sums[0] else total for e, sums in of_parts_drawn.items()}
+                means = {e: sums[3] / sums[0] for e, sums in known.items()}
+                entry[split]["interval"] = {"position_error_cm": drawn.confidence_half_width(means)}
+        entry["clips"] = [
+            {"clip": clip, "split": splits[clip], **errors_of_sums(sums, network.uses_phase)}
+            for clip, sums in of_clip.items()
+        ]
+        entries.append(entry)
     result = {"configuration": configuration, "joints": len(joints), "mode": mode, "lengths": entries}
     return with_sample(result, sample)
 
@@ -363,29 +316,6 @@ def _part_batches(
             batch, rows = [], 0
     if batch:
         yield batch
-
-
-def _add_intervals(
-    entries: Sequence[dict[str, Any]],
-    sample: Sample,
-    excerpts: Mapping[int, Mapping[Excerpt, float | None]],
-    splits: Mapping[str, str],
-) -> None:
-    """Add the confidence interval of each split to the entry of each length.
-
-    excerpts: length -> position error of each excerpt, cm. It is None for an excerpt that is too short for a
-    roll-out; the mean of the split is then used.
-    """
-    for entry in entries:
-        for split in SPLITS:
-            mean = entry[split]["position_error_cm"]
-            if mean is not None:
-                values = {
-                    excerpt: mean if error is None else error
-                    for excerpt, error in excerpts[entry["length"]].items()
-                    if splits[excerpt.clip] == split
-                }
-                entry[split]["interval"] = {"position_error_cm": sample.confidence_half_width(split, values)}
 
 
 def roll_out_rows(result: Json) -> list[Row]:

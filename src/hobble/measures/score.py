@@ -25,19 +25,13 @@ from hobble.labels.contacts import find_stance_contacts
 from hobble.labels.gait import automatic_gait
 from hobble.labels.options import LabelOptions
 from hobble.measures.motion_quality import (
-    BODY,
     FOOT_POINTS,
     FPS,
-    Reference,
-    contact_speed,
-    diversity,
+    cleanness,
+    compare_windows,
     floating,
-    frechet_distance,
-    jerk,
-    joint_update,
     joints_with,
     penetration,
-    skating,
     standing_heights,
     window_features,
 )
@@ -174,7 +168,10 @@ def score(takes: Sequence[Take], reference: Sequence[Take] | None = None) -> dic
         result["reference_median"] = {
             name: float(np.nanmedian(np.abs([clip[name] for clip in clips]))) for name in OF_CLIP
         }
-        mine, theirs = _distribution(takes, reference)
+        features = _features(reference)
+        # Two halves: blocks of ten windows in turn, so that both halves have all clips of the reference.
+        half = np.arange(len(features)) // 10 % 2 == 0
+        mine, theirs = compare_windows(_features(takes), features, half)
         result["mean"] |= mine
         result["reference"] |= theirs
     return result
@@ -190,19 +187,16 @@ def _standing(takes: Sequence[Take]) -> dict[tuple[Any, ...], Array]:
 
 def _of_clip(take: Take, ground: Array) -> dict[str, float]:
     """The measures OF_CLIP of one clip, and its seconds. ground: (4,) heights of standing feet of its rig."""
-    body, standing = joints_with(take.clip.skeleton, BODY), take.standing
-    depth, deep_share = penetration(take.feet, standing)
-    return {
+    depth, deep_share = penetration(take.feet, take.standing)
+    found = cleanness(take.clip.skeleton, take.clip.positions, take.clip.rotations)
+    found |= {
         "seconds": len(take.clip) / FPS,
-        "skating": float(skating(take.feet, standing).mean()),
-        "floor": float((standing - ground).mean()),
-        "floating": floating(take.feet, standing),
+        "floor": float((take.standing - ground).mean()),
+        "floating": floating(take.feet, take.standing),
         "depth": depth,
         "deep_share": deep_share,
-        "jerk": jerk(take.clip.positions[:, body]),
-        "joint_update": joint_update(take.clip.rotations[:, body]),
-        "contact_speed": contact_speed(take.feet, standing),
     }
+    return {key: found[key] for key in ("seconds", *OF_CLIP)}
 
 
 def _mean(clips: Any) -> dict[str, float]:
@@ -214,22 +208,6 @@ def _mean(clips: Any) -> dict[str, float]:
         known, values = np.isfinite(values), np.abs(values)
         out[name] = float(np.average(values[known], weights=seconds[known])) if known.any() else math.nan
     return out
-
-
-def _distribution(takes: Sequence[Take], reference: Sequence[Take]) -> tuple[dict[str, float], ...]:
-    """The measures of windows, of the takes and of the reference. The reference's Frechet distance is that of
-    two halves of its windows: blocks of ten windows in turn, so that both halves have all of its clips.
-    """
-    features = _features(reference)
-    basis = Reference.of(features)
-    windows = basis.project(_features(takes))
-    half = np.arange(len(features)) // 10 % 2 == 0
-    halves = (basis.windows[half], basis.windows[~half])
-    between = frechet_distance(*halves) if min(map(len, halves)) > 1 else math.nan
-    return (
-        {"frechet": frechet_distance(windows, basis.windows), "diversity": diversity(windows)},
-        {"frechet": between, "diversity": diversity(basis.windows)},
-    )
 
 
 def _features(takes: Sequence[Take]) -> Array:

@@ -11,7 +11,6 @@ from hobble.config.load_configuration import Catalogue
 from hobble.core.errors import HobbleError
 from hobble.measures.measure import all_measures, measure_named
 from hobble.models.model import BuiltOptions, Options
-from hobble.runtime.options import Runtime
 from hobble.workflow.batches import Batches
 from hobble.workflow.clips import DATASETS, Clips, database_folder, original
 from hobble.workflow.datasets import Datasets
@@ -180,18 +179,6 @@ class Measurements:
             files["batches"] = self.configurations.batch_folders(configuration, "database")
         return files
 
-    def pieces(self, configuration: str, name: str) -> list[str]:
-        """Paths of the JSON files of the measurement's pieces; [] if there are fewer than two pieces."""
-        chosen = measure_named(name)
-        if chosen.pieces is None:
-            return []
-        params = self.params(configuration, name)
-        options = chosen.options.model_validate(params["options"])
-        runtime = Runtime.model_validate(params["runtime"])
-        pieces = chosen.pieces(options, runtime, self.configurations.network_options(configuration).modes)
-        folder = f"results/{configuration}/evaluation/pieces/{name}"
-        return [f"{folder}/{piece}.json" for piece in pieces] if len(pieces) > 1 else []
-
     def params(self, configuration: str, name: str) -> dict[str, Any]:
         """What the script of a measurement gets, as plain data.
 
@@ -219,13 +206,9 @@ class Measurements:
             "runtime": keys("runtime", chosen.runtime),
         }
 
-    def code(self, name: str, *modules: str, script: str = "measure") -> str:
-        """Hash of the code of the measurement `name`.
-
-        modules: full names of modules that the code imports dynamically. script: name of the rule's script,
-        without .py.
-        """
-        return self.package.code(script, measure_named(name).run_module, *modules)
+    def code(self, name: str, *modules: str) -> str:
+        """Hash of the code of the measurement `name`. modules: what it imports dynamically."""
+        return self.package.code("measure", measure_named(name).run_module, *modules)
 
 
 # Names of the configurations that are compared in results/compare/, unless --config compare=... names others:

@@ -103,13 +103,12 @@ def measure_of(snakemake: Any) -> tuple[Measure, Section, MeasureInputs]:
     find = Inputs(files.pop("batches", ()))
     inputs = MeasureInputs(
         params["configuration"],
-        {name: Path(file) for name, file in files.items() if name != "pieces"},
+        {name: Path(file) for name, file in files.items()},
         {clip: Path(find(f"database/clips/{clip}.npz")) for clip in params["splits"]},
         params["splits"],
         params["people"],
         [Path(find(f"database/clips/{clip}.json")) for clip in params["summaries"]],
         Runtime.model_validate(params["runtime"]),
-        {Path(file).stem: Path(file) for file in files.get("pieces", ())},
     )
     return measure, measure.options.model_validate(params["options"]), inputs
 

@@ -10,11 +10,10 @@ import numpy as np
 import pytest
 
 from hobble.core.errors import InputError
-from hobble.measures import accuracy as page
+from hobble.measures import rollouts as rollouts_page
 from hobble.measures.accuracy_run import measure_accuracy
-from hobble.measures.rollouts import rollout_chart
 from hobble.measures.rollouts_run import measure_roll_outs
-from hobble.measures.sample import LEAST_EXCERPTS, Sample, Stratum, draw_sample
+from hobble.measures.sample import Drawn, Sample, draw_sample
 from hobble.rows.clip_rows import (
     LONGEST,
     Excerpt,
@@ -58,12 +57,6 @@ def population(
     return clips, {one.clip: "held_out" if i % 12 == 0 else "train" for i, one in enumerate(clips)}, values
 
 
-def estimate(sample: Sample, split: str, values: dict[Excerpt, float]) -> float:
-    own = [one for s in sample.strata if s.split == split for one in s.drawn]
-    weights = [sample.weights[one] * one.rows for one in own]
-    return float(np.average([values[one] for one in own], weights=weights))
-
-
 def test_with_few_frames_all_clips_are_measured():
     clips, splits, _ = population(0)
     rows = sum(one.rows for one in clips)
@@ -71,64 +64,48 @@ def test_with_few_frames_all_clips_are_measured():
     assert draw_sample(clips, splits, rows - 1) is not None
 
 
-def test_the_sample_has_the_requested_size_and_every_kind_of_clip():
+def test_the_sample_has_the_requested_size_and_half_of_it_is_held_out():
     clips, splits, _ = population(1)
-    sample = draw_sample(clips, splits, 300_000)
-    assert sample is not None
-    of_excerpt = {excerpt: kind for one in clips for excerpt, kind in one.excerpts.items()}
-    rows_drawn = dict.fromkeys(("train", "held_out"), 0)
-    for stratum in sample.strata:
-        kinds = {(splits[n.clip], of_excerpt[n].gait, of_excerpt[n].channels) for n in stratum.drawn}
-        assert len(kinds) == 1
-        assert len(stratum.drawn) >= min(LEAST_EXCERPTS, stratum.excerpt_count)
-        rows_drawn[stratum.split] += sum(one.rows for one in stratum.drawn)
+    drawn = draw_sample(clips, splits, 300_000).splits
+    rows = {split: sum(one.rows for one in of.drawn) for split, of in drawn.items()}
     held_out = sum(one.rows for one in clips if splits[one.clip] == "held_out")
-    assert rows_drawn["held_out"] == pytest.approx(min(150_000, held_out), rel=0.1)
-    assert rows_drawn["train"] == pytest.approx(300_000 - rows_drawn["held_out"], rel=0.1)
-    assert sum(s.rows for s in sample.strata) == sum(one.rows for one in clips)
-    assert sum(stratum.split == "train" for stratum in sample.strata) == 2 * 3 * 2
+    assert rows["held_out"] == pytest.approx(min(150_000, held_out), rel=0.1)
+    assert rows["train"] == pytest.approx(300_000 - rows["held_out"], rel=0.1)
+    assert sum(of.rows for of in drawn.values()) == sum(one.rows for one in clips)
 
 
-def test_of_two_long_clips_only_excerpts_are_drawn():
+def test_of_long_clips_only_excerpts_are_drawn():
     clips, splits, _ = population(4, 24, (600_000, 600_001))
     sample = draw_sample(clips, splits, 100_000)
-    assert sample is not None
-    assert sum(one.rows for one in sample.weights) == pytest.approx(100_000, rel=0.3)
-    assert max(one.rows for one in sample.weights) <= LONGEST
-    assert len({one.clip for one in sample.weights}) > 12
-    found = sample.to_dict()
-    assert found["of_excerpts"] == 24 * 500
-    assert found["excerpts"] == len(sample.weights)
-    assert found["of"] == 24
+    drawn = [one for of in sample.splits.values() for one in of.drawn]
+    assert sum(one.rows for one in drawn) == pytest.approx(100_000, rel=0.1)
+    assert max(one.rows for one in drawn) <= LONGEST
+    assert len({one.clip for one in drawn}) > 12
+    counted = {"of_excerpts": 24 * 500, "excerpts": len(drawn), "of": 24}
+    assert counted.items() <= sample.to_dict().items()
 
 
 def test_an_additional_clip_hardly_changes_the_sample():
     clips, splits, _ = population(2)
     more = [*clips, RowsSummary("another", 900, (ExcerptKind("walk", 3.0, ()),))]
-    before = draw_sample(clips, splits, 300_000)
-    after = draw_sample(more, {**splits, "another": "train"}, 300_000)
-    assert before is not None
-    assert after is not None
-    changed = before.weights.keys() ^ after.weights.keys()
-    assert len(changed) <= 0.1 * len(before.weights)
+    before = draw_sample(clips, splits, 300_000).splits["train"].drawn
+    after = draw_sample(more, {**splits, "another": "train"}, 300_000).splits["train"].drawn
+    assert len(set(before) ^ set(after)) <= 0.1 * len(before)
 
 
 @pytest.mark.parametrize("split", ["train", "held_out"])
 @pytest.mark.parametrize("long", [False, True])
 def test_the_interval_contains_the_true_mean_about_as_often_as_stated(split, long):
-    """The intervals hold in nearly 95 % of samples, although excerpts of a clip resemble each other.
-
-    Without strata or weights they hold far less often.
-    """
+    """The intervals hold in nearly 95 % of samples, although excerpts of a clip resemble each other."""
     inside, off = [], []
     for seed in range(80):
         clips, splits, values = population(seed, 48, (20_000, 60_000)) if long else population(seed)
-        sample = draw_sample(clips, splits, 200_000)
-        assert sample is not None
         own = [one for one in values if splits[one.clip] == split]
         truth = np.average([values[one] for one in own], weights=[one.rows for one in own])
-        found = estimate(sample, split, values)
-        inside.append(abs(found - truth) <= sample.confidence_half_width(split, values))
+        of_split = draw_sample(clips, splits, 200_000).splits[split]
+        rows = [one.rows for one in of_split.drawn]
+        found = np.average([values[one] for one in of_split.drawn], weights=rows)
+        inside.append(abs(found - truth) <= of_split.confidence_half_width(values))
         off.append(found - truth)
     assert 0.88 < np.mean(inside) < 0.99
     assert abs(np.mean(off)) < 0.3 * np.std(off)
@@ -176,43 +153,32 @@ def flat(clip):
     return {key: value for key, value in clip.items() if key != "as_published"}
 
 
-def test_accuracy_and_roll_outs_count_each_clip_for_its_kind(tmp_path, clips):
+def test_accuracy_and_roll_outs_of_a_sample_have_intervals(tmp_path, clips):
     weights = tmp_path / "w.npz"
     np.savez(weights, **make_network())
     splits = dict.fromkeys(clips, "train")
-    a, b, c, d, e = (whole(name, 20 + 5 * i) for i, name in enumerate("abcde"))
-    sample = Sample((Stratum("train", 5, 300, (a, b, c)), Stratum("train", 3, 165, (d, e))), 8)
+    chosen = tuple(whole(name, 20 + 5 * i) for i, name in enumerate("abcde"))
+    sample = Sample({"train": Drawn(chosen, 8, 465)}, 8)
     everything = measure_accuracy(weights, clips, splits, "holden")
     found = measure_accuracy(weights, clips, splits, "holden", sample=sample)
     means = {clip["clip"]: clip["mean"] for clip in everything["clips"]}
-    assert [clip["clip"] for clip in found["clips"]] == list("abcde")
     assert list(map(flat, found["clips"])) == [pytest.approx(flat(clip)) for clip in everything["clips"][:5]]
-    first = np.average([means[n] for n in "abc"], weights=[20, 25, 30])
-    second = np.average([means[n] for n in "de"], weights=[35, 40])
-    assert found["train"]["mean"] == pytest.approx((300 * first + 165 * second) / 465)
-    assert found["train"]["frames"] == 150
-    width = sample.confidence_half_width("train", {one: means[one.clip] for one in sample.weights})
+    expected = np.average([means[n] for n in "abcde"], weights=[20, 25, 30, 35, 40])
+    assert found["train"]["mean"] == pytest.approx(expected)
+    assert found["train"]["mean_of_clips"] == pytest.approx(np.mean([means[n] for n in "abcde"]))
+    width = sample.splits["train"].confidence_half_width({one: means[one.clip] for one in chosen})
     assert found["train"]["interval"]["mean"] == pytest.approx(width)
-    by_clips = (5 * np.mean([means[n] for n in "abc"]) + 3 * np.mean([means[n] for n in "de"])) / 8
-    assert found["train"]["mean_of_clips"] == pytest.approx(by_clips)
-    assert found["sample"] == {"excerpts": 5, "of_excerpts": 8, "clips": 5, "of": 8, "strata": 2}
+    assert found["sample"] == {"excerpts": 5, "of_excerpts": 8, "clips": 5, "of": 8}
     assert "sample" not in everything
-    assert "5 of 8 excerpts" in page.describe_sample(found)
-    assert page.describe_sample(everything) == ""
-
     rolled = measure_roll_outs(weights, clips, splits, "holden", lengths=(1, 4), sample=sample)
-    every_roll_out = measure_roll_outs(weights, clips, splits, "holden", lengths=(1, 4))
-    entries = every_roll_out["lengths"][0]["clips"]
-    of_clip = {one: entries[i]["position_error_cm"] for i, one in enumerate(sample.weights)}
-    entry = rolled["lengths"][0]["train"]
-    assert entry["interval"]["position_error_cm"] == pytest.approx(
-        sample.confidence_half_width("train", of_clip)
-    )
-    assert entry["ended"] == sum(c["ended"] for c in entries[:5])
-    chart = rollout_chart(rolled)
-    assert len(chart.traces[0]["error_y"]["array"]) == 2
-    plain = rollout_chart(every_roll_out)
-    assert "error_y" not in plain.traces[0]
+    entries = measure_roll_outs(weights, clips, splits, "holden", lengths=(1, 4))["lengths"][0]["clips"]
+    of_clip = {one: entries[i]["position_error_cm"] for i, one in enumerate(chosen)}
+    width = sample.splits["train"].confidence_half_width(of_clip)
+    assert rolled["lengths"][0]["train"]["interval"]["position_error_cm"] == pytest.approx(width)
+    assert rolled["lengths"][0]["train"]["ended"] == sum(c["ended"] for c in entries[:5])
+    charts = [part.content for part in rollouts_page.section(rolled, None).parts]
+    assert len(charts[0].traces[0]["error_y"]["array"]) == 2
+    assert "5 of 8 excerpts" in charts[0].caption
 
 
 def test_all_excerpts_of_a_clip_together_measure_what_the_clip_does(tmp_path):
@@ -221,7 +187,7 @@ def test_all_excerpts_of_a_clip_together_measure_what_the_clip_does(tmp_path):
     np.savez(weights, **make_network())
     save_clip_rows(file, make_rows("a", 120, 1, 3))
     parts = [Excerpt("a", 40 * i, 40, 120) for i in range(3)]
-    sample = Sample((Stratum("train", 3, 120, tuple(parts)),), 1)
+    sample = Sample({"train": Drawn(tuple(parts), 3, 120)}, 1)
     given = weights, {"a": file}, {"a": "train"}, "holden"
     cut, uncut = measure_accuracy(*given, sample=sample), measure_accuracy(*given)
     assert list(map(flat, cut["clips"])) == [pytest.approx(flat(uncut["clips"][0]))]

@@ -1,0 +1,99 @@
+"""Charts and tables of measurements, as parts of pages.
+
+Titles and captions are in report/captions.yaml, each under the name of its chart.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable, Collection, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from hobble.report.gather import PUBLISHED
+from hobble.report.parts import Chart, Column, Table, Trace
+
+CAPTIONS = PUBLISHED.with_name("captions.yaml")
+Records = Sequence[Mapping[str, Any]]  # rows of a measurement's JSON
+
+
+@functools.cache
+def _captions(path: Path) -> dict[str, Any]:
+    return yaml.safe_load(path.read_text(encoding="utf-8"))
+
+
+def words(name: str, *more: str, **values: Any) -> str:
+    """A text of captions.yaml, with `values` in place of the names in braces.
+
+    name: of a text, or of an entry that has several: "<entry>.<text>". more: further texts that follow it.
+    """
+    found = []
+    for one in (name, *more):
+        entry, _, key = one.partition(".")
+        text = _captions(CAPTIONS)[entry]
+        found.append((text[key] if key else text).format(**values))
+    return " ".join(found)
+
+
+def chart(
+    name: str,
+    traces: Sequence[Mapping[str, Any]] = (),
+    layout: Mapping[str, Any] | None = None,
+    height: int = 340,
+    *,
+    choose: str | None = None,
+    options: Mapping[str, Sequence[Any]] | None = None,
+    option_layouts: Mapping[str, Mapping[str, Any]] | None = None,
+    more: Sequence[str] = (),
+    entry: str = "",
+    **values: Any,
+) -> Chart:
+    """A chart with the title and the caption that captions.yaml has under its name. The rest: see `Chart`.
+
+    entry: of captions.yaml, if it is not the chart's name. more: keys of further sentences that the entry
+    has. values: see `words`.
+    """
+    entry = entry or name
+    title = words(f"{entry}.title")
+    caption = words(*(f"{entry}.{key}" for key in ("caption", *more)), **values)
+    shown = (list(traces), layout or {}, height, choose, options or {}, option_layouts or {})
+    return Chart(name, title, caption, *shown)
+
+
+def table(
+    name: str,
+    records: Records,
+    heads: Mapping[str, str] | None = None,
+    title: str = "",
+    show: Mapping[str, Callable[[Any], str]] | None = None,
+    long: Collection[str] = (),
+) -> Table:
+    """A table with a row for each record. Whole numbers are shown in full, others with three digits.
+
+    heads: key of a record -> heading of its column; by default all keys of the first record, each its own
+    heading. show: key -> function from a value to its text. long: keys of long texts.
+    """
+    heads = heads or {key: key.replace("_", " ") for key in (records[0] if records else ())}
+    columns = {}
+    for key, head in heads.items():
+        value = next((r[key] for r in records if r.get(key) is not None), 0.0)
+        if show and key in show:
+            columns[key] = Column(head, show[key])
+        elif isinstance(value, str | bool):
+            columns[key] = Column(head, kind="long" if key in long else "text")
+        else:
+            columns[key] = Column.count(head) if isinstance(value, int) else Column.number(head)
+    return Table.of(name, columns, records, title or "Table of the values")
+
+
+def boxes(name: str, colour: str, **values: Any) -> Trace:
+    """The trace of boxes over values `y`, or with their edges given. values: as plotly takes them."""
+    return {
+        "type": "box",
+        "name": name,
+        "line": {"width": 1.6, "color": colour},
+        "boxpoints": False,
+        **values,
+    }

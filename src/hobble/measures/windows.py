@@ -1,0 +1,80 @@
+"""Windows: seconds of straight walking, captured or generated, in which a recogniser finds what it learnt."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from hobble.core.quat import Array
+from hobble.measures.walks import FPS, CrowdTarget, channel_values, gait_features, generate_walks
+from hobble.models.network import Network
+from hobble.rows.clip_rows import Captured
+from hobble.rows.layout import GAITS
+from hobble.runtime.options import Runtime
+
+WINDOW, STEP = 60, 15  # frames: length of a window (about a cycle), and from one start to the next
+AHEAD = 0.9  # a window is straight if at least this share of its mean velocity points forward
+LEAST_SPEED = 0.5  # cm a frame; a slower window does not count as walking
+WARM_UP, USED = 4 * FPS, 6 * FPS  # frames skipped at the start of a generated walk, and frames used
+Values = Mapping[str, float]  # feature -> value
+# A function of the type of `gait_features`.
+Features = Callable[..., dict[str, float]]
+# What a generated walk is asked for: channel -> column -> value (others are 0), and speed, cm a frame.
+Asked = tuple[Mapping[str, Mapping[str, float]], float]
+
+
+@dataclass(frozen=True)
+class Window:
+    """A window of a walk.
+
+    clip: name of the captured clip or generated walk. label: what a recogniser is to find in it. values: its
+    features. severity: the highest of any link. part: in which part of its stretch it lies, from 0.
+    """
+
+    clip: str
+    label: str
+    values: Values = field(repr=False)
+    severity: float = 0.0
+    part: int = 0
+
+
+def straight_windows(stretch: Captured, start: int = 0, stop: int | None = None) -> Iterator[slice]:
+    """The frames of each window, between two frames of a stretch, in which the person walks ahead."""
+    walk_share = stretch.gait[:, GAITS.index("walk")]
+    for first in range(start, (len(stretch) if stop is None else stop) - WINDOW + 1, STEP):
+        span = slice(first, first + WINDOW)
+        velocity = stretch.velocity[span].mean(axis=0)
+        speed = np.hypot(*velocity)
+        if walk_share[span].mean() > 0.5 and velocity[1] >= AHEAD * speed and speed >= LEAST_SPEED:
+            yield span
+
+
+def captured_values(
+    network: Network, stretch: Captured, span: slice, features: Features = gait_features
+) -> Values:
+    """The features of a window of a captured stretch."""
+    return features(network.skeleton, *(a[span] for a in (stretch.local, stretch.contacts, stretch.root)))
+
+
+def generated_values(
+    network: Network, walks: Sequence[Asked], runtime: Runtime, features: Features = gait_features
+) -> list[list[Values]]:
+    """For each walk, the features of the windows of the network's straight walk."""
+    channels: dict[str, Array] = {}
+    for name in network.channels:
+        channels |= channel_values(network, name, [values.get(name, {}) for values, _ in walks])
+    target = CrowdTarget(WARM_UP + USED, ["walk"] * len(walks), channels, [speed for _, speed in walks])
+    found = generate_walks(network, [target], runtime)
+    motion = (found.local, found.contacts, found.root)
+    spans = [slice(first, first + WINDOW) for first in range(WARM_UP, WARM_UP + USED - WINDOW + 1, STEP)]
+    return [
+        [features(network.skeleton, *(a[span, i] for a in motion)) for span in spans]
+        for i in range(len(walks))
+    ]
+
+
+def feature_table(values: Sequence[Values]) -> Array:
+    """(n, D) values of the D features in n windows."""
+    return np.array([list(of_window.values()) for of_window in values])
