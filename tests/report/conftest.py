@@ -15,10 +15,12 @@ import pytest
 
 from hobble.core.errors import HobbleError
 from hobble.core.skeleton import Skeleton
+from hobble.engine.compile import compile_wasm
+from hobble.engine.export import SOURCES
 from hobble.models.load import load_network
 from hobble.models.network import Network
 from hobble.report.bundle import WEB, bundle_page_scripts, install_npm_packages
-from hobble.report.character import opening_walk, playable_data
+from hobble.report.character import opening_slider, playable_data
 from hobble.report.gather import ReportMaterial, gather
 from hobble.report.page import render_report
 from hobble.report.recorded_motion import packed_comparisons, packed_scenes
@@ -88,11 +90,9 @@ def character(network: Network, examples: ModuleType) -> dict[str, Any]:
 
 
 @pytest.fixture(scope="session")
-def hero(
-    network: Network, character: dict[str, Any], material: ReportMaterial, examples: ModuleType
-) -> dict[str, Any]:
-    """The figures at the top of the page."""
-    return opening_walk(network, examples.RUNTIME, character, material.measurements.values())
+def hero(character: dict[str, Any], material: ReportMaterial) -> dict[str, Any]:
+    """The slider that is set at the top of the page."""
+    return opening_slider(character, material.measurements.values())
 
 
 @pytest.fixture(scope="session")
@@ -122,12 +122,25 @@ def modules(tmp_path_factory: pytest.TempPathFactory) -> Path | None:
 
 
 @pytest.fixture(scope="session")
-def script(modules: Path | None, tmp_path_factory: pytest.TempPathFactory) -> str:
+def wasm(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The runtime in WebAssembly, compiled once for all workers."""
+    made_of = b"".join(path.read_bytes() for path in sorted(SOURCES.glob("*.[ch]")))
+    digest = hashlib.sha256(made_of).hexdigest()[:12]
+    shared = tmp_path_factory.getbasetemp().parent / f"engine-{digest}.wasm"
+    with open(f"{shared}.lock", "w") as held:
+        fcntl.flock(held, fcntl.LOCK_EX)
+        if not shared.exists():
+            compile_wasm(shared)
+    return shared
+
+
+@pytest.fixture(scope="session")
+def script(modules: Path | None, wasm: Path, tmp_path_factory: pytest.TempPathFactory) -> str:
     """The page's scripts, bundled; "" if the packages cannot be fetched (then no browser opens the page)."""
     if modules is None:
         return ""
     target = tmp_path_factory.mktemp("bundle") / "bundle.js"
-    bundle_page_scripts(modules, target)
+    bundle_page_scripts(modules, wasm, target)
     return target.read_text(encoding="utf-8")
 
 

@@ -12,23 +12,23 @@ from hobble.report.bundle import bundle_page_scripts, install_npm_packages
 
 
 def test_the_bundle_needs_nothing_else_and_comes_out_the_same(
-    script: str, modules: Path, tmp_path: Path
+    script: str, modules: Path, wasm: Path, tmp_path: Path
 ) -> None:
     if not script:
         pytest.skip("the npm registry cannot be reached, so the page has no scripts")
-    bundle_page_scripts(modules, tmp_path / "again.js")
+    bundle_page_scripts(modules, wasm, tmp_path / "again.js")
     assert (tmp_path / "again.js").read_text(encoding="utf-8") == script
     assert not re.search(r"^\s*(import|export)\b", script, re.MULTILINE)
     assert "</script" not in script.lower()
     assert "three.js" in script.lower() or "Three.js" in script
 
 
-def test_a_script_that_is_wrong_is_named(script: str, modules: Path, tmp_path: Path) -> None:
+def test_a_script_that_is_wrong_is_named(script: str, modules: Path, wasm: Path, tmp_path: Path) -> None:
     if not script:
         pytest.skip("the npm registry cannot be reached, so the page has no scripts")
     (tmp_path / "index.js").write_text("const a = ;")
     with pytest.raises(HobbleError, match=r"index\.js:1"):
-        bundle_page_scripts(modules, tmp_path / "out.js", tmp_path)
+        bundle_page_scripts(modules, wasm, tmp_path / "out.js", tmp_path)
     assert not (tmp_path / "out.js").exists()
 
 

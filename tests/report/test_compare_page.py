@@ -7,6 +7,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+import numpy as np
 import pytest
 import yaml
 
@@ -17,7 +18,7 @@ from hobble.measures.compare import ConfigurationResults, compare_configurations
 from hobble.measures.measure import all_measures
 from hobble.models.load import load_network
 from hobble.report import compare_page
-from hobble.report.character import playable_data, round_weights
+from hobble.report.character import coarse_weights, playable_data
 from hobble.report.compare_page import render_comparison
 from hobble.report.gather import PUBLISHED, ReportMaterial
 
@@ -178,8 +179,8 @@ def test_networks_too_large_for_one_page_are_left_out(
     monkeypatch.setattr(compare_page, "LARGEST_PAGE", alone - 10_000 + compare_page.RESERVED)
     page = render_comparison(compared, pair)
     assert len(page.encode()) < alone + compare_page.RESERVED
-    assert "weights have 8 bits here" in page
-    alone = len(render_comparison(compared, {"holden": round_weights(pair["holden"])}).encode())
+    assert "weights have 9 bits here" in page
+    alone = len(render_comparison(compared, {"holden": coarse_weights(pair["holden"])}).encode())
     monkeypatch.setattr(compare_page, "LARGEST_PAGE", alone + compare_page.RESERVED)
     page = render_comparison(compared, pair)
     assert "to keep the file small: ava" in page
@@ -192,13 +193,15 @@ def test_two_figures_get_the_same_targets(tab: Any) -> None:
     tab.run("document.getElementById('play-stage').focus({ preventScroll: true })")
     assert tab.run("Hobble.player.actors.length") == 2
     tab.send("Input.dispatchKeyEvent", type="keyDown", key="w", code="KeyW", text="w")
-    speeds = "Hobble.player.actors.map(({ character }) => character.smoothedVelocity)"
-    assert tab.until(f"{speeds}.every((v) => Math.hypot(...v) > 2)")
-    first, second = tab.run(speeds)
+    where = "Hobble.player.actors.map(({ character: { root: [x, , z] } }) => [x, z])"
+    before = np.array(tab.run(where))
+    assert tab.until("Math.hypot(...Hobble.player.target.velocity) > 2")
+    tab.run("new Promise((done) => setTimeout(done, 1500))")
+    first, second = np.array(tab.run(where)) - before
     tab.send("Input.dispatchKeyEvent", type="keyUp", key="w", code="KeyW")
     assert first[0] * second[0] + first[1] * second[1] > 0
     tab.run("[...document.querySelectorAll('#play-presets button')][0].click()")
-    hurt = "Math.max(0, ...Hobble.player.actors[{0}].character.channelValues)"
+    hurt = "Math.max(0, ...Hobble.player.actors[{0}].character.values)"
     assert tab.until(f"{hurt.format(0)} > .1")
     assert tab.run(hurt.format(1)) == 0
     assert "holden" in tab.run("document.getElementById('play-panel').textContent")

@@ -32,7 +32,7 @@ def show(tab: Any) -> None:
 def test_the_top_of_the_page_shows_a_hurt_and_a_healthy_figure(tab: Any) -> None:
     """Also after a click on another part and a turn of the dial."""
     tab.run("scrollTo(0, 0)")
-    of = "(({ character }) => Array.from(character.channelValues))"
+    of = "(({ character }) => Array.from(character.values))"
     spec = "Object.values(Hobble.material.playable)[0].channels[0]"
     hero = "Hobble.hero"
     steps = f"for (let f = 0; f < 60; f++) {hero}.step()"  # without waiting for pictures
@@ -59,15 +59,15 @@ def test_the_top_of_the_page_shows_a_hurt_and_a_healthy_figure(tab: Any) -> None
 def test_keys_move_the_figure(tab: Any) -> None:
     show(tab)
     character = "Hobble.player.actors[0].character"
-    where = f"[{character}.px[60], {character}.pz[60]]"
+    where, speed = f"Array.from({character}.root)", "Math.hypot(...(Hobble.player.target?.velocity ?? [0]))"
     tab.run("Hobble.player.start()")
-    assert tab.until(f"Math.hypot(...{character}.smoothedVelocity) > 2"), "it walks until somebody steers"
+    assert tab.until(f"{speed} > 2"), "it walks until somebody steers"
     before = tab.run(where)
     tab.send("Input.dispatchKeyEvent", type="keyDown", key="w", code="KeyW", text="w")
-    assert tab.until(f"Math.hypot(...{character}.smoothedVelocity) > 2")
-    assert tab.until(f"Math.hypot({where}[0] - {before[0]}, {where}[1] - {before[1]}) > 5")
+    assert tab.until(f"{speed} > 2")
+    assert tab.until(f"Math.hypot({where}[0] - {before[0]}, {where}[2] - {before[2]}) > 5")
     tab.send("Input.dispatchKeyEvent", type="keyUp", key="w", code="KeyW")
-    assert tab.until(f"Math.hypot(...{character}.smoothedVelocity) < .01")
+    assert tab.until(f"{speed} < .01")
     tab.run("document.getElementById('play-details').open = true")
     panel = "document.getElementById('play-panel').textContent"
     assert tab.until(f"/Speed\\d\\.\\d\\d m\\/sPhase.*Time per frame\\d+\\.\\d ms/.test({panel})"), tab.run(
@@ -79,7 +79,7 @@ def test_keys_move_the_figure(tab: Any) -> None:
 def test_a_gamepad_and_a_thumb_steer_too(tab: Any) -> None:
     show(tab)
     tab.run("Hobble.player.start()")
-    velocity = "Hobble.player.actors[0].character.smoothedVelocity"
+    velocity = "(Hobble.player.target?.velocity ?? [0])"
     pad = "{ connected: true, axes: [0, -1, 0, 0], buttons: [{ pressed: true }] }"
     tab.run(f"navigator.getGamepads = () => [null, {pad}]")
     assert tab.until(f"Math.hypot(...{velocity}) > 6"), "the first button jogs"
@@ -132,7 +132,7 @@ def test_a_click_on_the_left_shin_hurts_it_and_changes_the_gait(tab: Any) -> Non
     place = """(() => {
       const { view, actors: [{ character, spec }] } = Hobble.player, [, knee, heel] = spec.legs[0];
       const box = document.getElementById("play-view").getBoundingClientRect();
-      const at = (j) => view.project(Array.from(character.posePosition.subarray(3 * j, 3 * j + 3)));
+      const at = (j) => view.project(Array.from(character.positions.subarray(3 * j, 3 * j + 3)));
       const [p, q] = [at(knee), at(heel)];
       return [box.x + (p[0] + q[0]) / 2, box.y + (p[1] + q[1]) / 2];
     })()"""
@@ -148,13 +148,13 @@ def test_a_click_on_the_left_shin_hurts_it_and_changes_the_gait(tab: Any) -> Non
             )  # fmt: skip
         assert tab.until(f"{shin} === {severity}"), severity
     index = "Hobble.player.actors[0].spec.channels[0].columns.indexOf('LeftLeg-LeftFoot')"
-    assert tab.until(f"Hobble.player.actors[0].character.channelValues[{index}] > .1")
+    assert tab.until(f"Hobble.player.actors[0].character.values[{index}] > .1")
     apart = f"""(() => {{
       const [{{ spec }}] = Hobble.player.actors;
       const hurt = Hobble.character(spec), healthy = Hobble.character(spec);
-      hurt.channelTargets[{index}] = 2;
+      hurt.set({index}, 2);
       for (let f = 0; f < 60; f++) for (const c of [hurt, healthy]) c.frame([0, 2.5], null, "walk", () => 0);
-      return Math.max(...hurt.posePosition.map((v, i) => Math.abs(v - healthy.posePosition[i])));
+      return Math.max(...hurt.positions.map((v, i) => Math.abs(v - healthy.positions[i])));
     }})()"""
     assert tab.run(apart) > 0.01
 

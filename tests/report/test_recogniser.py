@@ -1,7 +1,9 @@
-"""The recogniser in the page finds the same cycles, numbers and answers as in Python."""
+"""The recogniser in C, which the page runs, finds the same cycles, numbers and answers as in Python."""
 
 from __future__ import annotations
 
+import base64
+import ctypes
 import json
 from dataclasses import replace
 from types import ModuleType
@@ -12,12 +14,16 @@ import pytest
 
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
+from hobble.engine.compile import compile_c
+from hobble.engine.export import SOURCES
 from hobble.gait.cycles import measure_cycles
-from hobble.gait.profile import healthy_profile, profile_of_walk, read_people
-from hobble.gait.recognise import grade_walk
+from hobble.gait.profile import features, healthy_profile, profile_of_walk, read_people
+from hobble.gait.recognise import grade_walk, grader_of_all_people
 from hobble.models.network import Network
 from hobble.report.character import (
+    PROFILE_IN_C,
     healthy_walk,
+    measured_joints,
     packed_statistics,
     playable_with_recogniser,
 )
@@ -40,53 +46,67 @@ def walks(examples: ModuleType, holden31: Skeleton) -> dict[str, Array]:
     return {name: np.round(places, 6) for name, places in found.items()}
 
 
-def in_page(tab: Any, skeleton: Skeleton, places: Array) -> Any:
-    """Cycles and profile as the page finds them."""
-    spec = {"names": list(skeleton.joints), "roles": dict(skeleton.roles)}
-    frames = places.reshape(len(places), -1).tolist()
-    return tab.run(f"""(() => {{
-      const walk = Hobble.measureWalk({json.dumps(spec)}, {json.dumps(frames)});
-      const spans = ["right", "left"].map((side) => walk[side].map((c) => [c.start, c.end]));
-      return {{ spans, profile: Hobble.profile(walk) }};
-    }})()""")
+@pytest.fixture(scope="module")
+def library(tmp_path_factory: pytest.TempPathFactory) -> ctypes.CDLL:
+    """The recogniser in C."""
+    target = tmp_path_factory.mktemp("gait") / "libgait.so"
+    compile_c([SOURCES / "hobble_gait.c"], target, ["-O2", "-shared", "-fPIC"])
+    return ctypes.CDLL(str(target))
+
+
+def doubles(values: Array) -> Any:
+    """A pointer to numbers; the array must stay alive."""
+    return values.ctypes.data_as(ctypes.POINTER(ctypes.c_double))
+
+
+def profile_in_c(library: ctypes.CDLL, skeleton: Skeleton, places: Array) -> tuple[int, dict[str, float]]:
+    """The number of cycles, and the profile."""
+    joints = np.array(measured_joints(skeleton), np.int32)
+    frames, out = np.ascontiguousarray(places, float), np.zeros(len(PROFILE_IN_C))
+    cycles = library.hobble_gait_profile(
+        doubles(frames), len(frames), frames.shape[1], joints.ctypes.data_as(ctypes.c_void_p), doubles(out)
+    )
+    return cycles, dict(zip(PROFILE_IN_C, out, strict=True))
 
 
 def test_cycles_and_their_measurements_equal_those_of_python(
-    tab: Any, walks: dict[str, Array], holden31: Skeleton
+    library: ctypes.CDLL, walks: dict[str, Array], holden31: Skeleton
 ) -> None:
     walks_with_cycles = 0
     for name, places in walks.items():
-        walk, found = measure_cycles(holden31, places, 60), in_page(tab, holden31, places)
-        assert found["spans"] == [[[c.start, c.end] for c in side] for side in (walk.right, walk.left)], name
+        walk = measure_cycles(holden31, places, 60)
+        cycles, found = profile_in_c(library, holden31, places)
+        assert cycles == len(walk), name
         if not len(walk):
-            assert found["profile"] is None
             continue
         walks_with_cycles += 1
         expected = profile_of_walk(walk)
-        for key, value in found["profile"].items():
+        for key, value in found.items():
             assert value == pytest.approx(expected[key], abs=1e-6), (name, key)
     assert walks_with_cycles >= 3, "three of the walks have cycles"
+    assert profile_in_c(library, holden31, walks["even"][:20])[0] == 0
 
 
-def test_javascript_recognises_the_same_limps_as_python(tab: Any) -> None:
+def test_c_recognises_the_same_limps_as_python(library: ctypes.CDLL) -> None:
     """People's impaired walks at several strengths, compared with their healthy walks."""
-    healthy, cases = dict(healthy_profile([])), []
+    healthy, packed = dict(healthy_profile([])), packed_statistics()
+    learnt, answer = np.frombuffer(base64.b64decode(packed["learnt"])), np.zeros(4 + len(packed["words"]))
+    assert len(features(healthy, healthy)) == 21, "as many as HOBBLE_GAIT_FEATURES"
+    kinds, labels = list(grader_of_all_people().kinds), set()
     for person in (0, 3, 7):
         for walk in read_people()[person].values():
-            cases += [{k: (1 - s) * healthy[k] + s * walk[k] for k in healthy} for s in (0.2, 0.6, 1.0)]
-    found = tab.run(f"""(() => {{
-      const grade = Hobble.grader({json.dumps(packed_statistics())}), healthy = {json.dumps(healthy)};
-      return {json.dumps(cases)}.map((walk) => grade(walk, healthy));
-    }})()""")
-    labels = set()
-    for case, answer in zip(cases, found, strict=True):
-        expected = grade_walk(case, healthy)
-        labels.add(expected.label)
-        assert answer["label"] == expected.label
-        assert answer["strength"] == pytest.approx(expected.strength, abs=1e-6)
-        assert answer["distance"] == pytest.approx(expected.distance, abs=1e-6)
-        assert answer["probabilities"] == pytest.approx(dict(expected.probabilities), abs=1e-6)
-        assert answer["sides"] == pytest.approx(list(expected.probability_by_side.values()), abs=1e-6)
+            for s in (0.2, 0.6, 1.0):
+                case = {k: (1 - s) * healthy[k] + s * walk[k] for k in healthy}
+                arrays = [np.array([values[name] for name in PROFILE_IN_C]) for values in (case, healthy)]
+                library.hobble_gait_recognise(doubles(learnt), *map(doubles, arrays), doubles(answer))
+                expected = grade_walk(case, healthy)
+                labels.add(expected.label)
+                kind, strength, distance, normal, *probabilities = answer
+                assert (kinds[int(kind)][0] if kind >= 0 else "normal") == expected.label
+                assert strength == pytest.approx(expected.strength, abs=1e-6)
+                assert distance == pytest.approx(expected.distance, abs=1e-6)
+                assert normal == pytest.approx(expected.probabilities["normal"], abs=1e-6)
+                assert probabilities == pytest.approx(list(expected.probability_by_side.values()), abs=1e-6)
     assert len(labels) >= 4, "the cases are called different things"
 
 
@@ -94,9 +114,11 @@ def test_a_walk_is_compared_with_the_healthy_walk_of_the_same_figure(
     network: Network, examples: ModuleType, holden31: Skeleton, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """There is no answer for a figure that stays on the spot or has no knees."""
-    spec = playable_with_recogniser(network, examples.RUNTIME)
-    assert spec["recogniser"]["healthy"] == healthy_walk(network, holden31, examples.RUNTIME)
-    assert spec["recogniser"]["healthy"]["speed_per_leg"] > 0.5
+    spec, healthy = (
+        playable_with_recogniser(network, examples.RUNTIME), healthy_walk(network, holden31, examples.RUNTIME)
+    )  # fmt: skip
+    assert spec["recogniser"]["healthy"] == [healthy[name] for name in PROFILE_IN_C]
+    assert healthy["speed_per_leg"] > 0.5
     without = {role: joint for role, joint in holden31.roles.items() if role != "left_knee"}
     assert healthy_walk(network, replace(holden31, roles=without), examples.RUNTIME) is None
     monkeypatch.setattr("hobble.report.character.AHEAD", (0.0, 0.0))
@@ -107,13 +129,16 @@ def test_a_walk_is_compared_with_the_healthy_walk_of_the_same_figure(
 def test_the_panel_shows_the_recognised_limp(tab: Any, walks: dict[str, Array], holden31: Skeleton) -> None:
     """The recogniser in Play uses three seconds, and asks the user to walk if there is no cycle."""
     healthy = profile_of_walk(measure_cycles(holden31, walks["even"], 60))
-    spec = {"names": list(holden31.joints), "roles": dict(holden31.roles)}
-    spec["recogniser"] = {"learnt": packed_statistics(), "healthy": healthy}
+    recogniser = packed_statistics() | {
+        "healthy": [healthy[name] for name in PROFILE_IN_C],
+        "joints": measured_joints(holden31),
+    }
     said = {}
     for name in ("even", "on the spot"):
         frames = walks[name].reshape(240, -1).tolist()
         said[name] = tab.run(f"""(() => {{
-          const watch = Hobble.watch({json.dumps(spec)});
+          const spec = {{ ...Hobble.material.playable.example, recogniser: {json.dumps(recogniser)} }};
+          const watch = Hobble.watch(spec);
           {json.dumps(frames)}.forEach((places) => watch.add(places));
           return watch.say();
         }})()""")

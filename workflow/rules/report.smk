@@ -6,6 +6,8 @@ rule page_bundle:
     input:
         packages=keep_local(package.web_files(".json")),
         scripts=keep_local(package.web_files(".js")),
+        engine=keep_local(package.engine_files("examples/hobble.mjs")),
+        wasm=rules.engine_wasm.output.wasm,
     output:
         js="results/page/bundle.js",
     log:
@@ -193,6 +195,8 @@ rule export_web:
         weights=lambda w: configurations.network(w.configuration, "weights.npz"),
         bundle=rules.page_bundle.output.js,
         scripts=rules.page_bundle.input.scripts,
+        engine=rules.page_bundle.input.engine,
+        wasm=rules.engine_wasm.output.wasm,
         files=keep_local([*package.web_files(".ts"), *package.web_files(".html")]),
     output:
         folder=directory("results/{configuration}/export/web"),

@@ -93,7 +93,7 @@ rule export_glb:
 rule engine_wasm:
     """The runtime in C as WebAssembly, compiled by zig. It is the same for all configurations."""
     input:
-        sources=keep_local(package.engine_files()),
+        sources=keep_local(package.engine_files("c/*.[ch]")),
     output:
         wasm="results/page/engine.wasm",
     log:

@@ -13,5 +13,6 @@ with job(snakemake) as log:
         load_network(snakemake.input.weights),
         Runtime.model_validate(snakemake.params.runtime),
         Path(snakemake.input.bundle).parent / "node_modules",
+        snakemake.input.wasm,
     )
     log.info("wrote %s", snakemake.output.folder)

@@ -15,4 +15,4 @@ with job(snakemake):
     if not (installed.is_file() and lock.is_file() and lock.read_bytes() == Path(wanted).read_bytes()):
         installed.unlink(missing_ok=True)  # npm writes it last, so half an installation is made again
         install_npm_packages(folder)
-    bundle_page_scripts(folder / "node_modules", snakemake.output.js)
+    bundle_page_scripts(folder / "node_modules", snakemake.input.wasm, snakemake.output.js)

@@ -5,7 +5,7 @@ from pathlib import Path
 from hobble.core.files import write_text
 from hobble.measures.measure import all_measures
 from hobble.models.load import load_network
-from hobble.report.character import opening_walk, playable_with_recogniser
+from hobble.report.character import opening_slider, playable_with_recogniser
 from hobble.report.gather import gather
 from hobble.report.page import render_report
 from hobble.report.recorded_motion import packed_comparisons, packed_scenes
@@ -42,8 +42,8 @@ with job(snakemake):
     network = load_network(files.weights)
     runtime = Runtime.model_validate(material.resolved["configuration"]["runtime"])
     character = playable_with_recogniser(network, runtime)
-    first_walk = opening_walk(network, runtime, character, material.measurements.values())
+    opening = opening_slider(character, material.measurements.values())
     captured_and_predicted = packed_comparisons(network, rows, params.splits)
     bundle = Path(files.bundle).read_text(encoding="utf-8")
-    page = render_report(material, walks, character, captured_and_predicted, bundle, first_walk)
+    page = render_report(material, walks, character, captured_and_predicted, bundle, opening)
     write_text(snakemake.output.html, page)

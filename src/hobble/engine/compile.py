@@ -14,8 +14,9 @@ from hobble.engine.export import SOURCES
 # A module without a main function, with vectors of 128 bits, without debug information.
 WASM_OPTIONS = (
     *("-target", "wasm32-wasi", "-mexec-model=reactor", "-O3", "-msimd128", "-s"),
-    *("-Wl,--export-dynamic", "-Wl,--export=__heap_base"),
+    *("-Wl,--export-dynamic", "-Wl,--export=__heap_base", "-Wl,-z,stack-size=1048576"),
 )
+WASM_SOURCES = tuple(SOURCES / name for name in ("hobble.c", "hobble_gait.c", "hobble_web.c"))
 
 
 def compile_c(sources: Sequence[str | Path], target: str | Path, options: Sequence[str]) -> None:
@@ -24,10 +25,12 @@ def compile_c(sources: Sequence[str | Path], target: str | Path, options: Sequen
         arguments = [*options, *map(str, sources), "-o", str(temporary), "-lm"]
         command = [sys.executable, "-m", "ziglang", "cc", f"-I{SOURCES}", *arguments]
         process = subprocess.run(command, capture_output=True, text=True, check=False)
+        if "No module named ziglang" in process.stderr:
+            raise HobbleError(f"{target}: there is no compiler. Install it with: pip install ziglang")
         if process.returncode:
             raise HobbleError(f"{target}: the compiler says: {process.stderr.strip()[:1000]}")
 
 
 def compile_wasm(target: str | Path) -> None:
     """Compile the runtime to WebAssembly. The first time takes half a minute: zig builds its C library."""
-    compile_c([SOURCES / "hobble.c", SOURCES / "hobble_web.c"], target, WASM_OPTIONS)
+    compile_c(WASM_SOURCES, target, WASM_OPTIONS)

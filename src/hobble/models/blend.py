@@ -23,7 +23,7 @@ from hobble.core.skeleton import Skeleton
 from hobble.models.forward import forward
 from hobble.models.load import read_layers
 from hobble.models.model import LayerMirror, Trainable, TrainedOptions, TrainingStep
-from hobble.models.network import FIXED, Export, pack_layer, standardise_inputs
+from hobble.models.network import FIXED, Export, standardise_inputs
 from hobble.models.onnx_file import Graph, Node, OnnxNetwork, add_layers, write_checked
 from hobble.rows.layout import ColumnMirror, RowLayout
 
@@ -165,14 +165,6 @@ class BlendedNetwork(OnnxNetwork):
         stack = Stack([first, *weights[1:]], biases, storage, self.y_mean, self.y_std)
         sizes = {"form": FIXED, "layers": len(weights), "sets": len(first), "extra": self.extra_inputs}
         return sizes, stack.sections()
-
-    def page_data(self, inputs: NDArray[np.int64], outputs: NDArray[np.int64]) -> dict[str, Any]:
-        """As in `Network`. layers: see `pack_layer`."""
-        weights, biases = list(self.weights), list(self.biases)
-        extra = len(self.x_mean) + np.arange(self.extra_inputs)
-        weights[0] = weights[0][:, :, np.concatenate([inputs, extra])]
-        weights[-1], biases[-1] = weights[-1][:, outputs], biases[-1][:, outputs]
-        return {"layers": [pack_layer(w, b) for w, b in zip(weights, biases, strict=True)]}
 
     @property
     def exports(self) -> dict[str, Export]:

@@ -16,7 +16,7 @@ The kinds differ in where the shares come from:
 - plain, a feed-forward network: there is one set, c = 1. x ends with sine and cosine of the phase.
 
 Other modules compute the same: `predict` fast, for one character or a crowd; `step` with the gradient, for
-training; `onnx_file` and `layers.js` for other programs.
+training; `onnx_file` and `engine/c` for other programs.
 """
 
 from __future__ import annotations

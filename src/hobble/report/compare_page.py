@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from hobble.figure.pack import packed_body
-from hobble.report.character import body_channel, round_weights, skeleton_of
+from hobble.report.character import body_channel, coarse_weights, skeleton_of
 from hobble.report.parts import (
     Chart,
     Column,
@@ -19,7 +19,6 @@ from hobble.report.parts import (
     configuration_colours,
     configuration_names,
     dot_trace,
-    embedded,
     format_bytes,
     format_duration,
     format_number,
@@ -45,7 +44,7 @@ def render_comparison(
 
     compared: the content of compare.json. playables: configuration -> data of a character that its network
     moves in the page, from `playable_data` in `hobble.report.character`. If these characters do not all fit
-    into the page, the weights of all of them are rounded to 8 bits. Characters that still do not fit are left
+    into the page, the weights of all of them are rounded to 9 bits. Characters that still do not fit are left
     out. bundle: all scripts of the page as one script. measures: all measurements, for what they show.
     """
     columns = [column for each in compared_by(measures, "compared_columns", compared) for column in each]
@@ -65,9 +64,9 @@ def render_comparison(
     drawn = drawn_by_script([sections, measurements])
     # Configurations with the same skeleton share a body. Its key is in the entry `body` of a character.
     bodies = {spec["body"]: packed_body(skeleton_of(spec)) for spec in playables.values()}
-    used = sum(map(len, (bundle.encode(), embedded(bodies), *map(compressed, drawn.values()))))
+    used = sum(map(len, (bundle.encode(), compressed(bodies), *map(compressed, drawn.values()))))
     on_page, left_out = select_fitting(playables or {}, LARGEST_PAGE - RESERVED - used)
-    rounded = {name: round_weights(spec) for name, spec in playables.items()} if left_out else {}
+    rounded = {name: coarse_weights(spec) for name, spec in playables.items()} if left_out else {}
     if left_out:
         on_page, left_out = select_fitting(rounded, LARGEST_PAGE - RESERVED - used)
     bodies = {spec["body"]: bodies[spec["body"]] for spec in on_page.values()}
@@ -101,7 +100,7 @@ def select_fitting(
     kept: dict[str, Mapping[str, Any]] = {}
     left_out, used = [], 0
     for name, spec in playables.items():
-        needed = len(embedded(spec))
+        needed = len(compressed(spec))
         if used + needed > largest:
             left_out.append(name)
         else:

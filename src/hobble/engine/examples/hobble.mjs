@@ -1,33 +1,31 @@
-// Hobble in JavaScript, in a browser or in Node, by WebAssembly. engine.wasm and character.hob are bytes (Uint8Array).
-//
-// node hobble.mjs ../engine.wasm ../character.hob
+// Hobble in JavaScript, in a browser or in Node, by WebAssembly. hobble.h explains units, axes and errors.
+// walk.mjs shows how to use it in Node.
 //
 // In a page: const bytes = async (url) => new Uint8Array(await (await fetch(url)).arrayBuffer());
-//            const { Characters } = await import("./hobble.mjs");
+//            const { Engine } = await import("./hobble.mjs");
 
 const WHY = 160, TARGET = 88; // sizes of the reason for a refusal, and of a target, in bytes
 const PAGE = 65536;
 const BY_SPEED = -1;
 
-export class Characters {
-  // Throws an Error with the reason if the character file is refused.
-  constructor(wasm, file, count = 1) {
-    this.ground = null;
+// The runtime with one character file. All characters that it makes share its memory, and the network in it.
+export class Engine {
+  // wasm: bytes of engine.wasm, or a WebAssembly.Module. file: bytes of character.hob. Throws an Error with the reason if the file is refused.
+  constructor(wasm, file) {
     const unused = new Proxy({}, { get: () => () => 0 }); // functions of WASI that nothing calls
-    const instance = new WebAssembly.Instance(new WebAssembly.Module(wasm), {
+    const instance = new WebAssembly.Instance(wasm instanceof WebAssembly.Module ? wasm : new WebAssembly.Module(wasm), {
       hobble: { ground: (n, points, heights) => this.lookUp(n, points, heights) }, wasi_snapshot_preview1: unused,
     });
     this.c = instance.exports;
     this.c._initialize?.();
     this.end = this.c.__heap_base.value;
-    const at = this.take(file.length), why = this.take(WHY);
-    new Uint8Array(this.c.memory.buffer).set(file, at);
-    const size = this.c.hobble_size(at, file.length, count, why);
-    if (!size) throw new Error(this.text(why));
-    this.h = this.c.hobble_create(at, file.length, count, this.take(size), size, why);
-    this.targets = this.take(TARGET * count);
+    this.ground = null;
+    this.unused = []; // crowds that nobody needs any more
+    this.file = this.take(file.length);
+    this.size = file.length;
+    new Uint8Array(this.c.memory.buffer).set(file, this.file);
     this.spare = this.take(1024); // for names
-    this.joints = this.c.hobble_joints(this.h);
+    this.sizes = new Map(); // number of characters -> the memory that they need
   }
 
   // The start of `size` unused bytes.
@@ -38,6 +36,10 @@ export class Characters {
     return at;
   }
 
+  // Views of memory. They are valid until more memory is taken.
+  doubles(at, count) { return new Float64Array(this.c.memory.buffer, at, count); }
+  integers(at, count) { return new Int32Array(this.c.memory.buffer, at, count); }
+
   text(at) {
     const bytes = new Uint8Array(this.c.memory.buffer, at);
     return new TextDecoder().decode(bytes.subarray(0, bytes.indexOf(0)));
@@ -45,7 +47,8 @@ export class Characters {
 
   name(text) {
     const bytes = new TextEncoder().encode(`${text}\0`);
-    new Uint8Array(this.c.memory.buffer).set(bytes.subarray(0, 1024), this.spare);
+    if (bytes.length > 1024) throw new RangeError("the name is too long");
+    new Uint8Array(this.c.memory.buffer).set(bytes, this.spare);
     return this.spare;
   }
 
@@ -54,43 +57,68 @@ export class Characters {
     return code;
   }
 
-  // Sets the value of a column, such as "left thigh" of the channel "injury".
-  set(character, part, value) {
-    this.check(this.c.hobble_set(this.h, character, this.check(this.c.hobble_column(this.h, 0, this.name(part))), value));
+  lookUp(count, points, heights) {
+    const at = this.doubles(points, 2 * count), out = this.doubles(heights, count);
+    for (let i = 0; i < count; i++) out[i] = this.ground(at[2 * i], at[2 * i + 1]);
+  }
+
+  // Characters at the origin, which run their frames together.
+  characters(count = 1) {
+    const same = this.unused.findIndex((crowd) => crowd.count === count);
+    return same < 0 ? new Characters(this, count) : this.unused.splice(same, 1)[0];
+  }
+}
+
+export class Characters {
+  constructor(engine, count = 1) {
+    const { c } = engine, why = engine.spare;
+    if (!engine.sizes.has(count)) engine.sizes.set(count, c.hobble_size(engine.file, engine.size, count, why));
+    const size = engine.sizes.get(count);
+    if (!size) throw new Error(engine.text(why));
+    Object.assign(this, { engine, c, count });
+    this.h = c.hobble_create(engine.file, engine.size, count, engine.take(size), size, why);
+    this.targets = engine.take(TARGET * count);
+    this.joints = c.hobble_joints(this.h);
+    this.columns = c.hobble_columns(this.h);
+    this.bones = engine.take(7 * this.joints * 8);
+  }
+
+  // Gives the memory back to the engine. The characters must not be used any more.
+  release() { this.engine.unused.push(this); }
+
+  // Starts a character again. x, z: cm. yaw: radians.
+  reset(character, x = 0, z = 0, yaw = 0) { this.engine.check(this.c.hobble_reset(this.h, character, x, z, yaw)); }
+
+  // Sets the value of a column: its number, or the name of a part such as "left thigh".
+  set(character, column, value) {
+    const number = typeof column === "number" ? column : this.engine.check(this.c.hobble_column(this.h, 0, this.engine.name(column)));
+    this.engine.check(this.c.hobble_set(this.h, character, number, value));
   }
 
   // Says what a character shall do. velocity, facing: [x, z]. gait: its name, or null: walk or jog, by the speed.
-  aim(character, velocity, facing = [0, 0], gait = null) {
-    const number = gait === null ? BY_SPEED : this.check(this.c.hobble_gait(this.h, this.name(gait)));
+  aim(character, velocity, facing = null, gait = null) {
+    const number = gait === null ? BY_SPEED : this.engine.check(this.c.hobble_gait(this.h, this.engine.name(gait)));
     const at = this.targets + TARGET * character;
-    new Float64Array(this.c.memory.buffer, at, 4).set([...velocity, ...facing]);
-    new Int32Array(this.c.memory.buffer, at + 80, 1)[0] = number;
+    this.engine.doubles(at, 4).set([...velocity, ...(facing ?? [0, 0])]);
+    this.engine.integers(at + 80, 1)[0] = number;
   }
 
   // Runs one frame. ground(x, z): the height in cm; null: flat.
   frame(ground = null) {
-    this.ground = ground;
-    this.check(this.c.hobble_web_frame(this.h, this.targets, ground ? 1 : 0));
+    this.engine.ground = ground;
+    this.engine.check(this.c.hobble_web_frame(this.h, this.targets, ground ? 1 : 0));
   }
 
-  lookUp(count, points, heights) {
-    const at = new Float64Array(this.c.memory.buffer, points, 2 * count), out = new Float64Array(this.c.memory.buffer, heights, count);
-    for (let i = 0; i < count; i++) out[i] = this.ground(at[2 * i], at[2 * i + 1]);
-  }
+  // Views of what a function of hobble.h returns, such as ("positions", 3 * joints). They are valid until more memory is taken.
+  view(name, count, character = 0) { return this.engine.doubles(this.c[`hobble_${name}`](this.h, character), count); }
+  positions(character = 0) { return this.view("positions", 3 * this.joints, character); }
+  rotations(character = 0) { return this.view("rotations", 4 * this.joints, character); }
+  root(character = 0) { return this.view("root", 3, character); }
 
-  // A view of the pose: (joints, 3) positions, (joints, 4) rotations, (3) root. It is valid until more memory is taken.
-  positions(character = 0) { return new Float64Array(this.c.memory.buffer, this.c.hobble_positions(this.h, character), 3 * this.joints); }
-  rotations(character = 0) { return new Float64Array(this.c.memory.buffer, this.c.hobble_rotations(this.h, character), 4 * this.joints); }
-  root(character = 0) { return new Float64Array(this.c.memory.buffer, this.c.hobble_root(this.h, character), 3); }
-}
-
-if (globalThis.process?.argv[1]?.endsWith("hobble.mjs")) {
-  const { readFileSync } = await import("node:fs");
-  const [wasm, file] = process.argv.slice(2).map((path) => new Uint8Array(readFileSync(path)));
-  const characters = new Characters(wasm, file);
-  characters.aim(0, [0, 2.5]);
-  for (let frame = 1; frame <= 120; frame++) {
-    characters.frame((x, z) => .05 * z);
-    if (frame % 30 === 0) console.log(`after ${frame} frames the root is at ${Array.from(characters.root(), (v) => v.toFixed(1)).join(", ")} cm`);
+  // The pose with bones of constant length: [positions, rotations]. The next call overwrites them.
+  skeleton(character = 0) {
+    const turns = this.bones + 3 * this.joints * 8;
+    this.c.hobble_bones(this.h, character, this.bones, turns);
+    return [this.engine.doubles(this.bones, 3 * this.joints), this.engine.doubles(turns, 4 * this.joints)];
   }
 }

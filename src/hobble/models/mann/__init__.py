@@ -20,7 +20,7 @@ from hobble.models.blend import BlendedNetwork, BlendedOptions, TrainableBlend
 from hobble.models.forward import forward, softmax
 from hobble.models.load import read_arrays, read_layers
 from hobble.models.model import Trainable
-from hobble.models.network import GATED, pack_layer
+from hobble.models.network import GATED
 from hobble.rows.layout import GAITS, RowLayout
 
 if TYPE_CHECKING:
@@ -144,18 +144,6 @@ class Mann(BlendedNetwork):
         columns = np.searchsorted(inputs, self.columns[read]).astype(np.int32)
         sizes |= {"form": GATED, "gate_layers": len(self.gate_weights), "gate_inputs": len(columns)}
         return sizes, sections | gate.sections("gate_") | {"gate_columns": columns}
-
-    def page_data(self, inputs: NDArray[np.int64], outputs: NDArray[np.int64]) -> dict[str, Any]:
-        """As in `BlendedNetwork`. gateLayers: of the gate. gate: its columns, as positions in `inputs`."""
-        position = {int(column): i for i, column in enumerate(inputs)}
-        present = [i for i, column in enumerate(self.columns) if int(column) in position]
-        first, *others = self.gate_weights
-        gate = zip([first[:, :, present], *others], self.gate_biases, strict=True)
-        return {
-            **super().page_data(inputs, outputs),
-            "gateLayers": [pack_layer(w, b) for w, b in gate],
-            "gate": [position[int(self.columns[i])] for i in present],
-        }
 
     def onnx_shares(self, g: Graph, z: Node, mode: str) -> tuple[None, Node]:
         """As in `BlendedNetwork`."""

@@ -26,10 +26,9 @@ from scipy.spatial import cKDTree
 from hobble.core.compiled import njit
 from hobble.core.declared import ArrayOf, read_declared
 from hobble.core.errors import InputError
-from hobble.core.files import to_base64
 from hobble.core.quat import Array
 from hobble.models.load import LARGEST_MEAN, read_arrays
-from hobble.models.network import RECORDED, STORAGES, Network, pack_table, standardise_inputs
+from hobble.models.network import RECORDED, STORAGES, Network, standardise_inputs
 from hobble.models.predict import StandardisingPredictor
 
 # Largest number of rows of the tables. The page keeps row numbers in float32, which is exact up to here.
@@ -227,43 +226,9 @@ class Matching(Network):
             "findable": findable,
         }
 
-    def page_data(self, inputs: NDArray[np.int64], outputs: NDArray[np.int64]) -> dict[str, Any]:
-        """As in `Network`. Frames are integers with a factor for each column. Features stay float32, so that
-        the page finds the same rows. Large tables are shortened to about MOST_ON_PAGE rows."""
-        return self.shortened_copy(MOST_ON_PAGE)._all_for_page(inputs, outputs)
-
-    def _all_for_page(self, inputs: NDArray[np.int64], outputs: NDArray[np.int64]) -> dict[str, Any]:
-        """What `page` returns, but with all rows.
-
-        The keys have the names of the fields, except for: `start`: `start_rows`. `at`: positions in `outputs`
-        of the first columns of joint positions and velocities, and of the change of phase; -1 if left out.
-        `turning`: the joints whose rotations are among `outputs`, each with the position of its first column.
-        """
-        place_in_inputs = {int(column): i for i, column in enumerate(inputs)}
-        place_in_outputs = {int(column): i for i, column in enumerate(outputs)}
-        on_page = [i for i, column in enumerate(self.columns) if int(column) in place_in_inputs]
-        layout = self.layout
-        blocks = layout.y_joint_position, layout.y_joint_velocity, layout.y_phase_change
-        rotation_columns = {j: layout.y_joint_rotation.start + 3 * j for j in range(layout.joints)}
-        return {
-            "frames": pack_table(self.frames[:, outputs]),
-            "features": to_base64(self.features[:, on_page].astype(np.float32)),
-            "columns": [place_in_inputs[int(column)] for column in self.columns[on_page]],
-            "weights": to_base64(self.weights[on_page]),
-            "phases": to_base64(self.phases),
-            "remaining": to_base64(np.minimum(self.remaining, 1 << 30).astype(np.int32)),  # 2^30 fits int32
-            "start": to_base64(self.start_rows.astype(np.int32)),
-            "every": self.every,
-            "halflife": self.halflife,
-            "memory": self.memory_size,
-            "joints": layout.joints,
-            "at": [place_in_outputs.get(block.start, -1) for block in blocks],
-            "turning": [
-                [j, place_in_outputs[column]]
-                for j, column in rotation_columns.items()
-                if column in place_in_outputs
-            ],
-        }
+    def copy_for_page(self) -> Matching:
+        """As in `Network`: the beginnings of all runs, about MOST_ON_PAGE rows."""
+        return self.shortened_copy(MOST_ON_PAGE)
 
 
 class MatchingPredictor(StandardisingPredictor):

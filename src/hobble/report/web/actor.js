@@ -1,9 +1,8 @@
 // Writes the played motion as a BVH file.
 import { bodyChannel, channelColour, valueKey } from "./base.js";
-import { createCharacter } from "./controller.js";
-import { createRig } from "./feet.js";
+import { createCharacter } from "./character.js";
 import { createFigure } from "./figure.js";
-import { at4, conjugate, multiply } from "./math.js";
+import { at3, at4, conjugate, multiply } from "./math.js";
 import { createLab } from "./panel.js";
 
 const FPS = 60;
@@ -49,21 +48,18 @@ const LEAST_SPEED = .15; // cm a frame: slower joints have no needle
 // The heights of the ground that are inputs of the network. They are sampled along the past and future path, and to both sides of it. place:
 // [x, y, z] of a sample. above: its height above the mean height of the path, cm. c: the state of the character.
 export const groundSamples = (c, spec) => {
-  const { step, constants: { side } } = spec, out = [];
-  for (let s = 0; s < c.ground.length / 3; s++) {
-    const i = s * step, a = side * c.dz[i], b = side * c.dx[i];
-    [[a, -b], [0, 0], [-a, b]].forEach(([x, z], k) => {
-      out.push({ place: [c.px[i] + x, c.ground[3 * s + k], c.pz[i] + z], above: c.ground[3 * s + k] - c.rootHeight });
-    });
-  }
-  return out;
+  const { path, directions, ground, root: [, height] } = c;
+  return Array.from(ground, (y, i) => {
+    const f = 2 * spec.step * Math.floor(i / 3), aside = (1 - i % 3) * spec.side; // to the left, on the path, to the right
+    return { place: [path[f] + aside * directions[f + 1], y, path[f + 1] - aside * directions[f]], above: y - height };
+  });
 };
 
 // Needles {from, to}, from where a joint is to where it would be in NEEDLE_FRAMES frames.
 export const jointVelocities = (c) => {
-  const out = [];
-  for (let j = 0; j < c.jointVelocity.length; j += 3) {
-    const v = [c.jointVelocity[j], c.jointVelocity[j + 1], c.jointVelocity[j + 2]], from = [c.posePosition[j], c.posePosition[j + 1], c.posePosition[j + 2]];
+  const { velocities, positions } = c, out = [];
+  for (let j = 0; j < positions.length / 3; j++) {
+    const v = at3(velocities, j), from = at3(positions, j);
     if (Math.hypot(...v) >= LEAST_SPEED) out.push({ from, to: from.map((p, i) => p + NEEDLE_FRAMES * v[i]) });
   }
   return out;
@@ -85,66 +81,73 @@ const MOST_FRAMES = 1200; // the last 20 seconds of motion are kept, so that the
 // view: where the character is drawn, see view.js. spec: its data, from `hobble.report.character`. place: [x, z] in cm where it starts.
 // tint: name of a colour in the palette for its body, or null. ghost: whether the body is transparent.
 export const createActor = (view, spec, { place = [0, 0], tint = null, ghost = false } = {}) => {
-  const figure = createFigure(view, spec.body, bodyChannel(spec)?.regions || [], { ghost }), rig = createRig(spec), wasDown = [false, false];
-  const lab = createLab(spec.legs), actor = { spec, figure, rig, lab, place, watch: null, falls: 0, milliseconds: 0, frames: [] };
+  const figure = createFigure(view, spec.body, bodyChannel(spec)?.regions || [], { ghost }), wasDown = [false, false], lab = createLab(spec.legs);
+  // rig: the pose that is drawn, with bones of constant length.
+  const J = spec.names.length, character = createCharacter(spec, place), rig = { places: new Float64Array(3 * J), turns: new Float64Array(4 * J) };
+  const actor = { spec, figure, character, rig, lab, place, watch: null, milliseconds: 0, frames: [] };
   let footprints = [], groundHeight = () => 0;
 
+  const takePose = () => {
+    const [places, turns] = character.skeleton;
+    rig.places.set(places);
+    rig.turns.set(turns);
+  };
   // Starts again. height(x, z): height of the ground in cm.
   actor.start = (height) => {
     groundHeight = height;
-    actor.character = createCharacter(spec, place);
+    character.reset();
+    takePose();
     actor.frames = [];
     lab.clear();
     actor.watch?.clear();
     footprints = [];
   };
+  actor.remove = () => { figure.remove(); character.release(); };
   // The point on the ground under joint j.
   const groundUnder = (j) => { const [x, z] = [rig.places[3 * j], rig.places[3 * j + 2]]; return [x, groundHeight(x, z), z]; };
 
   // Runs one frame toward a target. values: Map from `valueKey(channel, column)` to the value of the column. A missing
   // column has the start value of its channel.
   actor.frame = ({ velocity, facing, gait }, values) => {
-    const character = actor.character, before = performance.now();
-    spec.channels.forEach((channel) => channel.columns.forEach((column, l) => {
-      character.channelTargets[channel.first + l] = (values.get(valueKey(channel, column)) ?? channel.start) / channel.scale;
-    }));
+    const before = performance.now();
+    spec.channels.forEach((channel) => channel.columns.forEach((column, l) => (
+      character.set(channel.first + l, values.get(valueKey(channel, column)) ?? channel.start))));
     character.frame(velocity, facing, gait, groundHeight);
-    rig.take(character.posePosition, character.poseRotation);
+    takePose();
     // The time per frame is smoothed, because it varies much from frame to frame.
     actor.milliseconds += .05 * (performance.now() - before - actor.milliseconds);
     actor.frames.push(Float32Array.from([...rig.places.subarray(0, 3), ...rig.turns]));
     if (actor.frames.length > MOST_FRAMES) actor.frames.shift();
     footprints.forEach((print) => { print.age++; });
     footprints = footprints.filter((print) => print.age < 360); // footprints fade out in 360 frames, which are six seconds
+    const { held, contacts } = character;
     spec.legs.forEach(([, , heel, toe], f) => {
-      const down = character.footLock[f] === 1;
+      const down = held[f] === 1;
       if (down && !wasDown[f]) footprints.push({ from: groundUnder(heel), to: groundUnder(toe), age: 0, side: f });
       wasDown[f] = down;
     });
-    lab.add(rig.places, [0, 1].map((f) => character.contacts[2 * f] > .5 || character.contacts[2 * f + 1] > .5));
+    lab.add(rig.places, [0, 1].map((f) => contacts[2 * f] > .5 || contacts[2 * f + 1] > .5));
     actor.watch?.add(rig.places);
-    // Predictions of a network with too little training may grow without end. Then the character starts again.
-    if (!character.posePosition.every(Number.isFinite)) { actor.falls++; actor.start(groundHeight); }
   };
   const drawGround = (withPath) => {
     if (withPath === null) return;
-    const character = actor.character, { paint, marks } = view;
+    const { path } = character, { paint, marks } = view;
     for (const { from, to, age } of footprints) marks.addPrint(from, to, paint.ink, (paint.dark ? .16 : .13) * (1 - age / 360));
     if (!withPath) return;
-    for (let i = 5; i < character.px.length; i += 5) {
-      const [a, b] = [i - 5, i].map((t) => [character.px[t], groundHeight(character.px[t], character.pz[t]) + .2, character.pz[t]]);
-      marks.addStrip(a, b, 2.2, tint ? paint[tint] : paint.accent, i > character.px.length / 2 ? .85 : .35);
+    for (let i = 10; i < path.length; i += 10) {
+      const [a, b] = [i - 10, i].map((t) => [path[t], groundHeight(path[t], path[t + 1]) + .2, path[t + 1]]);
+      marks.addStrip(a, b, 2.2, tint ? paint[tint] : paint.accent, i > path.length / 2 ? .85 : .35);
     }
   };
   // withPath: true draws the footprints, the past path and the predicted path on the ground; false only the footprints; null nothing.
   // shift: [x, z] in cm from where the figure is to where it is drawn.
   actor.draw = (withPath = true, shift = [0, 0]) => {
-    const character = actor.character, { paint } = view, plainColour = tint ? paint[tint] : paint.body, channel = bodyChannel(spec);
+    const { values } = character, { paint } = view, plainColour = tint ? paint[tint] : paint.body, channel = bodyChannel(spec);
     drawGround(withPath);
     if (view.inputs) drawInputs(view, character, spec);
     figure.copyPose(rig, shift);
     figure.pose((columns) => {
-      const share = channel ? Math.max(0, ...columns.map((l) => character.channelValues[channel.first + l])) * channel.scale / channel.highest : 0;
+      const share = channel ? Math.max(0, ...columns.map((l) => values[channel.first + l])) * channel.scale / channel.highest : 0;
       return channelColour(paint, share, plainColour);
     });
   };

@@ -1,7 +1,6 @@
 // What all parts of the page share: its data, its colours, and how channel values are named.
 import { Color, SRGBColorSpace } from "three";
-import { bytes } from "../../models/layers.js";
-import { mix } from "./math.js";
+import { bytes, mix } from "./math.js";
 
 // Unpacks zlib data in base64. Returns their text.
 export const inflate = async (packed) => {

@@ -1,5 +1,5 @@
 // Draws charts in the page's colours when they scroll into view, and again when the theme changes.
-import library from "plotly.js-cartesian-dist-min"; // as zlib data in base64, see bundle.py
+import library from "plotly"; // as zlib data in base64, see bundle.py
 import { colour, inflate, material, onTheme } from "./base.js";
 import { openClip } from "./recorded.js";
 

@@ -1,6 +1,5 @@
 // Writes the played motion with the body as a binary glTF 2.0 file. Units are metres, Y is up.
-import { bytes } from "../../models/layers.js";
-import { at3, at4, conjugate, multiply, rotate } from "./math.js";
+import { at3, at4, bytes, conjugate, multiply, rotate } from "./math.js";
 
 const FPS = 60;
 const TYPES = { [5120]: Int8Array, [5121]: Uint8Array, [5123]: Uint16Array, [5125]: Uint32Array, [5126]: Float32Array };

@@ -1,5 +1,6 @@
 // A dial with whole values from 0 to `most`. It is drawn as an arc. People turn it by dragging, clicking or pressing keys.
 import { createActor } from "./actor.js";
+import { paceOf } from "./character.js";
 import { find, material, valueKey } from "./base.js";
 import { firstShown } from "./play.js";
 import { createView } from "./view.js";
@@ -85,6 +86,8 @@ export const createDial = (host, { most = 10, value = 0, changed }) => {
 const APART = 100; // cm between the two figures
 const LINES = 50; // cm between two lines of a belt
 const SPEED = 2.5; // target speed, cm per frame
+const OPENING = 120; // frames that the figures walk before they are seen
+const IN_STEP = .03; // share of a gait cycle by which figures in step may differ
 const TARGET = { velocity: [0, SPEED], facing: null, gait: "walk" };
 const metresPerSecond = (cmPerFrame) => `${(cmPerFrame * .6).toFixed(2)} m/s`;
 
@@ -106,7 +109,7 @@ const createStepCount = (actor) => {
 const createHero = (spec, opening) => {
   const section = find("hero"), canvas = find("hero-view"), line = find("hero-line"), button = find("hero-walk");
   const channel = firstShown(spec), labels = channel ? Object.keys(channel.sliders) : [];
-  const values = new Map(), neutralValues = new Map(), flat = () => 0, hero = { frames: 0 };
+  const values = new Map(), neutralValues = new Map(), hero = { frames: 0 };
   let resolveShown;
   hero.shown = new Promise((done) => { resolveShown = done; }); // resolved when the figure has moved, or, if it rests, has been drawn
   // part: label of the slider that the dial sets. last: time of the last picture, ms, or null. due: how many frames have to run, of the first
@@ -165,13 +168,11 @@ const createHero = (spec, opening) => {
     view.land.darkenUnder(figures.flatMap(([{ figure }]) => figure.balls(view.balls / figures.length)));
     if (now - shown > 250) { shown = now; showPace(); }
   };
-  // The mean speed over the last 50 frames, cm a frame.
-  const pace = ({ character: c }) => Math.hypot(c.px[spec.window] - c.px[spec.window - 50], c.pz[spec.window] - c.pz[spec.window - 50]) / 50;
   // Writes under each figure who it is and how fast it walks.
   const showPace = () => {
     if (beside) figures.forEach(([actor, x], i) => {
       const name = find(`hero-name-${i}`), [left, top] = view.project([x, -9, 12]);
-      name.lastElementChild.textContent = metresPerSecond(pace(actor));
+      name.lastElementChild.textContent = metresPerSecond(paceOf(actor.character, 50));
       Object.assign(name.style, { left: `${left}px`, top: `${top}px` });
     });
   };
@@ -215,13 +216,14 @@ const createHero = (spec, opening) => {
   button.addEventListener("click", () => { walks = !walks; last = null; showButton(); view.requestDraw(); });
   showButton();
 
-  // The page contains the states of both characters while they walk, because predicting their first steps here would take long.
+  // Both walk before they are seen, so that they are up to speed and limp. The second one goes on until it is in step with the first.
   view.compile();
   figures.forEach(([actor], i) => {
-    actor.start(flat);
-    if (opening.walked?.[i]) actor.character.follow(opening.walked[i]);
-    actor.rig.take(actor.character.posePosition, actor.character.poseRotation);
+    actor.start(() => 0);
+    for (let f = 0; f < OPENING; f++) actor.frame(TARGET, i ? neutralValues : values);
   });
+  const ahead = () => { const lead = beside.character.phase - main.character.phase; return lead - Math.floor(lead); };
+  for (let f = 0; beside && f < OPENING && ahead() > IN_STEP; f++) beside.frame(TARGET, neutralValues);
   section.classList.add("ready");
   return Object.assign(hero, { main, beside, view });
 };

@@ -1,7 +1,7 @@
 /** Centimetres, 60 Hz, Y up; yaw 0 faces +Z; +X is the character's left. Quaternions w first. */
 import type * as Three from "three";
 
-/** The content of character.json: the network, the skeleton, the body. */
+/** The content of character.json: the network and the skeleton, and the body. */
 export interface CharacterData { spec: object; body: object }
 
 export interface Target {
@@ -34,6 +34,8 @@ export interface Character {
   setChannel(channel: string, values?: Record<string, number>): void;
   /** Runs one frame, a sixtieth of a second. */
   step(target?: Target): Character;
+  /** Gives the memory to the next character that is made. This one must not be used any more. */
+  release(): void;
 }
 
 export interface Figure { mesh: Three.SkinnedMesh; pose(character: Character): void }

@@ -2,9 +2,7 @@
 import { bvhText, groundSamples, jointVelocities } from "./actor.js";
 import { colour, material, unpackParts } from "./base.js";
 import { drawAll, startCharts } from "./charts.js";
-import { createCharacter } from "./controller.js";
-import { createRig } from "./feet.js";
-import { createGrader, createWatch, measureWalk, profile } from "./gait.js";
+import { createCharacter, createWatch } from "./character.js";
 import { hero, startHero } from "./hero.js";
 import { csv, startPage, startTables } from "./page.js";
 import { createLab } from "./panel.js";
@@ -13,8 +11,8 @@ import { openClip, startCaptured, startFits, startWalks } from "./recorded.js";
 import { createChase } from "./view.js";
 
 globalThis.Hobble = {
-  bvh: bvhText, character: createCharacter, chase: createChase, colour, csv, grader: createGrader, groundSamples, jointVelocities, lab: createLab,
-  material, measureWalk, profile, rig: createRig, watch: createWatch, ready: false,
+  bvh: bvhText, character: createCharacter, chase: createChase, colour, csv, groundSamples, jointVelocities, lab: createLab, material, watch: createWatch,
+  ready: false,
   get drawAll() { return drawAll; },
   get hero() { return hero; },
   get openClip() { return openClip; },

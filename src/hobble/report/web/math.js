@@ -1,5 +1,12 @@
 // Computes with vectors of three numbers and with rotations, and unpacks a body.
-import { bytes } from "../../models/layers.js";
+
+// The bytes of a base64 text, as an ArrayBuffer.
+export const bytes = (text) => {
+  if (Uint8Array.fromBase64) return Uint8Array.fromBase64(text).buffer;
+  const raw = atob(text), out = new Uint8Array(raw.length);
+  for (let i = 0; i < raw.length; i++) out[i] = raw.charCodeAt(i);
+  return out.buffer;
+};
 
 export const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 export const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
@@ -23,11 +30,6 @@ export const conjugate = ([w, x, y, z]) => [w, -x, -y, -z];
 export const rotate = (q, v) => {
   const axis = [q[1], q[2], q[3]], t = cross(axis, v).map((x) => 2 * x), more = cross(axis, t);
   return v.map((x, i) => x + q[0] * t[i] + more[i]);
-};
-// The smallest rotation from direction a to direction b. If they are opposite, no rotation.
-export const between = (a, b) => {
-  const w = Math.hypot(...a) * Math.hypot(...b) + dot(a, b), v = cross(a, b), n = Math.hypot(w, ...v);
-  return n < 1e-9 ? [1, 0, 0, 0] : [w / n, v[0] / n, v[1] / n, v[2] / n];
 };
 // Rotation j of a flat array of rotations, and position j of a flat array of positions.
 export const at4 = (array, j) => [array[4 * j], array[4 * j + 1], array[4 * j + 2], array[4 * j + 3]];

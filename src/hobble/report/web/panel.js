@@ -1,6 +1,6 @@
 // The gait lab: it measures contacts, step lengths and knee angles of the played character over the last seconds, and draws them.
 import { palette } from "./base.js";
-import { SECONDS, createWatch } from "./gait.js";
+import { SECONDS, createWatch, paceOf } from "./character.js";
 import { at3, dot, minus } from "./math.js";
 
 export const SHOWN = 240; // frames that are kept and drawn: four seconds
@@ -110,7 +110,7 @@ export const createPanel = (host, actor, title = "") => {
     piece.style.background = `var(--${COLOURS[name] || "g0"})`;
     return piece;
   });
-  const note = addElement(box, "p", "note"), limpText = limpRow && addElement(limpRow, "span", "said"), limpShare = limpRow && addElement(limpRow, "span", "words");
+  const limpText = limpRow && addElement(limpRow, "span", "said"), limpShare = limpRow && addElement(limpRow, "span", "words");
   let recognisedAt = 0;
   if (limpRow) {
     actor.watch = createWatch(spec);
@@ -121,14 +121,14 @@ export const createPanel = (host, actor, title = "") => {
     box,
     // Shows the present readings. drawing: milliseconds that a picture takes.
     update(drawing) {
-      const c = actor.character, M = spec.window, G = spec.gaits.length;
-      number.textContent = `${(Math.hypot(c.px[M] - c.px[M - 10], c.pz[M] - c.pz[M - 10]) * 6 / 100).toFixed(2)} m/s`; // cm in 10 frames, to m/s
+      const c = actor.character, { contacts, gaits } = c, share = (g) => gaits[gaits.length / 2 + g]; // of a gait now
+      number.textContent = `${(paceOf(c, 10) * .6).toFixed(2)} m/s`; // from cm a frame
       hand.setAttribute("stroke-dasharray", `${c.phase.toFixed(3)} 1`);
       turn.textContent = c.phase.toFixed(2);
-      FEET.forEach((name, i) => dots[i].classList.toggle("on", c.contacts[i] > .5));
-      standing.textContent = FEET.filter((_, i) => c.contacts[i] > .5).join(", ") || "no foot";
-      spec.gaits.forEach((name, g) => { shares[g].style.flexGrow = Math.max(0, c.gait[M * G + g]); });
-      words.textContent = spec.gaits.filter((_, g) => c.gait[M * G + g] > .3).join(", ");
+      FEET.forEach((name, i) => dots[i].classList.toggle("on", contacts[i] > .5));
+      standing.textContent = FEET.filter((_, i) => contacts[i] > .5).join(", ") || "no foot";
+      spec.gaits.forEach((name, g) => { shares[g].style.flexGrow = Math.max(0, share(g)); });
+      words.textContent = spec.gaits.filter((_, g) => share(g) > .3).join(", ");
       const { knees, steps: made } = actor.lab, cm = (v) => (v === null ? "–" : `${v.toFixed(0)} cm`);
       drawLab(chart, actor.lab, palette());
       bends.textContent = `knees ${knees.map((k) => `${(k.at(-1) ?? 0).toFixed(0)}°`).join(" and ")}, left and right`;
@@ -143,7 +143,6 @@ export const createPanel = (host, actor, title = "") => {
           limpShare.textContent = share === undefined ? text : `${Math.round(100 * share)} % sure`;
         });
       }
-      note.textContent = actor.falls ? `fell ${actor.falls === 1 ? "once" : `${actor.falls} times`} and was put back on its feet` : "";
     },
   };
 };

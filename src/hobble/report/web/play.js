@@ -229,16 +229,16 @@ const SIDE = 95; // cm between two figures
 
 const createPlay = (stage, playables) => {
   const canvas = find("play-view"), ground = find("play-ground"), selects = [find("play-first"), find("play-second")];
-  const names = Object.keys(playables), player = { actors: [] };
+  const names = Object.keys(playables), player = { actors: [], target: null };
   // due: how many frames have to run; it grows with time. last: time of the last picture, ms, or null. shown: when the readings were last
   // updated, ms. ready: false until the page is set up.
-  let panels = [], sliders, last = null, due = 0, shown = 0, ready = false, target = null;
+  let panels = [], sliders, last = null, due = 0, shown = 0, ready = false;
   const currentGround = () => GROUNDS.get(ground.value), groundHeight = (x, z) => currentGround().height(x, z);
 
   const view = createView(canvas, START, (now) => {
     move(now);
     const middle = [0, 1, 2].map((i) => player.actors.reduce((sum, { rig }) => sum + rig.places[i], 0) / player.actors.length);
-    const [vx, vz] = target ? target.velocity : [0, 0], walks = target && !steering.byItself && !target.facing && Math.hypot(vx, vz) > .5;
+    const { target } = player, [vx, vz] = target ? target.velocity : [0, 0], walks = target && !steering.byItself && !target.facing && Math.hypot(vx, vz) > .5;
     const lookAt = chase.follow(now, middle, walks ? [vx, vz] : null);
     view.aim([lookAt[0], lookAt[1] - 8, lookAt[2]]);
     view.land.drawAround(lookAt, currentGround(), ground.value);
@@ -254,14 +254,14 @@ const createPlay = (stage, playables) => {
     due = Math.min(4, due + (last === null ? 1 : (now - last) * .06));
     last = now;
     for (; due >= 1; due--) {
-      target = steering.target();
-      player.actors.forEach((actor) => actor.frame(target, sliders.values));
+      player.target = steering.target();
+      player.actors.forEach((actor) => actor.frame(player.target, sliders.values));
     }
   };
   view.onHidden = () => { last = null; chase.rest(); steering.release(); };
 
   const createActors = () => {
-    player.actors.forEach(({ figure }) => figure.remove());
+    player.actors.forEach((actor) => actor.remove());
     panels.forEach(({ box }) => box.remove());
     const who = selects[0] ? selects.map((select) => select.value) : names, two = who.length > 1;
     player.actors = who.map((name, i) => createActor(view, playables[name], two
@@ -271,7 +271,7 @@ const createPlay = (stage, playables) => {
     start();
   };
   const start = () => {
-    player.actors.forEach((actor) => { actor.start(groundHeight); actor.rig.take(actor.character.posePosition, actor.character.poseRotation); });
+    player.actors.forEach((actor) => actor.start(groundHeight));
     chase.reset();
     view.requestDraw();
   };

@@ -1,8 +1,7 @@
 // Motion that is stored in the page: the places and rotations of a figure's bones, frame by frame.
 import { find, material } from "./base.js";
 import { createFigure } from "./figure.js";
-import { bytes } from "../../models/layers.js";
-import { mix, mixTurn } from "./math.js";
+import { bytes, mix, mixTurn } from "./math.js";
 import { createView } from "./view.js";
 
 const TURN = 32767; // a component of a rotation that is 1 is stored as this integer
