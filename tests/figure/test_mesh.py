@@ -13,9 +13,10 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from hobble.core import quat
-from hobble.core.skeleton import Skeleton, forward_kinematics
+from hobble.core.files import load_npz
+from hobble.core.skeleton import Skeleton, forward_kinematics, rest_positions
 from hobble.figure.gltf import fitted_rotations
-from hobble.figure.mesh import Mesh, body_mesh, mesh_key
+from hobble.figure.mesh import FIGURE, Mesh, body_mesh, mesh_key, modelled_pose
 from hobble.figure.pack import links_of_bones, part_spheres, whole_weights
 
 
@@ -50,35 +51,57 @@ def test_the_surface_is_closed_in_one_piece_and_of_a_persons_volume(mesh: Mesh) 
     assert pieces == 1
     a, b, c = mesh.corners[mesh.faces].transpose(1, 0, 2)
     assert 45 < (a * np.cross(b, c)).sum() / 6 / 1000 < 75  # litres; positive, so seen from outside
-    assert np.ptp(mesh.corners[:, 1]) == pytest.approx(162, abs=4)
+    assert np.ptp(mesh.corners[:, 1]) == pytest.approx(162, abs=3)
 
 
-@pytest.mark.parametrize("name", ["mixamo55", "rig22"])
-def test_every_rig_gets_a_body(root: Path, name: str) -> None:
-    made = body_mesh(rig(root, name))
+@pytest.mark.parametrize("name", ["mixamo55", "rig22", "ava191"])
+def test_every_rig_gets_a_body_of_its_size(root: Path, name: str) -> None:
+    skeleton = rig(root, name)
+    made, rest = body_mesh(skeleton), rest_positions(skeleton)
     assert closed(made)
     assert len(made.bones) == 19
+    low, high = made.corners[:, 1].min(), made.corners[:, 1].max()
+    assert 0.5 < rest[skeleton.role("left_toe"), 1] - low < 6
+    assert 12 < high - rest[skeleton.role("head"), 1] < 25
 
 
-def test_the_surface_is_smooth(mesh: Mesh, holden31: Skeleton) -> None:
-    """The normals at the two ends of an edge are similar, except on fingers, at the edges of soles and in the
-    face.
-    """
+def test_the_figure_in_its_pose_is_the_sculpted_one(mesh: Mesh, holden31: Skeleton) -> None:
+    """holden31 is the skeleton around which it was sculpted. In between, it was turned to the rest pose."""
+    pose, sculpted = modelled_pose(holden31), load_npz(FIGURE)
+    corners = mesh.posed(pose.positions[mesh.bones], pose.rotations[mesh.bones])
+    assert np.abs(corners - sculpted["corners"]).max() < 1e-3
+
+
+def test_the_surface_is_small_and_smooth(mesh: Mesh, holden31: Skeleton) -> None:
+    """The normals at the ends of an edge are similar, except on hands, soles and in the face."""
+    assert len(mesh.faces) <= 12_000
     a, b = edges(mesh).T
     turn = np.degrees(np.arccos(np.clip((mesh.normals[a] * mesh.normals[b]).sum(axis=1), -1, 1)))
     fine = [
         holden31.role(f"{side}_{role}") for side in ("left", "right") for role in ("wrist", "heel", "toe")
     ]
     trunk = ~np.isin(mesh.bones[mesh.bones_of_corner[a, 0]], [*fine, holden31.role("head")])
-    assert np.median(turn) < 8
-    assert np.quantile(turn[trunk], 0.99) < 35
+    assert np.median(turn) < 20
+    assert np.quantile(turn[trunk], 0.99) < 50
+
+
+def test_each_triangle_has_its_own_place_in_the_texture(mesh: Mesh) -> None:
+    assert mesh.uv is not None
+    assert (mesh.uv.min(), mesh.uv.max()) == pytest.approx((0, 1), abs=0.02)
+    a, b, c = mesh.uv.swapaxes(0, 1)
+    twice = np.linalg.det(np.stack([b - a, c - a], axis=1))  # twice the area
+    assert 0.4 < np.abs(twice).sum() / 2 < 1
+    # The middle of a triangle is in no other triangle, but for some at the edges of charts.
+    flat = np.abs(twice) > 1e-9
+    inverse = np.linalg.inv(np.stack([b - a, c - a], axis=2)[flat])
+    away = mesh.uv.mean(axis=1)[::7, None] - a[flat]
+    u, v = np.einsum("tij,ptj->ipt", inverse, away)
+    assert (((u > 0) & (v > 0) & (u + v < 1)).sum(axis=1) > 1).mean() < 0.01
 
 
 def test_left_and_right_of_the_body_are_mirror_images(mesh: Mesh) -> None:
-    mirrored = mesh.corners * [-1, 1, 1]
-    _, nearest = cKDTree(mesh.corners).query(mirrored)
-    away = np.abs(((mirrored - mesh.corners[nearest]) * mesh.normals[nearest]).sum(axis=1))
-    assert np.quantile(away, 0.99) < 0.3
+    away, _ = cKDTree(mesh.corners).query(mesh.corners * [-1, 1, 1])
+    assert away.max() < 0.1
 
 
 def test_a_corner_has_at_most_four_bones_and_their_shares_sum_to_one(mesh: Mesh) -> None:
@@ -99,22 +122,6 @@ def test_a_rigid_movement_of_all_bones_moves_the_body_rigidly(mesh: Mesh) -> Non
     away = np.array([5.0, 6, 7])
     moved = mesh.posed(quat.rotate(turn, mesh.positions) + away, quat.mul(turn, mesh.rotations))
     assert np.abs(moved - (quat.rotate(turn, mesh.corners) + away)).max() < 1e-9
-
-
-def test_no_corner_moves_further_than_its_bones_move_it(mesh: Mesh, holden31: Skeleton) -> None:
-    """A corner is a mean of the places where its bones would move it, even if a hand turns by half a turn."""
-    rng = np.random.default_rng(4)
-    wild = quat.normalize(rng.normal(size=(2, len(holden31.joints), 4)))
-    world, places = forward_kinematics(holden31, wild, np.zeros((2, 3)))
-    before, after = (mesh.posed(places[i, mesh.bones], world[i, mesh.bones]) for i in (0, 1))
-    most = np.zeros(len(mesh.corners))
-    for b in range(len(mesh.bones)):
-        local = quat.rotate(quat.inv(mesh.rotations[b]), mesh.corners - mesh.positions[b])
-        carried = [quat.rotate(world[i, mesh.bones[b]], local) + places[i, mesh.bones[b]] for i in (0, 1)]
-        step = np.linalg.norm(carried[1] - carried[0], axis=1)
-        mine = ((mesh.bones_of_corner == b) & (mesh.weights > 0)).any(axis=1)
-        most[mine] = np.maximum(most[mine], step[mine])
-    assert (np.linalg.norm(after - before, axis=1) <= most + 1e-6).all()
 
 
 def test_a_knee_bends_without_moving_the_other_leg(mesh: Mesh, holden31: Skeleton) -> None:

@@ -82,15 +82,6 @@ def test_the_injured_part_is_coloured_if_requested(
     assert np.all(np.abs(columns - x[knee]) < 15)
 
 
-def test_a_walk_is_cut_where_it_repeats() -> None:
-    time = np.arange(stimuli.SETTLED + 60 + stimuli.LONGEST + stimuli.BLEND)
-    swing = np.stack([0 * time, 90 + np.sin(2 * np.pi * time / 67), 2.0 * time], axis=1)
-    leg = swing + np.stack([0 * time, -50 + 0 * time, 20 * np.sin(2 * np.pi * time / 67)], axis=1)
-    first, last, gap = stimuli.find_cut(np.stack([swing, leg], axis=1))
-    assert (last - first) % 67 == 0
-    assert gap < 1e-6
-
-
 def test_the_distance_of_walks_ignores_start_and_heading(holden31: Skeleton) -> None:
     time, joints = np.arange(134), len(holden31.joints)
     swing = 20 * np.sin(2 * np.pi * (time[:, None] / 67 + np.linspace(0, 1, joints)))

@@ -69,7 +69,7 @@ rule export_release:
 
 
 rule export_glb:
-    """The character for a game engine as a glTF 2.0 file: body, skeleton and the scripted scenarios."""
+    """The character for a game engine as a glTF 2.0 file: body, skeleton, loops of each gait, the scripted scenarios."""
     input:
         weights=lambda w: configurations.network(w.configuration, "weights.npz"),
         scenarios=rules.generate.output.scenarios,
@@ -83,8 +83,11 @@ rule export_glb:
         mem_mb=1500,
         runtime=10,
     params:
+        runtime=lambda w: configurations.section(w.configuration, "runtime"),
         code=lambda w: package.code(
-            "export_glb", configurations.model_package(w.configuration)
+            "export_glb",
+            configurations.model_package(w.configuration),
+            *display_modules(),
         ),
     script:
         "../scripts/export_glb.py"

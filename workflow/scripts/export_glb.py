@@ -1,9 +1,12 @@
-"""Creates results/<configuration>/export/character.glb: the body, its skeleton and the scripted motion."""
+"""Creates results/<configuration>/export/character.glb: the body with bones and animations."""
 
 from hobble.models.load import load_network
-from hobble.runtime.export import export_glb
+from hobble.runtime.glb import export_glb
+from hobble.runtime.options import Runtime
 from hobble.workflow.job import job
 
 with job(snakemake) as log:
-    export_glb(snakemake.output.glb, load_network(snakemake.input.weights), snakemake.input.scenarios)
+    network = load_network(snakemake.input.weights)
+    runtime = Runtime.model_validate(snakemake.params.runtime)
+    export_glb(snakemake.output.glb, network, snakemake.input.scenarios, runtime)
     log.info("wrote %s", snakemake.output.glb)

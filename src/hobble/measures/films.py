@@ -35,10 +35,11 @@ from hobble.measures.study import PARTS, QUESTIONS
 from hobble.models.network import Network
 from hobble.report.parts import embedded
 from hobble.report.raster import BodyRenderer, Camera
-from hobble.report.stimuli import FRAME_STEP, VISIBLE, draw_frames, make_loop
+from hobble.report.stimuli import FRAME_STEP, VISIBLE, draw_frames
 from hobble.report.templates import load_template, page_style, questionnaire_script
 from hobble.runtime.animation import ProceduralAnimation
 from hobble.runtime.export import restore_bone_lengths
+from hobble.runtime.loops import make_loop
 from hobble.runtime.options import Runtime
 
 INJURY = "injury"  # the channel

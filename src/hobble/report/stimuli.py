@@ -6,7 +6,6 @@ They are stimuli for a questionnaire, or pictures for a README.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -23,33 +22,16 @@ from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 from hobble.figure.mesh import body_mesh
 from hobble.models.network import Network
-from hobble.report.character import walk_straight
 from hobble.report.raster import GRID, BodyRenderer, Camera
 from hobble.runtime.export import export_bvh, fitted_skeleton, restore_bone_lengths
+from hobble.runtime.loops import RepeatedWalk, make_loop
 from hobble.runtime.options import Runtime
 
-SETTLED = 6 * 60  # frames until the gait has settled; no loop begins earlier
-SHORTEST, LONGEST = 150, 300  # frames: least and greatest length of a loop
-BLEND = 12  # frames over which the end of a loop is blended into its start
 FRAME_STEP = 2  # every second frame of the motion becomes an image
 QUALITY = 80  # of the WebP images, 0 to 100
 # cm: a loop that is nearer than this to the loop of the neutral walk (`loop_distance`) looks the same. In the
 # neutral walk all values of channels are 0.
 VISIBLE = 0.1
-
-
-@dataclass(frozen=True)
-class RepeatedWalk:
-    """A walk that can be repeated: after its last frame, its first frame follows without a jump.
-
-    positions: (F, J, 3), cm. rotations: (F, J, 4). travel: (3,) cm from the start of one repetition to the
-    start of the next. gap: mean distance by which the joints would jump without blending, cm.
-    """
-
-    positions: Array
-    rotations: Array
-    travel: Array
-    gap: float
 
 
 def write_stimuli(
@@ -162,48 +144,6 @@ def loop_warnings(entries: Sequence[Mapping[str, Any]]) -> list[str]:
     return out
 
 
-def make_loop(network: Network, values: Mapping[str, Mapping[str, float]], runtime: Runtime) -> RepeatedWalk:
-    """A loop of the character walking straight on, cut out of a longer walk by `find_cut`.
-
-    values: channel -> column -> value.
-    """
-    count = SETTLED + 60 + LONGEST + BLEND
-    poses = [pose for _, pose in walk_straight(network, runtime, count, values)]
-    positions, rotations = np.array([p.positions for p in poses]), np.array([p.rotations for p in poses])
-    first, stop, gap = find_cut(positions)
-    loop_positions, loop_rotations = positions[first:stop].copy(), rotations[first:stop].copy()
-    travel = positions[stop, 0] - positions[first, 0]
-    travel[1] = 0.0
-    # The end of the loop is blended into the frames just before its first frame, moved on by `travel`.
-    for k in range(BLEND):
-        share = (k + 1) / (BLEND + 1)
-        here, before = stop - BLEND + k, first - BLEND + k
-        loop_positions[here - first] = (1 - share) * positions[here] + share * (positions[before] + travel)
-        loop_rotations[here - first] = _mix_rotations(rotations[here], rotations[before], share)
-    return RepeatedWalk(loop_positions, loop_rotations, travel, gap)
-
-
-def find_cut(positions: Array) -> tuple[int, int, float]:
-    """Find two frames of a walk, (F, J, 3), between which it can be cut out and repeated.
-
-    Their poses and velocities are as similar as possible. Returns the first frame of the loop, the frame
-    after its last, and the mean distance (cm) between the joints in these two frames. First frames within a
-    second after SETTLED and all allowed lengths are tried.
-    """
-    local = positions - positions[:, :1] * np.array([1.0, 0.0, 1.0])  # the root stays over the origin
-    velocity = np.gradient(local, axis=0)
-    best = (SETTLED, SETTLED + SHORTEST, np.inf)
-    for first in range(SETTLED, SETTLED + 60, 2):
-        later = np.arange(first + SHORTEST, min(first + LONGEST, len(positions) - BLEND))
-        # Distance of the poses, cm, plus 3 times the difference of the velocities, cm a frame.
-        difference = np.linalg.norm(local[later] - local[first], axis=-1).mean(axis=1)
-        difference += 3 * np.linalg.norm(velocity[later] - velocity[first], axis=-1).mean(axis=1)
-        if difference.min() < best[2]:
-            best = (first, int(later[difference.argmin()]), float(difference.min()))
-    first, stop, _ = best
-    return first, stop, float(np.linalg.norm(local[stop] - local[first], axis=-1).mean())
-
-
 def draw_frames(
     renderer: BodyRenderer, skeleton: Skeleton, loop: RepeatedWalk, values: Array | None, size: int
 ) -> list[NDArray[np.uint8]]:
@@ -253,10 +193,3 @@ def _turned_ahead(loop: RepeatedWalk) -> Array:
     yaw = np.arctan2(loop.travel[0], loop.travel[2])
     turn = np.array([[np.cos(yaw), 0, -np.sin(yaw)], [0, 1, 0], [np.sin(yaw), 0, np.cos(yaw)]])
     return (loop.positions - loop.positions[:, :1] * [1, 0, 1]) @ turn.T
-
-
-def _mix_rotations(a: Array, b: Array, share: float) -> Array:
-    """Rotations (J, 4) between a and b. share: 0 gives a, 1 gives b."""
-    b = np.where((a * b).sum(-1, keepdims=True) < 0, -b, b)  # q and -q are the same rotation
-    mixed = (1 - share) * a + share * b
-    return mixed / np.linalg.norm(mixed, axis=-1, keepdims=True)
