@@ -155,10 +155,10 @@ def test_clips_without_turns_are_reported(material: ReportMaterial) -> None:
 
     def said(seconds: float) -> bool:
         straight = np.where(np.abs(middles) < 20, 50.0, 0.0)
-        turns = {"train": straight, "held_out": np.where(middles == 50, seconds, 0.0)}
+        turns = {"train": straight[:, None], "held_out": np.where(middles == 50, seconds, 0.0)[:, None]}
         return any("Hardly anybody turns" in hint.head for hint in hints(material, turns))
 
     assert said(0.0)
     assert said(0.9)
     assert not said(1.5)
-    assert not any("turns" in hint.head for hint in hints(material, {"train": 0.0 * middles}))
+    assert not any("turns" in hint.head for hint in hints(material, {"train": 0.0 * middles[:, None]}))

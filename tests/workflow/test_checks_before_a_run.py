@@ -28,12 +28,6 @@ def test_an_impossible_data_set_is_reported(base: Path, text: str, message: str)
         Project(base, {}).configurations.splits("one")
 
 
-def test_holding_out_all_clips_is_refused(base: Path) -> None:
-    (base / "config/datasets/mine.yaml").write_text(DATASET.replace("[b]", "[a, b, c]"))
-    with pytest.raises(HobbleError, match="mine: no clip is left to train on"):
-        Project(base, {}).configurations.splits("hurt")
-
-
 @pytest.mark.parametrize(
     ("target", "message"),
     [
@@ -154,7 +148,8 @@ def test_an_impossible_continuation_is_reported_before_anything_runs(
     (complete / "config/other.yaml").write_text(f"extends: more\n{text}\n")
     project = Project(complete, {})
     if message is None:
-        return check_targets(project, ["results/other/report.html"])
+        check_targets(project, ["results/other/report.html"])
+        return
     with pytest.raises(HobbleError, match=f"configuration other continues from one, .*{message}"):
         check_targets(project, ["results/other/report.html"])
 

@@ -10,18 +10,8 @@ from pathlib import Path
 import pytest
 
 from hobble.core.errors import HobbleError
-from hobble.motion.options import ClipMotion
 from hobble.workflow.project import Project
 from tests.workflow.small_project import DATASET
-
-
-def test_only_the_files_beside_a_clip_are_found(base: Path) -> None:
-    project = Project(base, {})
-    assert [Path(f).name for f in project.clips.label_files("mine", "b")] == ["b_gait.txt"]
-    assert project.clips.label_files("mine", "c") == []
-    assert [Path(f).name for f in project.datasets.channel_sources.files("mine", "c", "injury")] == [
-        "c_injuries.txt"
-    ]
 
 
 def test_a_listed_clip_without_a_file_is_reported(base: Path) -> None:
@@ -113,22 +103,6 @@ def test_a_clip_depends_on_the_skeleton_that_it_is_retargeted_from(complete: Pat
     shipped = Project(root, {}).clips
     assert [Path(f).name for f in shipped.clip_skeleton_files("synthetic-ava", "walk-1")] == ["holden31.yaml"]
     assert shipped.clip_skeleton_files("synthetic", "walk-1") == []
-
-
-@pytest.mark.shared
-def test_plan_and_job_use_the_same_skeleton_file(root: Path, shared: Path) -> None:
-    from hobble.motion.make import load_source
-    from hobble.motion.read import read_bvh
-    from hobble.motion.skeleton_file import load_skeleton
-
-    project = Project(root, {"mocap": str(shared / "mocap")})
-    target = load_skeleton(root / "config/skeletons/holden31.yaml")
-    options = ClipMotion()
-    for clip in ("Injured_Ilde", "Injured_Walk_LLL", "Injured_Run_LLL_extended_converted"):
-        file = read_bvh(project.clips.source("ferre", clip))
-        rig = load_source(file, target, root / "config/skeletons", options).match.rig
-        files = project.clips.clip_skeleton_files("ferre", clip)
-        assert [Path(f).stem for f in files] == [rig] * (rig != "holden31")
 
 
 @pytest.mark.parametrize("name", ["a.bvh", "map.txt"])

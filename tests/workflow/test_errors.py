@@ -9,8 +9,6 @@ from pathlib import Path
 
 import pytest
 
-from hobble.workflow.batches import LEAST_BATCHES, batch_of
-
 pytestmark = pytest.mark.workflow
 
 # A figure of one bone, whatever its joints are called.
@@ -151,32 +149,3 @@ def test_a_full_disk_gives_a_message_and_the_next_run_completes(workflow, small_
     subprocess.run(["mount", "-o", "remount,size=300m", str(small_disk)], check=True)
     workflow.run("-c2", target)
     assert {p: p.read_bytes() for p in whole} == whole
-
-
-@pytest.mark.slow
-def test_one_bad_clip_of_a_batch_does_not_stop_the_others(clips: list[Path], workflow) -> None:
-    """There are enough clips for shared batches. Only one batch, of three clips, is requested."""
-    names = [f"clip-{number}" for number in range(200)]
-    together = [name for name in names if batch_of(name, LEAST_BATCHES) == 5][:3]
-    others = [name for name in names if name not in together][: LEAST_BATCHES - 2]
-    folder = workflow.folder / "mocap" / "mine"
-    folder.mkdir(parents=True)
-    for number, name in enumerate([*together, *others]):
-        # A line end more for each, because identical files are refused on both sides of the split.
-        (folder / f"{name}.bvh").write_bytes(clips[1].read_bytes() + b"\n" * number)
-    (workflow.checkout / "config/datasets/mine.yaml").write_text(DATASET)
-    workflow.mine, (workflow.clip, *_) = folder, together
-    path = folder / f"{together[0]}.bvh"
-    whole = path.read_text()
-    path.write_text(spoil(whole.splitlines(), "nan"))
-    asked = [f"motion/{name}.npz" for name in together]
-    text = make(workflow, *asked, ok=False)
-    said = [line for line in text.splitlines() if line.startswith("motion_clips: ")]
-    assert len(said) == 1, text
-    assert path.name in said[0]
-    assert "0 of 4 jobs done" in text
-    path.write_text(whole)
-    make(workflow, *asked, ok=True)
-    log = (workflow.folder / "results/datasets/mine/logs/motion/motion_clips/05.log").read_text()
-    assert "3 pieces, 2 of them kept from before, 0 failed" in log
-    assert make(workflow, *asked, ok=True).count("Nothing to be done") == 1

@@ -55,39 +55,20 @@ def test_a_hurt_version_has_the_mood_of_its_clip(base: Path) -> None:
     assert project.measurements.params("both", "accuracy")["people"] == {}
 
 
-def test_a_status_in_the_data_set_replaces_the_file(base: Path) -> None:
-    text = DATASET + "clips: {a: , b: , c: {channels: {injury: 'LeftArm-LeftForeArm[3]'}}}\n"
-    (base / "config/datasets/mine.yaml").write_text(text)
-    assert Project(base, {}).datasets.channel_sources.files("mine", "c", "injury") == []
+def test_severities_of_0_count_as_healthy_and_an_entry_replaces_the_file(base: Path) -> None:
+    for clip, text in (("a", "1-9 LeftLeg-LeftFoot[0];"), ("c", "5-9 LeftLeg-LeftFoot[.5];")):
+        (base / f"data/mine/{clip}_injuries.txt").write_text(f"frames:9\n{text}\n")
 
+    def healthy() -> list[bool]:
+        sources = Project(base, {}).datasets.channel_sources
+        return [sources.is_neutral("mine", clip, "injury") for clip in "abc"]
 
-def test_severities_of_0_count_as_healthy(base: Path) -> None:
-    (base / "data/mine/a_injuries.txt").write_text(
-        "frames:9\n1-9 LeftLeg-LeftFoot[0];LeftArm-LeftForeArm[0.0];\n"
-    )
-    (base / "data/mine/c_injuries.txt").write_text(
-        "frames:9\n1-4 LeftLeg-LeftFoot[0];\n5-9 LeftLeg-LeftFoot[.5];\n"
-    )
-    assert [
-        Project(base, {}).datasets.channel_sources.is_neutral("mine", clip, "injury") for clip in "abc"
-    ] == [
-        True,
-        True,
-        False,
-    ]
-    text = (
-        DATASET
-        + "clips: {a: {channels: {injury: 'LeftLeg-LeftFoot[2]'}}, "
-        + "b: {channels: {injury: 'LeftLeg-LeftFoot[0]'}}, c: }\n"
-    )
+    assert healthy() == [True, True, False]
+    entry = "{channels: {injury: 'LeftLeg-LeftFoot[%s]'}}"
+    text = f"{DATASET}clips: {{a: {entry % 2}, b: {entry % 0}, c: }}\n"
     (base / "config/datasets/mine.yaml").write_text(text)
-    assert [
-        Project(base, {}).datasets.channel_sources.is_neutral("mine", clip, "injury") for clip in "abc"
-    ] == [
-        False,
-        True,
-        False,
-    ]
+    assert healthy() == [False, True, False]
+    assert Project(base, {}).datasets.channel_sources.files("mine", "a", "injury") == []
 
 
 @pytest.mark.parametrize("name", ["Walk Forward", "walk, slow (2)", "gå+走"])
@@ -99,14 +80,6 @@ def test_a_clip_with_any_file_name_can_have_an_entry(base: Path, name: str) -> N
     assert project.clips.entry("mine", name).gait == "jog"
     assert project.configurations.splits("hurt")[name + "_mirror"] == "held_out"
     assert project.clips.source("mine", name) == str(base / f"data/mine/{name}.bvh")
-
-
-def test_the_frames_of_the_synthetic_data_set_are_divided_among_its_clips(root: Path) -> None:
-    project = Project(root, {})
-    total = sum(
-        project.datasets.frames("synthetic", clip) for clip in project.clips.listed_entries("synthetic")
-    )
-    assert abs(total - 12_795) < 20
 
 
 def test_network_of_reads_the_other_configurations_files(root: Path) -> None:
@@ -176,10 +149,3 @@ def test_motion_options_include_the_ground_of_the_clip(root):
 def test_a_mocap_that_is_not_a_folder_is_reported(base: Path, asked: object) -> None:
     with pytest.raises(HobbleError, match="--config mocap: must be the name of one folder"):
         Project(base, {"mocap": asked})
-
-
-def test_single_keys_of_a_section_can_be_requested(root: Path) -> None:
-    project = Project(root, {})
-    assert project.datasets.options("tiny", "database", "window", "step") == {"window": 60, "step": 10}
-    with pytest.raises(KeyError):
-        project.configurations.section("test", "training", "passes", "learning_rat")

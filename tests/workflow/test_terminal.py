@@ -90,24 +90,18 @@ def test_a_failure_is_printed_once_and_listed_in_the_summary(tmp_path: Path) -> 
         run.say(
             "job_error", "Error in rule", logging.ERROR, jobid=number, rule_name="motion_clips", log=[log]
         )
+    run.say("error", "WorkflowError:\nconfig/nope.yaml: no such file", logging.ERROR)
     run.say(None, "Exiting because a job execution failed. Look below for error messages", logging.ERROR)
     run.terminal.close()
     assert run.lines[1:] == [
         f"motion_clips b: ended without a message; it may have been killed. Its log: {silent}",
+        "WorkflowError:",
+        "config/nope.yaml: no such file",
         "0 of 2 jobs done in 0 s, 2 failed:",
         f"  motion_clips a: {said}",
         f"  motion_clips b: {silent}",
         "When this is fixed, the same command continues from here.",
     ]
-
-
-def test_snakemakes_own_errors_are_printed() -> None:
-    run = Run()
-    run.say("error", "WorkflowError:\nconfig/nope.yaml: no such file", logging.ERROR)
-    run.say("error", "LockException:\nError: Directory cannot be locked.", logging.ERROR)
-    run.terminal.close()
-    assert "config/nope.yaml: no such file" in run.lines
-    assert "Error: Directory cannot be locked." in run.lines
 
 
 def test_jobs_of_a_stopped_run_do_not_count_as_failed() -> None:
@@ -179,17 +173,6 @@ def test_a_long_job_shows_its_share_its_errors_and_its_log_while_the_time_moves(
     run.clock += PROGRESS_SECONDS
     run.terminal.tick()
     assert len(run.lines) == 6, "nothing runs"
-
-
-def test_the_batches_of_a_rule_are_one_line() -> None:
-    run = Run()
-    run.say("run_info", "", stats={"motion_clips": 12, "training": 1, "total": 13})
-    log = "results/datasets/cmu-ava/logs/motion/motion_clips/07.log"
-    run.job(1, "motion_clips", log, dataset="cmu-ava", batch="07")
-    run.say("job_error", "", logging.ERROR, jobid=1, rule_name="motion_clips", log=[log])
-    run.terminal.close()
-    assert run.lines[0] == "13 jobs: 12 motion_clips, 1 training"
-    assert f"  motion_clips cmu-ava 07: {log}" in run.lines
 
 
 @pytest.mark.workflow

@@ -18,7 +18,6 @@ from hobble.report.parts import (
     citation,
     configuration_colours,
     configuration_names,
-    dot_trace,
     format_bytes,
     format_duration,
     format_number,
@@ -26,7 +25,7 @@ from hobble.report.parts import (
     line_trace,
     log_axis,
 )
-from hobble.report.sections import passes_axis, published_curve, stage_axes
+from hobble.report.sections import passes_axis, published_curve, stage_charts
 from hobble.report.templates import compared_by, compressed, drawn_by_script, render_page
 
 LARGEST_PAGE = 19_850_000  # bytes; the page must stay under 20 MB
@@ -49,6 +48,11 @@ def render_comparison(
     """
     columns = [column for each in compared_by(measures, "compared_columns", compared) for column in each]
     verdicts = [v for each in compared_by(measures, "compared_verdicts", compared) for v in each]
+    once = "The stages that prepare a data set run only once for all configurations that use it."
+    stages = {
+        name: [stage for stage in compared["stages"] if stage["configuration"] == name]
+        for name in configuration_names(compared)
+    }
     sections: dict[str, dict[str, Any]] = {
         "overview": {
             "verdicts": sorted(verdicts, key=lambda verdict: verdict.order),
@@ -56,7 +60,7 @@ def render_comparison(
             "published": published_table(compared),
         },
         "training": {"curves": training_curves(compared)},
-        "stages": {"charts": stage_charts(compared)},
+        "stages": {"charts": stage_charts(stages, "compare", once, configuration_colours(compared))},
     }
     playables = playables or {}
     measurements = join_sections(compared_by(measures, "compared_section", compared))
@@ -147,26 +151,6 @@ def training_curves(compared: Compared) -> Chart | None:
         options=options,
         option_layouts={label: {"xaxis": {**axis(label), "rangemode": "tozero"}} for label in options},
     )
-
-
-def stage_charts(compared: Compared) -> list[Chart]:
-    """Two charts: the time and the size on disk of each stage of the pipeline."""
-    # Plotly draws the first category at the bottom, so the order is reversed.
-    order = list(dict.fromkeys(stage["stage"] for stage in compared["stages"]))[::-1]
-    charts = []
-    for key, title, label, as_text in (
-        ("seconds", "Time of each stage", "seconds, sum over all jobs", format_duration),
-        ("bytes", "Size of each stage", "bytes on disk", format_bytes),
-    ):
-        traces = []
-        for name, colour in configuration_colours(compared).items():
-            rows = [s for s in compared["stages"] if s["configuration"] == name and s.get(key)]
-            x, y = [s[key] for s in rows], [s["stage"] for s in rows]
-            traces.append(dot_trace(name, x, y, colour, "%{y}: %{text}") | {"text": list(map(as_text, x))})
-        layout = stage_axes(label, [stage.get(key) or 0 for stage in compared["stages"]], order)
-        caption = "The stages that prepare a data set run only once for all configurations that use it."
-        charts.append(Chart(f"compare-{key}", title, caption, traces, layout, 110 + 32 * len(order)))
-    return charts
 
 
 # Published measure -> a longer name, if its own name is unclear.

@@ -31,60 +31,36 @@ TURN_EDGES = np.arange(-220, 221, 20.0)  # of turning speeds, degrees a second, 
 TENTHS = np.arange(1, 11)  # middles of the bins of channel values, in tenths of the channel's highest value
 
 
-def choose_clips(material: ReportMaterial, most: int = MOST_SHOWN) -> frozenset[str]:
-    """Names of the clips that the page shows one by one: all clips, or `most` of them if there are more.
+def some_clips(names: Iterable[str], most: int) -> frozenset[str]:
+    """`most` of the clips, drawn at random; all if there are no more.
 
-    So the size of the page does not grow with the data set. The clips are divided into kinds by split, by
-    main gait, and by whether a channel (group of inputs of the network) is above 0 in them. In each round
-    every kind gives one clip, until there are `most`. Which clip of its kind comes first is random, but
-    depends only on the names.
+    So the size of the page does not grow with the data set. The draw depends only on the names.
     """
-    with_values = {report["clip"] for report in material.channels if report.get("values")}
-    kinds: dict[tuple[str, str, bool], list[str]] = {}
-    for report in material.labels:
-        clip, seconds = report["clip"], report.get("seconds") or {}
-        gait = max(seconds, key=lambda name: seconds[name], default="")
-        kinds.setdefault((material.split_of(clip), gait, clip in with_values), []).append(clip)
-    candidates = [
-        (turn, kind, name) for kind in kinds for turn, name in enumerate(sorted(kinds[kind], key=shuffle_key))
-    ]
-    return frozenset(name for *_, name in sorted(candidates)[:most])
+    return frozenset(sorted(names, key=shuffle_key)[:most])
 
 
-def sample_files(paths: Sequence[str], most: int = MOST_COUNTED) -> list[str]:
-    """At most `most` of the paths, drawn at random. paths: one file for each clip, called after the clip.
-
-    The draw depends only on the names, so it is the same each time.
-    """
-    chosen = set(sorted((Path(path).stem for path in paths), key=shuffle_key)[:most])
-    return files_of_clips(paths, chosen)
+def some_files(paths: Sequence[str], most: int) -> list[str]:
+    """The files of `some_clips`. paths: one file for each clip, called after the clip."""
+    chosen = some_clips((Path(path).stem for path in paths), most)
+    return [path for path in paths if Path(path).stem in chosen]
 
 
-def files_of_clips(paths: Iterable[str], names: Iterable[str]) -> list[str]:
-    """Those of the paths that belong to the clips `names`. paths: files called after their clips."""
-    wanted = set(names)
-    return [path for path in paths if Path(path).stem in wanted]
-
-
-def seconds_of_data(
-    paths: Sequence[str | Path], splits: Mapping[str, str], all_clips: int | None = None
-) -> dict[str, Any]:
+def seconds_of_data(paths: Sequence[str], splits: Mapping[str, str]) -> dict[str, Any]:
     """Seconds of data in the files `database/clips/<clip>.npz`.
 
-    splits: clip -> "train" or "held_out". all_clips: if `paths` are a random choice of clips, the number of
-    clips from which they were chosen. Then the seconds are an estimate for all of these.
+    splits: clip -> "train" or "held_out". At most MOST_COUNTED clips and MOST_EXCERPTS excerpts of them are
+    read; then the seconds are an estimate for all.
 
-    The result has `turns`: split -> seconds in each bin between two TURN_EDGES; `both`: seconds at each
-    combination, (bins between TURN_EDGES, bins between SPEED_EDGES); `channels`: channel -> column -> seconds
-    in each bin of TENTHS; `estimate`: a sentence that says which part of the data was read, empty if all was
-    read. Turning speeds and speeds outside the bins count in the outermost bin. Channel values below half a
-    tenth do not count.
+    The result has `both`: split -> seconds at each combination, (bins between two TURN_EDGES, bins between
+    two SPEED_EDGES); `channels`: channel -> column -> seconds in each bin of TENTHS; `estimate`: a sentence
+    that says which part of the data was read, empty if all was read. Turning speeds and speeds outside the
+    bins count in the outermost bin. Channel values below half a tenth do not count.
     """
-    chosen, share = _chosen_excerpts(paths)
+    read_paths = some_files(paths, MOST_COUNTED)
+    chosen, share = _chosen_excerpts(read_paths)
     # Each frame that is read stands for this many seconds of data. The clips have 60 frames a second.
-    weight = max(all_clips or 0, len(paths)) / max(len(paths), 1) / share / 60
-    turns = {split: np.zeros(len(TURN_EDGES) - 1) for split, *_ in SPLITS}
-    both = np.zeros((len(TURN_EDGES) - 1, len(SPEED_EDGES) - 1))
+    weight = len(paths) / max(len(read_paths), 1) / share / 60
+    both = {split: np.zeros((len(TURN_EDGES) - 1, len(SPEED_EDGES) - 1)) for split in SPLIT_WORDS}
     channels: dict[str, dict[str, Array]] = {}
     for path, excerpt in chosen:
         rows = load_excerpt(path, excerpt)
@@ -96,8 +72,8 @@ def seconds_of_data(
         turn = np.degrees(-y[:, layout.y_turn][:, 0]) * 60
         speed = np.clip(speed, SPEED_EDGES[0], SPEED_EDGES[-1] - 1e-6)
         turn = np.clip(turn, TURN_EDGES[0], TURN_EDGES[-1] - 1e-6)
-        turns[splits.get(rows.clip, "train")] += np.histogram(turn, TURN_EDGES)[0] * weight
-        both += np.histogram2d(turn, speed, (TURN_EDGES, SPEED_EDGES))[0] * weight
+        counts = np.histogram2d(turn, speed, (TURN_EDGES, SPEED_EDGES))[0]
+        both[splits.get(rows.clip, "train")] += counts * weight
         skeleton = Skeleton.from_dict(rows.skeleton)
         for name, table in rows.channels.items():
             definition, seconds = channel(name), channels.setdefault(name, {})
@@ -105,13 +81,13 @@ def seconds_of_data(
                 if values.any():
                     counts = np.histogram(10 * values / definition.highest, np.arange(0.5, 11))[0]
                     seconds[column] = seconds.get(column, 0) + counts * weight
-    read = [f"{len(paths):,} of {all_clips:,} clips"] if all_clips and all_clips > len(paths) else []
+    read = [f"{len(read_paths):,} of {len(paths):,} clips"] if len(paths) > len(read_paths) else []
     read += [f"{100 * share:.0f} % of their frames"] if share < 1 else []
     estimate = f" Estimated from {' and '.join(read)}." if read else ""
-    return {"turns": turns, "both": both, "channels": channels, "estimate": estimate}
+    return {"both": both, "channels": channels, "estimate": estimate}
 
 
-def _chosen_excerpts(paths: Sequence[str | Path]) -> tuple[list[tuple[str | Path, Excerpt]], float]:
+def _chosen_excerpts(paths: Sequence[str]) -> tuple[list[tuple[str, Excerpt]], float]:
     """The excerpts to read, each with the file of its clip: all, or MOST_EXCERPTS drawn at random.
 
     Also returns their share of all rows.
@@ -159,39 +135,23 @@ def gait_chart(material: ReportMaterial) -> Chart | None:
     return _seconds_chart("gaits", "Seconds of each gait", caption, bars, GAITS, "%{x}", xaxis=x_axis)
 
 
-def speed_chart(material: ReportMaterial) -> Chart | None:
-    """Seconds at each speed over the ground, from the speed curves of the label reports; None without any."""
-    seconds = {split: np.zeros(len(SPEED_EDGES) - 1) for split, *_ in SPLITS}
-    for report in material.labels:
-        curves = report.get("curves") or {}
-        if speed := [v for v in curves.get("speed") or () if v is not None]:
-            counts, _ = np.histogram(np.clip(speed, 0, SPEED_EDGES[-1] - 1e-6), SPEED_EDGES)
-            # A curve may have fewer points than frames. Each stands for an equal part of the clip.
-            seconds[material.split_of(report["clip"])] += counts / len(speed) * curves["seconds"][-1]
-    x, bars = _middles(SPEED_EDGES), {split: np.round(s, 3).tolist() for split, s in seconds.items()}
-    highest_speed = max((x[i] for bar in bars.values() for i in np.flatnonzero(bar)), default=0)
-    caption = "Seconds at each speed. Where there is little or no data, the network has to interpolate."
-    layout = {"bargap": 0.08, "xaxis": axis("m/s", range=[0, highest_speed + 0.3])}
-    return _seconds_chart("speeds", "Speed over the ground", caption, bars, x, "%{x:.1f} m/s", **layout)
-
-
-def turn_chart(counted: Mapping[str, Any]) -> Chart | None:
-    """A bar for each turning speed; None without data. counted: from `seconds_of_data`."""
-    bars = {split: np.round(seconds, 3).tolist() for split, seconds in counted["turns"].items()}
-    caption = "Seconds of data at each turning speed. With mirrored clips, left and right are alike."
-    layout = {"bargap": 0.08, "xaxis": axis("degrees per second (positive: to the left)")}
-    caption += counted["estimate"]
-    return _seconds_chart("turns", "Turning speed", caption, bars, _middles(TURN_EDGES), "%{x}°/s", **layout)
-
-
-def speed_turn_chart(counted: Mapping[str, Any]) -> Chart | None:
-    """A cell for each combination of speed and turn; None without data. counted: from `seconds_of_data`."""
-    both, estimate = counted["both"], counted["estimate"]
+def speed_and_turn_charts(counted: Mapping[str, Any]) -> list[Chart | None]:
+    """Seconds at each speed, at each turning speed, and at each combination. counted: `seconds_of_data`."""
+    speeds, turns, estimate = _middles(SPEED_EDGES), _middles(TURN_EDGES), counted["estimate"]
+    of_speed, of_turn = (
+        {split: np.round(seconds.sum(axis=axis), 3).tolist() for split, seconds in counted["both"].items()}
+        for axis in (0, 1)
+    )
+    both = sum(counted["both"].values())
     if not both.any():
-        return None
+        return []
     shown = int(np.flatnonzero(both.any(axis=0)).max()) + 1  # number of bins of speeds
+    little = "Where there is little or no data, the network has to interpolate."
+    mirrors = "With mirrored clips, left and right are alike."
+    of_turns = {"bargap": 0.08, "xaxis": axis("degrees per second (positive: to the left)")}
+    of_speeds = {"bargap": 0.08, "xaxis": axis("m/s", range=[0, speeds[shown - 1] + 0.3])}
     trace = {
-        **_heat_trace(_middles(SPEED_EDGES)[:shown], _middles(TURN_EDGES), both[:, :shown]),
+        **_heat_trace(speeds[:shown], turns, both[:, :shown]),
         "colorscale": [[0, "@sunken"], [0.15, "@muted"], [1, "@accent"]],
         # Not the maximum: with one very full cell, all others would look alike.
         "zmax": float(np.percentile(both[both > 0], 95)),
@@ -200,7 +160,27 @@ def speed_turn_chart(counted: Mapping[str, Any]) -> Chart | None:
     }
     layout = {"xaxis": axis("m/s"), "yaxis": axis("degrees per second", automargin=True)}
     caption = f"Seconds of data at each combination of speed and turn. {_empty_cells(estimate)}.{estimate}"
-    return Chart("speed-turn", "Speed and turn combined", caption, [trace], layout, 300)
+    return [
+        _seconds_chart(
+            "speeds",
+            "Speed over the ground",
+            f"Seconds at each speed. {little}{estimate}",
+            of_speed,
+            speeds,
+            "%{x:.1f} m/s",
+            **of_speeds,
+        ),
+        _seconds_chart(
+            "turns",
+            "Turning speed",
+            f"Seconds of data at each turning speed. {mirrors}{estimate}",
+            of_turn,
+            turns,
+            "%{x}°/s",
+            **of_turns,
+        ),
+        Chart("speed-turn", "Speed and turn combined", caption, [trace], layout, 300),
+    ]
 
 
 def channel_charts(counted: Mapping[str, Any], shown_name: Callable[[str], str] = str) -> list[Chart]:
@@ -272,7 +252,7 @@ def clip_table(material: ReportMaterial) -> Table:
         "sha256": Column("SHA-256", lambda v: str(v)[:12], "hash"),
     }
     labels = {report["clip"]: report for report in material.labels}
-    shown, records = choose_clips(material, MOST_ROWS), []
+    shown, records = some_clips((report["clip"] for report in material.motion), MOST_ROWS), []
     for report in material.motion:
         if report["clip"] not in shown:
             continue

@@ -53,10 +53,9 @@ def render_report(
     `character.opening_slider`. A section without data is left out. Without `hero`, the characters at the top
     begin in the network's start frame.
     """
-    terrain = data.files_of_clips(material.terrain_files, data.choose_clips(material))
+    terrain = data.some_files(material.terrain_files, data.MOST_SHOWN)
     # Seconds of data at each speed, turning speed and channel value.
-    row_files = data.sample_files(material.row_files)
-    counted = data.seconds_of_data(row_files, material.splits, all_clips=len(material.row_files))
+    counted = data.seconds_of_data(material.row_files, material.splits)
     sections = _sections(material, counted, terrain)
     measured_sections = join_sections(measured_by(material, "section"))
     scenes, playable, compared = dict(scenes or {}), playable or {}, captured_and_predicted or {}
@@ -88,7 +87,7 @@ def render_report(
         shown_channel=opening_channel(playable),
         measured_sections=measured_sections,
         figures=key_figures(material),
-        hints=hints(material, counted["turns"]),
+        hints=hints(material, counted["both"]),
         scene_names=[scene["name"] for scene in scenes.get("scenarios", ())],
         playable=for_scripts["playable"],
         captured_and_predicted=[clip["name"] for clip in compared.get("clips", ())],
@@ -113,7 +112,9 @@ def _sections(
 
     counted: from `seconds_of_data`. terrain: files of the terrain fits that are shown.
     """
-    seconds, sizes = own.stage_charts(material)
+    parallel = "The sum over all jobs of a stage. Jobs run in parallel, so the run itself takes less time."
+    stages = {material.name: material.pipeline.get("stages") or ()}
+    seconds, sizes = own.stage_charts(stages, "stage", parallel, {material.name: "@accent"})
     return {
         "training": {
             "curve": own.learning_curve(material),
@@ -123,9 +124,7 @@ def _sections(
         "stages": {"seconds": seconds, "bytes": sizes, "table": own.stage_table(material)},
         "data": {
             "gaits": data.gait_chart(material),
-            "speeds": data.speed_chart(material),
-            "turns": data.turn_chart(counted),
-            "both": data.speed_turn_chart(counted),
+            "speeds": data.speed_and_turn_charts(counted),
             "channels": data.channel_charts(counted, shown_names(material.network["skeleton"])),
             "clips": data.clip_table(material),
             "remarks": data.remarks_table(material),
@@ -188,16 +187,16 @@ def _network_figure(network: Mapping[str, Any]) -> KeyFigure:
     return KeyFigure("Network", format_number(network["parameters"] / 1e6, 3), "M", note, order=40)
 
 
-def hints(material: ReportMaterial, turns: Mapping[str, Array] | None = None) -> list[Hint]:
+def hints(material: ReportMaterial, both: Mapping[str, Array] | None = None) -> list[Hint]:
     """Warnings and advice in the order in which to follow them, then what is good, then plain facts.
 
-    turns: split -> seconds in each bin of `data_section.TURN_EDGES`, if they were counted.
+    both: of `data_section.seconds_of_data`, if the seconds were counted.
     """
     # The first argument of `with_order` is the place among hints of the same kind, see `parts.Hint`.
     found = [
         *(hint for shown in measured_by(material, "hints") for hint in shown),
         *with_order(10, _gait_hints(material)),  # before training, which cannot make up for missing data
-        *with_order(10, _turning_hints(turns or {})),
+        *with_order(10, _turning_hints(both or {})),
         *with_order(11, _repair_hints(material)),
         *with_order(20, _training_hints(material)),
         *with_order(90, _cost_hints(material)),
@@ -261,9 +260,9 @@ def _gait_hints(material: ReportMaterial) -> Iterator[Hint]:
         )
 
 
-def _turning_hints(turns: Mapping[str, Array]) -> Iterator[Hint]:
-    """A warning if hardly anybody turns. turns: split -> seconds in each bin of TURN_EDGES."""
-    seconds = np.sum(list(turns.values()), axis=0)
+def _turning_hints(both: Mapping[str, Array]) -> Iterator[Hint]:
+    """A warning if hardly anybody turns. both: of `data_section.seconds_of_data`."""
+    seconds = np.sum([of_split.sum(axis=1) for of_split in both.values()], axis=0)
     if not np.any(seconds):
         return
     middles = (data.TURN_EDGES[:-1] + data.TURN_EDGES[1:]) / 2  # of the bins, degrees a second

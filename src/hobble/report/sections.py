@@ -14,12 +14,14 @@ from hobble.report.parts import (
     Column,
     Table,
     axis,
+    dot_trace,
     format_bytes,
     format_duration,
     format_number,
     line_trace,
     log_axis,
     log_range,
+    ordered_axis,
 )
 
 # The network's output consists of blocks. The names of these blocks do not say that they belong to the path,
@@ -148,43 +150,41 @@ def fit_table(paths: Iterable[str | Path]) -> Table | None:
     return Table("terrain", columns, rows, "Distance of the feet from the fitted ground") if rows else None
 
 
-def stage_charts(material: ReportMaterial) -> list[Chart]:
-    """Two charts: the seconds and the bytes of each stage."""
+def stage_charts(
+    stages: Mapping[str, Sequence[Mapping[str, Any]]], prefix: str, caption: str, colours: Mapping[str, str]
+) -> list[Chart]:
+    """Two charts: the seconds and the bytes of each stage.
+
+    stages: configuration -> its stages, from pipeline.json. prefix: of the charts' names. caption: a sentence
+    on the times. colours: configuration -> colour.
+    """
     # Plotly draws the first category at the bottom, so the order is reversed.
-    stages = list(material.pipeline.get("stages") or ())[::-1]
-    names = [stage["stage"] for stage in stages]
+    names = list(dict.fromkeys(stage["stage"] for each in stages.values() for stage in each))[::-1]
     charts = []
-    for key, title, label, as_text, caption in (
-        ("seconds", "Time of each stage", "seconds, sum over all jobs", format_duration,
-         "The sum over all jobs of a stage. Jobs run in parallel, so the run itself takes less time. The "
-         "scale is logarithmic."),
-        ("bytes", "Size of each stage", "bytes", format_bytes,
-         "The files that each stage writes. The scale is logarithmic."),
-    ):  # fmt: skip
-        values = [stage.get(key) or 0 for stage in stages]
-        trace = {
-            "type": "scatter",
-            "mode": "markers+text",
-            "y": names,
-            "x": [value or None for value in values],
-            "text": [f"  {as_text(value)}" for value in values],
-            "textposition": "middle right",
-            "textfont": {"size": 11.5, "color": "@soft"},
-            "marker": {"color": "@accent", "size": 10},
-            "hovertemplate": "%{y}: %{text}<extra></extra>",
-            "cliponaxis": False,
+    for key, title, label, as_text, words in (
+        ("seconds", "Time of each stage", "seconds, sum over all jobs", format_duration, f"{caption} "),
+        ("bytes", "Size of each stage", "bytes on disk", format_bytes, "The files that each stage writes. "),
+    ):
+        traces, values = [], []
+        for name, each in stages.items():
+            rows = [stage for stage in each if stage.get(key)]
+            x, y = [stage[key] for stage in rows], [stage["stage"] for stage in rows]
+            values += x
+            trace = dot_trace(name, x, y, colours[name], "%{y}: %{text}") | {"cliponaxis": False}
+            trace["text"] = [f"  {as_text(value)}" for value in x]
+            if len(stages) == 1:
+                trace |= {"mode": "markers+text", "textposition": "middle right"}
+                trace["textfont"] = {"size": 11.5, "color": "@soft"}
+            traces.append(trace)
+        layout = {
+            "xaxis": axis(label, type="log", tickformat="~s", dtick=1, range=log_range(values)),
+            "yaxis": ordered_axis(names),
+            "showlegend": len(stages) > 1,
         }
-        layout = {**stage_axes(label, values, names), "showlegend": False}
-        charts.append(Chart(f"stage-{key}", title, caption, [trace], layout, 80 + 30 * len(names)))
+        height = (80 if len(stages) == 1 else 110) + 31 * len(names)
+        text = f"{words}The scale is logarithmic."
+        charts.append(Chart(f"{prefix}-{key}", title, text, traces, layout, height))
     return charts
-
-
-def stage_axes(label: str, values: Iterable[float], names: Sequence[str]) -> dict[str, Any]:
-    """The axes of a chart of stages. label: of the x axis. names: of the stages, from bottom to top."""
-    return {
-        "xaxis": axis(label, type="log", tickformat="~s", dtick=1, range=log_range(values)),
-        "yaxis": {"automargin": True, "categoryorder": "array", "categoryarray": names},
-    }
 
 
 def stage_table(material: ReportMaterial) -> Table:
