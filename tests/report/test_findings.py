@@ -6,7 +6,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from hobble.measures.responsivity import track_figures
 from hobble.report.data_section import TURN_EDGES
 from hobble.report.gather import ReportMaterial
 from hobble.report.page import hints, key_figures
@@ -108,25 +107,6 @@ def test_the_time_of_a_frame_is_a_median(material: ReportMaterial) -> None:
     assert (
         next(kind for head, kind in heads(slow).items() if head.startswith("A frame takes 0.1 %")) == "good"
     )
-
-
-def test_a_limited_turn_is_reported(material: ReportMaterial) -> None:
-    lap = material.measurements["responsivity"]
-    limited = {**lap, "largest_turn_degrees": 25.0, "predicted_turn_degrees": 170.0, "turns_held_back": 3}
-    assert heads(material, responsivity=limited)[
-        "The network predicted a turn of a joint by 170 degrees in one frame."
-    ]
-    figure = next(f for f in track_figures(limited) if f.label == "Largest predicted turn")
-    assert figure.value == "170"
-    assert "limited it to 25° in 3 of" in figure.note
-    assert "after the feet were put on the ground, the largest turn was 25.0°" in figure.note
-
-
-def test_key_figures_show_the_published_values(material: ReportMaterial) -> None:
-    figures = {f.label: f for f in key_figures(changed(material, name="holden"))}
-    assert "published for HOLDEN: 4.39 %" in figures["Error on held-out clips"].note
-    assert "published mean 0.376 ms" in figures["Time per frame"].note
-    assert figures["Network"].note.startswith("parameters at each control point; layers of 372–16–16–311")
 
 
 def test_key_figures_without_results(material: ReportMaterial) -> None:

@@ -2,43 +2,10 @@
 
 from __future__ import annotations
 
-import pytest
-
 from hobble.measures import injury as injury_page
 from hobble.measures import responsivity as lap_charts
-from hobble.measures import responsivity as responsivity_page
 from hobble.report.gather import ReportMaterial
-from hobble.report.parts import ChartGroup, ChartPair, KeyFigure
-
-
-def test_the_steps_of_a_frame_are_in_their_order(material: ReportMaterial) -> None:
-    chart = lap_charts.lap_chart(material.results_of("responsivity"), material)
-    assert chart is not None
-    traces = next(iter(chart.options.values()))
-    assert [t["name"] for t in traces] == [
-        "prepare",
-        "input",
-        "insert",
-        "predict",
-        "output",
-        "update",
-        "median",
-    ]
-    times = material.measurements["responsivity"]["laps"][0]["milliseconds"]
-    assert sum(trace["y"][0] for trace in traces[:-1]) == pytest.approx(times["total"])
-    assert traces[-1]["y"][0] == times["spread"]["median"]
-
-
-def test_feet_with_little_contact_have_no_slide(material: ReportMaterial) -> None:
-    def slide(steps: int) -> KeyFigure:
-        laps = [{**lap, "steps": steps} for lap in material.measurements["responsivity"]["laps"][:2]]
-        found = {**material.measurements["responsivity"], "laps": laps, "foot_slide_cm": 0.0}
-        figures = responsivity_page.track_figures(found)
-        return next(figure for figure in figures if figure.label == "Foot slide")
-
-    assert (slide(4).value, slide(4).unit) == ("–", "")
-    assert "8 steps" in slide(4).note
-    assert (slide(5).value, slide(5).unit) == ("0", "cm")
+from hobble.report.parts import ChartGroup, ChartPair
 
 
 def test_links_never_hurt_in_training_are_told_from_the_others(material: ReportMaterial) -> None:

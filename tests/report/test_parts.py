@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from hobble.measures.measure import all_measures
 from hobble.report.parts import (
@@ -17,7 +21,9 @@ from hobble.report.parts import (
     Paragraph,
     SectionPart,
     Table,
+    embedded,
     join_sections,
+    json_data,
 )
 from hobble.report.templates import drawn_by_script, load_template, measured_by
 
@@ -84,3 +90,12 @@ def test_words_are_escaped_and_every_kind_is_drawn() -> None:
     assert "<h2>&lt;S&gt;</h2>" in text
     assert text.count("<figure") == 2
     assert 'class="plot tall" tabindex="0" data-chart="b"' in text
+
+
+@settings(max_examples=80, deadline=None)
+@given(st.dictionaries(st.text(), st.text() | st.floats(allow_nan=False, allow_infinity=False), max_size=4))
+def test_embedded_json_comes_back_and_cannot_end_its_element(value: dict) -> None:
+    text = str(embedded(value))
+    assert json.loads(text) == value
+    assert not set("<>&") & set(text)
+    assert json_data({"a": np.array([1.0, np.nan]), "b": np.float32("inf")}) == {"a": [1.0, None], "b": None}

@@ -38,23 +38,6 @@ def made(
         )
 
 
-@pytest.mark.slow
-def test_films_drawn_at_once_are_those_drawn_one_by_one(
-    made: tuple[Path, dict[str, Any]],
-    network: Network,
-    examples: ModuleType,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    for name, seconds in (("WARM_UP_SECONDS", 0.1), ("HEALTHY_SECONDS", 0.1), ("HURT_SECONDS", 0.3)):
-        monkeypatch.setattr(films, name, seconds)
-    again = write_questionnaire(
-        network, tmp_path, examples.RUNTIME, "example", SHORT, "sided", size=48, threads=3
-    )
-    assert again == made[1]
-    assert (tmp_path / "questionnaire.html").read_text() == (made[0] / "questionnaire.html").read_text()
-
-
 @pytest.fixture
 def tab(
     made: tuple[Path, dict[str, Any]], tools: ModuleType, tmp_path_factory: pytest.TempPathFactory

@@ -39,49 +39,17 @@ def test_turns_speeds_and_severities_are_counted_in_seconds(
     save_clip_rows(tmp_path / "walk.npz", replace(rows, y=y, channels={"injury": severity}))
     found = data_section.seconds_of_data([tmp_path / "walk.npz"], {rows.clip: "held_out"})
     seconds, hurt = len(np.unique(rows.frame)) / 60, len(np.unique(rows.frame[: len(rows) // 2])) / 60
-    turns = dict(zip(data_section._middles(data_section.TURN_EDGES), found["turns"]["held_out"], strict=True))
-    assert turns[30.0] == pytest.approx(seconds)
-    assert sum(turns.values()) == pytest.approx(seconds)
-    assert not found["turns"]["train"].any()
-    row, column = np.argwhere(found["both"] > 0)[0]
-    assert (
-        data_section._middles(data_section.TURN_EDGES)[row],
-        data_section._middles(data_section.SPEED_EDGES)[column],
-    ) == (
-        30.0,
-        1.3,
-    )
+    of_split = found["both"]["held_out"]
+    row, column = np.argwhere(of_split > 0)[0]
+    assert of_split[row, column] == of_split.sum() == pytest.approx(seconds)
+    middles = data_section._middles(data_section.TURN_EDGES), data_section._middles(data_section.SPEED_EDGES)
+    assert (middles[0][row], middles[1][column]) == (30.0, 1.3)
+    assert not found["both"]["train"].any()
     assert list(found["channels"]["injury"]) == ["LeftUpLeg-LeftLeg"]
     assert found["channels"]["injury"]["LeftUpLeg-LeftLeg"][6] == pytest.approx(hurt, abs=1 / 60 + 1e-9)
     (chart,) = data_section.channel_charts(found)
     assert chart is not None
     assert chart.traces[0]["z"][0][6] == pytest.approx(hurt, abs=0.02)
-
-
-def test_stages_are_listed_with_published_values_of_the_same_configuration(material: ReportMaterial) -> None:
-    """A published time or size is shown only for its own configuration."""
-    nothing, patches = [None, None], [1680, 606.0e6]
-    known = {
-        "holden": {
-            "motion": [None, 848.0e6],
-            "labels": [None, 63.94e6],
-            "terrain": patches,
-            "database": [5400, 7.12e9],
-            "training": [43 * 3600, 122.0e6],
-        },
-        "holden-xl": {"training": [47 * 3600, 176.0e6]},
-        "holden-xt": {"training": [91 * 3600, 122.0e6]},
-        "ava": {"motion": [None, 7.62e9], "database": [55 * 60, 10.4e9], "training": [31 * 3600, 374.0e6]},
-        "example": {},
-    }
-    for name, theirs in known.items():
-        table = sections.stage_table(replace(material, name=name))
-        if not theirs:
-            assert [c.label for c in table.columns if "published" in c.label] == []
-            continue
-        assert {row[0]: row[-2:] for row in table.rows} == {
-            stage["stage"]: theirs.get(stage["stage"], nothing) for stage in material.pipeline["stages"]
-        }
 
 
 def test_fits_of_uneven_ground_are_listed_with_the_farthest_feet_first(tmp_path: Path) -> None:
