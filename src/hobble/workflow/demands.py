@@ -26,7 +26,7 @@ from hobble.workflow.project import Project
 
 # Memory of Snakemake itself, which runs twice in a cluster job (for SLURM's step and for the script), and of
 # Python with numpy, scipy and the package.
-BASE_MB = 400 + 400
+ENGINE_MB, PYTHON_MB = 400, 400
 MEMORY_MARGIN = 1.5  # requested memory / measured memory
 TIME_MARGIN = 10  # requested time / measured time, for an old and busy machine
 MEASURED_JOINTS = 31  # joints of the skeleton with which the rates were measured
@@ -70,7 +70,8 @@ def request(megabytes: float, seconds: float, attempt: int, least: int) -> Reque
     """
     minutes = max(least, math.ceil(TIME_MARGIN * seconds / 60)) * attempt
     return Request(
-        math.ceil((BASE_MB + MEMORY_MARGIN * megabytes) * attempt), min(math.ceil(minutes), WEEK_MINUTES)
+        math.ceil((ENGINE_MB + PYTHON_MB + MEMORY_MARGIN * megabytes) * attempt),
+        min(math.ceil(minutes), WEEK_MINUTES),
     )
 
 
