@@ -30,12 +30,6 @@ def test_a_cycle_starts_at_half_the_frame_number_of_a_120_hz_file(number):
     assert whole_frame(SourceTime(20_000, 120.0).to_clip_frame(number)) == number // 2
 
 
-@pytest.mark.parametrize(("fps", "number", "frame"), [(60, 31, 30), (30, 16, 30), (24, 13, 30), (50, 26, 30)])
-def test_frames_of_files_at_other_rates_keep_their_time(fps, number, frame):
-    assert SourceTime(500, fps).to_clip_frame(number) == pytest.approx(frame)
-    assert SourceTime(500, fps, first=number - 1).to_clip_frame(number) == 0
-
-
 @pytest.mark.parametrize("fps", [23.976, 1 / 0.00833, 1 / 0.01667])
 def test_a_frame_rate_that_is_not_whole_is_not_rounded(fps):
     """Labels and frames are at the same moments even after ten minutes."""
@@ -83,16 +77,6 @@ def test_gait_shares_are_constant_between_equal_keys_and_fade_between_others(wri
     assert shares.sum(axis=1) == pytest.approx(1)
 
 
-def test_a_single_gait_key_holds_in_all_frames(write):
-    assert (read_gait_keys(write("a_gait.txt", "1 unknown"), AT_120, 7)[:, 5] == 1).all()
-
-
-def test_the_first_and_last_gait_keys_hold_to_the_ends_of_the_clip(write):
-    shares = read_gait_keys(write("a_gait.txt", "50 walk\n100 jog\n"), AT_120, 120)
-    assert (shares[:24, 1] == 1).all()
-    assert (shares[50:, 2] == 1).all()
-
-
 @pytest.mark.parametrize(
     ("text", "line", "word"),
     [
@@ -108,12 +92,6 @@ def test_wrong_gait_keys_are_refused_with_their_line(write, text, line, word):
     with pytest.raises(InputError, match=word) as caught:
         read_gait_keys(write("a_gait.txt", text), AT_120, 120)
     assert caught.value.line == line
-
-
-def test_every_second_row_of_a_phase_file_is_exact(write):
-    rows = np.round(np.linspace(0, 5, 240) % 1.0, 5)
-    path = write("a.phase", "\n".join(f"{r:.5f}" for r in rows))
-    assert (read_phase(path, AT_120, 120) == rows[::2]).all()
 
 
 def test_a_clip_cut_at_the_start_uses_the_matching_part_of_its_files(write):

@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hobble.labels.footfall import SETTLING_CM, find_landings, find_swings, foot_speeds
+from hobble.labels.footfall import SETTLING_CM, find_landings, find_swings
 from hobble.labels.options import LabelOptions
-from hobble.labels.phase import find_cycles, phase_of_footsteps, rows_of_landings
+from hobble.labels.phase import find_cycles, rows_of_landings
 
 
 def found(clip):
@@ -29,25 +29,6 @@ def test_every_landing_is_found_once(walker, limp, half, swing, stride):
     late = np.array([when - true for (when, _), (true, _) in zip(events, truth, strict=True)])
     assert np.abs(late - late.mean()).max() <= 1.0
     assert -0.15 * swing < late.mean() < SETTLING_CM / 1.5
-
-
-def test_phase_of_a_made_limp_is_within_three_hundredths(walker):
-    clip = walker(limp=0.35)
-    rights = np.arange(40, 590, 60.0)
-    truth = np.column_stack([rights, rights + 21, np.zeros(len(rights))])
-    phase, known = phase_of_footsteps(rows_of_landings(found(clip)[1]), len(clip))
-    true, known_true = phase_of_footsteps(truth, len(clip))
-    both = known & known_true
-    assert both.sum() > 500
-    assert np.abs((phase - true + 0.5) % 1 - 0.5)[both].mean() < 0.03
-
-
-def test_a_standing_figure_has_no_landings(walker):
-    clip = walker(start=1000)
-    swings, events = found(clip)
-    assert swings == []
-    assert events == []
-    assert not foot_speeds(clip).any()
 
 
 @pytest.mark.parametrize(("pause", "bouts"), [(30, 1), (90, 2)])

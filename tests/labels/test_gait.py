@@ -17,17 +17,6 @@ def automatic(clip, dominant=None):
     return g.automatic_gait(clip, find_stance_contacts(clip, LabelOptions()), dominant)
 
 
-def clearly(gait):
-    """Log odds that clearly mean walking."""
-    return np.full(len(gait), -9.0)
-
-
-def test_gait_shares_add_up_to_one(walker):
-    shares = automatic(walker(frames=400, start=150))
-    assert shares.sum(axis=1) == pytest.approx(1)
-    assert ((shares >= 0) & (shares <= 1)).all()
-
-
 def test_a_walk_after_standing_is_labelled_as_both(walker):
     shares = automatic(walker(frames=500, start=200))
     assert (shares[:150].argmax(axis=1) == g.STAND).all()
@@ -78,34 +67,6 @@ def test_only_the_data_set_marks_jumps(walker, dominant):
     assert (shares[:150].argmax(axis=1) == g.STAND).all()
     assert (shares[230:].argmax(axis=1) == GAITS.index(dominant)).all()
     assert shares.sum(axis=1) == pytest.approx(1)
-
-
-def test_the_likeliest_path_changes_gait_only_if_that_is_worth_the_cost():
-    evidence = np.tile([0.0, -1.0], (60, 1))
-    evidence[20:28, 1], evidence[40:, 1] = 1.0, 1.0
-    assert g._likeliest_path(evidence, 9.0).tolist() == [0] * 40 + [1] * 20
-    assert g._likeliest_path(evidence, 3.0).tolist() == [0] * 20 + [1] * 8 + [0] * 12 + [1] * 20
-    assert g._likeliest_path(evidence, 99.0).tolist() == [0] * 60
-    assert len(g._likeliest_path(np.zeros((0, 4)), 1.0)) == 0
-
-
-def test_a_short_walk_before_a_jog_counts_as_jog():
-    gait = np.array([g.STAND] * 20 + [g.WALK] * 40 + [g.JOG] * 20 + [g.WALK] * 30 + [g.CROUCH] * 5)
-    out = g._without_short_walks(gait, clearly(gait))
-    assert out.tolist() == [g.STAND] * 40 + [g.JOG] * 40 + [g.WALK] * 30 + [g.CROUCH] * 5
-    longer = np.array([g.STAND] * 5 + [g.WALK] * (g.LONGEST_SHORT_WALK + 1) + [g.JOG] * 5)
-    assert (g._without_short_walks(longer, clearly(longer)) == longer).all()
-
-
-def test_a_doubtful_start_belongs_to_the_jog():
-    gait = np.array([g.STAND] * 20 + [g.WALK] * 100 + [g.JOG] * 20 + [g.WALK] * 100 + [g.STAND] * 5)
-    doubtful = np.full(len(gait), -1.0)
-    assert (
-        g._without_short_walks(gait, doubtful).tolist()
-        == [g.STAND] * 20 + [g.JOG] * 120 + gait[140:].tolist()
-    )
-    much_longer = np.array([g.STAND] * 5 + [g.WALK] * (g.LONGEST_START + 1) + [g.JOG] * 5)
-    assert (g._without_short_walks(much_longer, np.full(len(much_longer), -1.0)) == much_longer).all()
 
 
 @pytest.mark.parametrize(

@@ -9,11 +9,8 @@ import numpy as np
 import pytest
 
 from hobble.core.declared import load_report
-from hobble.core.errors import InputError
-from hobble.labels import clip_labels
 from hobble.labels.clip_labels import LabelReport, load_labels, save_labels
 from hobble.labels.label import label_clip, mirror_labels, write_report
-from hobble.rows.layout import CONTACTS, GAITS
 
 MOTION = {"source_frames": 1200, "source_fps": 120.0, "source_start": 0}
 FOOTSTEPS = "141 201\n261 321\n381 441 *\n501 561\n621 681\n741"
@@ -21,11 +18,6 @@ FOOTSTEPS = "141 201\n261 321\n381 441 *\n501 561\n621 681\n741"
 
 def apart(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return np.abs((a - b + 0.5) % 1.0 - 0.5)
-
-
-def test_gaits_and_contacts_have_the_same_order_as_in_rows():
-    assert clip_labels.GAITS == GAITS
-    assert clip_labels.CONTACT_ROLES == CONTACTS
 
 
 def test_hand_made_files_replace_labels_found_from_motion(walker, options, write):
@@ -112,40 +104,9 @@ def test_a_mirrored_clip_has_the_labels_that_mirrored_files_would_give(walker, o
     assert other.clip == "walker_mirror"
 
 
-@pytest.mark.parametrize("zero", ["right", "left"])
-def test_mirroring_twice_gives_the_labels_back(walker, options, zero):
-    clip = walker(limp=0.4)
-    labels, report = label_clip(
-        clip, [], MOTION, "walk", "flat", options.model_copy(update={"phase_zero": zero})
-    )
-    mirrored, other = mirror_labels(labels, report, clip)
-    assert mirrored.cycles.tolist() != labels.cycles.tolist()
-    back, again = mirror_labels(mirrored, other, clip)
-    assert again == report
-    assert apart(back.phase, labels.phase).max() < 1e-12
-    for name in ("contacts", "phase_known", "gait", "footsteps", "cycles"):
-        np.testing.assert_equal(getattr(back, name), getattr(labels, name))
-
-
-def test_joints_that_do_not_move_are_in_contact(walker, options):
-    clip = walker(start=100, swing=24)
-    labels, _ = label_clip(clip, [], MOTION, "walk", "flat", options)
-    assert labels.contacts.dtype == bool
-    assert labels.contacts[:75].all()
-    assert not labels.contacts[80:95, 2:].any()
-    assert labels.contacts[80:95, :2].all()
-    step = np.sum(np.diff(clip.positions[:, clip.skeleton.role("right_toe")], axis=0) ** 2, axis=1)
-    assert (labels.contacts[:-1, 3] == (step < 0.02)).all()
-
-
 def test_a_clip_without_a_whole_cycle_gets_a_warning(walker, options):
     _, report = label_clip(walker(frames=120), [], MOTION, "walk", "flat", options)
     assert "no whole gait cycle" in report.warnings[0]
-
-
-def test_a_wrong_file_is_named_with_its_line(walker, options, write):
-    with pytest.raises(InputError, match=r"w_gait.txt, line 2: no such gait"):
-        label_clip(walker(), [write("w_gait.txt", "1 walk\n9 fly\n")], MOTION, None, "flat", options)
 
 
 def test_labels_survive_their_file_and_the_picture_is_drawn(walker, options, tmp_path):

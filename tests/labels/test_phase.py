@@ -43,16 +43,6 @@ def test_an_unknown_phase_advances_slowly():
     assert not known.any()
 
 
-def test_during_a_pause_the_phase_advances_to_the_next_landing():
-    steps = np.array([[10.0, 40, 0], [np.nan, np.nan, 1], [np.nan, 400.0, 0], [430.0, np.nan, 0]])
-    phase, known = phase_of_footsteps(steps, 500)
-    assert phase[[40, 400]] == pytest.approx(0.5)
-    assert known[[10, 39, 40, 400, 430]].all()
-    assert not known[41:400].any()
-    assert ((np.diff(phase) % 1.0) < 0.05).all()
-    assert ((np.diff(phase[45:395]) % 1.0) < 3 * IDLE_RATE).all()
-
-
 def test_cycles_run_from_line_to_line_and_share_their_boundary_frames():
     cycles, dropped = find_cycles(STEPS, 300, "right", "drop")
     assert cycles.tolist() == [[70, 120], [120, 175], [175, 230]]
@@ -61,24 +51,17 @@ def test_cycles_run_from_line_to_line_and_share_their_boundary_frames():
     assert cycles.tolist() == [[95, 150], [150, 200]]
 
 
-@pytest.mark.parametrize(("first", "kept"), [(59.0, 2), (59.5, 3), (60.0, 3)])
-def test_a_cycle_that_starts_before_frame_60_is_left_out(first, kept):
-    steps = STEPS.copy()
+MARGINS = [("extend", 1, 164, 3), ("extend", 0.5, 164, 3), ("extend", 0, 164, 2), ("extend", 1, 163, 2)]
+MARGINS += [("drop", 70, 291, 2), ("drop", 70, 292, 3), ("drop", 59.5, 300, 3), ("drop", 59, 300, 2)]
+
+
+@pytest.mark.parametrize(("margins", "first", "frames", "kept"), MARGINS)
+def test_a_cycle_near_an_end_of_the_clip_is_left_out(margins, first, frames, kept):
+    """With `extend` it needs one frame before and two after it, with `drop` 60 and 61."""
+    steps = STEPS - [0, 0, 0] if margins == "drop" else STEPS - [69, 69, 0]
     steps[0, 0] = first
-    assert len(find_cycles(steps, 300, "right", "drop")[0]) == kept
-
-
-@pytest.mark.parametrize(("frames", "kept"), [(291, 2), (292, 3), (293, 3)])
-def test_a_cycle_that_ends_within_61_frames_of_the_end_is_left_out(frames, kept):
-    cycles, dropped = find_cycles(STEPS, frames, "right", "drop")
+    cycles, dropped = find_cycles(steps, frames, "right", margins)
     assert (len(cycles), dropped) == (kept, 3 - kept)
-
-
-@pytest.mark.parametrize(("first", "frames", "kept"), [(1, 164, 3), (0.5, 164, 3), (0, 164, 2), (1, 163, 2)])
-def test_with_extended_margins_a_cycle_needs_a_frame_before_it_and_two_after(first, frames, kept):
-    steps = STEPS - [69, 69, 0]
-    steps[0, 0] = first
-    assert len(find_cycles(steps, frames, "right", "extend")[0]) == kept
 
 
 @pytest.mark.parametrize(("line", "kept"), [(0, [1, 2]), (1, [2]), (2, [0]), (3, [0, 1])])

@@ -33,15 +33,6 @@ def test_written_label_files_read_back_unchanged(walker, tmp_path, fps, start):
     assert apart.max() < 0.04
 
 
-def test_a_pause_ends_a_bout(walker):
-    clip = walker(frames=700, start=150)
-    motion = {"source_frames": 700, "source_fps": 60.0, "source_start": 0}
-    labels, _ = label_clip(clip, [], motion, None, "rocky", LabelOptions())
-    rows = np.insert(labels.footsteps, 4, [np.nan, np.nan, 1.0], axis=0)
-    lines = footsteps_text(replace(labels, footsteps=rows), SourceTime(700, 60.0)).splitlines()
-    assert [number for number, line in enumerate(lines) if line.endswith("*")] == [3]
-
-
 def test_a_bout_that_ends_with_the_right_foot_is_not_joined_to_the_next(walker):
     clip = walker(frames=700, start=150)
     time = SourceTime(700, 60.0)

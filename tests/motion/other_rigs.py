@@ -13,8 +13,7 @@ import numpy as np
 
 from hobble.core import quat
 from hobble.core.clip import Clip
-from hobble.core.skeleton import Skeleton
-from tests.motion.scramble import SYLLABLES, Rig, Scramble, X, as_clip, from_world
+from tests.motion.scramble import SYLLABLES, Rig, Scramble, as_clip, from_world
 
 LEG, ARM = ("UpLeg", "Leg", "Foot", "ToeBase"), ("Shoulder", "Arm", "ForeArm", "Hand")
 SIDES = {"L": "Left", "R": "Right"}
@@ -70,35 +69,6 @@ MECHANISM = "".join(
     f"\nmch_thigh_{s}|hips|{side}UpLeg\nmch_shin_{s}|mch_thigh_{s}|{side}Leg\nmch_foot_{s}|mch_shin_{s}|{side}Foot"
     f"\nheel_{s}|foot_{s}|{side}Foot+0,-6,-5\nheel_end_{s}|heel_{s}|{side}Foot+{6 * x},-6,-14"
     for s, side, x in (("l", "Left", 1), ("r", "Right", -1))
-)
-# As avatars of Second Life have them, and a rig nearly three times as wide as high.
-HIND = "\nhind|hips|Hips+0,0,-6" + "".join(
-    f"\nhind1_{s}|hind|Hips+{10 * x},0,-10\nhind2_{s}|hind1_{s}|Hips+{12 * x},-40,-8"
-    f"\nhind3_{s}|hind2_{s}|Hips+{12 * x},-80,-8\nhind4_{s}|hind3_{s}|Hips+{12 * x},-86,2"
-    f"\nwing_{s}|chest|Spine1+{10 * x},10,-10\nwing2_{s}|wing_{s}|Spine1+{16 * x},15,-14"
-    f"\nwing3_{s}|wing2_{s}|Spine1+{230 * x},15,-14"
-    for s, x in (("l", 1), ("r", -1))
-)
-ROLLS = "hips|-|Hips\nspine|hips|LowerBack\nspine1|spine|Spine\nspine2|spine1|Spine1\n" + "\n".join(
-    ["neck|spine2|Neck", "neck1|neck|Neck1", "head|neck1|Head"]
-    + [
-        f"{s}{name}|{'' if top in ('hips', 'spine2') else s}{top}|{s}{joint}{move.format(x)}"
-        for s, x in (("Left", 1), ("Right", -1))
-        for name, top, joint, move in (
-            ("Shoulder", "spine2", "Shoulder", ""),
-            ("Arm", "Shoulder", "Arm", ""),
-            ("ArmRoll", "Arm", "Arm", "+{}3,0,0"),
-            ("ForeArm", "ArmRoll", "ForeArm", ""),
-            ("ForeArmRoll", "ForeArm", "ForeArm", "+{}0,0,0"),
-            ("Hand", "ForeArmRoll", "Hand", ""),
-            ("UpLeg", "hips", "UpLeg", ""),
-            ("UpLegRoll", "UpLeg", "UpLeg", "+0,-18,0"),
-            ("Leg", "UpLegRoll", "Leg", ""),
-            ("LegRoll", "Leg", "Leg", "+0,-18,0"),
-            ("Foot", "LegRoll", "Foot", ""),
-            ("ToeBase", "Foot", "ToeBase", ""),
-        )
-    ]
 )
 
 # As the Master Motor Map of KIT has it: several joints in one place, one for each axis.
@@ -162,44 +132,3 @@ def rezeroed(clip: Clip, joints: tuple[str, ...], turn: np.ndarray) -> Clip:
         if name.startswith(joints):
             turned[:, j] = quat.mul(turned[:, j], turn)
     return from_world(clip.skeleton, clip.fps, places, turned)
-
-
-def dog() -> Clip:
-    """A dog that trots, four seconds."""
-    time = np.arange(240) / 60
-    joints = [("root", -1, (0, 0, 0)), ("spine1", 0, (0, 5, 25)), ("spine2", 1, (0, 0, 25))]
-    joints += [("neck", 2, (0, 12, 12)), ("head", 3, (0, 10, 10))]
-    bones = {
-        "hind": (0, ((0, -3, 0), (0, -25, 3), (0, -22, -8), (0, -10, 6))),
-        "front": (2, ((0, -5, 5), (0, -22, -4), (0, -24, 2), (0, -8, 5))),
-    }
-    swing = {}
-    for limb, (hub, places) in bones.items():
-        for side, x in (("L", 8), ("R", -8)):
-            first = len(joints)
-            swing[first] = 0.0 if (limb == "hind") == (side == "L") else np.pi
-            for k, (_, y, z) in enumerate(places):
-                parent = hub if k == 0 else len(joints) - 1
-                joints.append((f"{limb}{k}_{side}", parent, (x if k == 0 else 0, y, z)))
-    names, parents, offsets = zip(*joints, strict=True)
-    skeleton = Skeleton("dog", names, parents, np.array(offsets, float))
-    rotations = np.broadcast_to(quat.IDENTITY, (240, len(names), 4)).copy()
-    for first, phase in swing.items():
-        for k, angle in enumerate((0.4 * np.sin(6 * time + phase), 0.3 * np.cos(6 * time + phase) + 0.2)):
-            rotations[:, first + k] = quat.from_axis_angle(X, angle)
-    return Clip("dog", skeleton, 60.0, rotations, np.stack([0 * time, 0 * time + 58, 120 * time], axis=1))
-
-
-def crawling(clip: Clip) -> Clip:
-    """A figure of the 31 joints that crawls on hands and knees."""
-    index, time = clip.skeleton.index, np.arange(len(clip)) / clip.fps
-    rotations = np.broadcast_to(quat.IDENTITY, clip.rotations.shape).copy()
-    rotations[:, 0] = quat.from_axis_angle(X, np.array(1.4))
-    for side, sign in (("Left", 1.0), ("Right", -1.0)):
-        swing = 0.35 * sign * np.sin(5 * time)
-        rotations[:, index(f"{side}UpLeg")] = quat.from_axis_angle(X, swing - 1.4)
-        rotations[:, index(f"{side}Leg")] = quat.from_axis_angle(X, 1.65 + 0.1 * sign * np.cos(5 * time))
-        rotations[:, index(f"{side}Arm")] = quat.yaw(np.full(len(time), -1.4 * sign))
-        rotations[:, index(f"{side}ForeArm")] = quat.yaw(-sign * (0.2 + 0.15 * np.sin(5 * time)))
-    root = np.stack([0 * time, 0 * time + 45, 40 * time], axis=1)
-    return replace(clip, rotations=rotations, root=root)

@@ -174,9 +174,3 @@ def test_control_characters_from_a_server_are_not_printed(tmp_path):
     assert str(refused.value).isprintable()
     assert "404 ?[2J?]0;owned? gonexxx" in str(refused.value)
     assert len(str(refused.value)) < 500
-
-
-def test_a_folder_that_cannot_be_written_is_named(server, tmp_path):
-    (tmp_path / "kept").write_text("a file where the folder should be")
-    with pytest.raises(InputError, match=r"kept/walk\.bvh"):
-        download_clip(server.url, tmp_path / "kept/walk.bvh", SHA256, "data/mine", attempts=1)

@@ -43,12 +43,6 @@ def test_a_mirrored_file_of_the_original_release_is_found(shared, make):
     ]
 
 
-def test_files_with_one_digest_are_the_same_file(walker, holden31):
-    clip = walker(holden31, 120, 60.0)
-    same = [clip_digest(replace(clip, name=name), "aa") for name in "yx"]
-    assert duplicate_pairs(same) == [("x", "y", "the same file")]
-
-
 def test_a_motion_in_both_splits_is_refused_with_both_names():
     pairs = [("a", "b", "the same file"), ("c", "d", "the same motion"), ("e", "f", "the same motion")]
     splits = {"a": "held_out", "b": "train", "c": "train", "d": "train", "e": "held_out", "f": "held_out"}
@@ -60,20 +54,3 @@ def test_a_motion_in_both_splits_is_refused_with_both_names():
     assert 'Add the second ones to held_out: ["b"]' in str(caught.value)
     assert "c and d" not in str(caught.value)
     refuse_split_pairs("data set mine", pairs, dict.fromkeys("abcdef", "train"))
-
-
-@pytest.mark.shared
-def test_no_two_patients_walks_are_equal_except_for_known_copies(root, shared):
-    from hobble.motion.make import make_clip
-    from hobble.motion.options import ClipMotion
-
-    skeletons = root / "config/skeletons"
-    found = []
-    for subject in ("A1", "A2", "A11", "A13"):
-        for cycle in (1, 2):
-            file = shared / f"mocap/patients/Subject{subject}_Cycle{cycle}.bvh"
-            made = make_clip(
-                file, skeletons / "holden31.yaml", skeletons, file.stem, "holden31", ClipMotion()
-            )
-            found.append(clip_digest(made[0], made[1]["sha256"]))
-    assert [pair for pair in duplicate_pairs(found) if pair[2] != "the same file"] == []

@@ -28,12 +28,6 @@ def test_a_normal_walk_has_steps_and_no_warning(root, folder):
     assert clip.warnings == ()
 
 
-def test_a_wrong_frame_rate_shows_in_the_cadence(root, folder, bvh, walker, holden31):
-    bvh(walker(holden31, 600, 120.0), "slow", edit=lambda s: s.replace("0.00833333", "0.04166667"))
-    slow = next(clip for clip in seen(root, folder).clips if clip.name == "slow")
-    assert any("steps a minute of" in warning and "impossible" in warning for warning in slow.warnings)
-
-
 def test_duplicates_and_files_without_a_clip_are_reported(root, folder):
     (folder / "again.bvh").write_bytes((folder / "healthy.bvh").read_bytes())
     (folder / "helthy_injuries.txt").write_text("frames:600\n")

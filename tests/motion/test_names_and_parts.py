@@ -45,11 +45,6 @@ def word(joint: str) -> str:
     return "".join("kmnptvz"[seed // 7**k % 7] + "aeiou"[seed // 5**k % 5] for k in range(4))
 
 
-def asf(joint: str) -> str:
-    """`lUpLeg` in small letters, as in the Acclaim format."""
-    return joint.replace("Left", "L").replace("Right", "R").lower()
-
-
 def wrists(clip, side):
     return clip.positions[:, clip.skeleton.role(f"{side}_wrist")]
 
@@ -66,14 +61,6 @@ def test_a_rig_whose_names_tell_no_sides_is_refused_until_handedness_is_set(orig
         here = wrists(right, side)
         assert np.linalg.norm(here - wrists(known, side)[: len(here)], axis=-1).mean() < 2
         assert np.linalg.norm(wrists(left, other) * FLIP - here, axis=-1).mean() < 2
-
-
-@pytest.mark.shared
-def test_lower_case_side_letters_are_recognised(original, known, tmp_path, make):
-    clip, report = make(renamed(original, tmp_path, asf))
-    assert not any("left side from its right" in note for note in report["notes"])
-    here = wrists(clip, "left")
-    assert np.linalg.norm(here - wrists(known, "left")[: len(here)], axis=-1).mean() < 2
 
 
 @pytest.mark.parametrize(

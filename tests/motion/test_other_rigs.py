@@ -16,62 +16,22 @@ from tests.motion.other_rigs import PLAIN, TRUNK, human, rigged
 from tests.motion.scramble import X, compare, outcome, source_of
 
 SLOW = pytest.mark.slow
-PELVIS = PLAIN.replace("thigh_l|hips", "thigh_l|pelvis").replace("thigh_r|hips", "thigh_r|pelvis")
+JAPANESE = human(
+    "{J}{n}",
+    TRUNK.format("センター", "上半身", "上半身2", "首", "頭"),
+    "足 ひざ 足首 つま先",
+    "肩 腕 ひじ 手首",
+)
 RIGS = {
-    "Xsens, right first": (
-        human(
-            "{S}{n}",
-            "Pelvis=Hips L5=LowerBack L3=Spine T12=Spine+0,4,0 T8=Spine1 Neck=Neck1 Head=Head",
-            "UpperLeg LowerLeg Foot Toe",
-            "Shoulder UpperArm ForeArm Hand",
-            "RL",
-        ),
-        {},
-    ),
-    "LaFAN, bones along one axis": (
-        human(
-            "{S}{n}",
-            "Hips=Hips Spine=LowerBack Spine1=Spine Spine2=Spine1 Neck=Neck1 Head=Head",
-            "UpLeg Leg Foot Toe",
-            "Shoulder Arm ForeArm Hand",
-        ),
-        {"rest": "one axis"},
-    ),
-    "Japanese": (
-        human(
-            "{J}{n}",
-            TRUNK.format("センター", "上半身", "上半身2", "首", "頭"),
-            "足 ひざ 足首 つま先",
-            "肩 腕 ひじ 手首",
-        ),
-        {},
-    ),
-    "Spanish, bones along one axis": (
-        human(
-            "{n}_{l}",
-            TRUNK.format("Cadera", "Columna", "Pecho", "Cuello", "Cabeza"),
-            "Muslo Pierna Pie Dedos",
-            "Hombro Brazo Antebrazo Mano",
-        ),
-        {"rest": "one axis"},
-    ),
-    "rolls in every limb": (rigs.ROLLS, {}),
+    "Japanese": (JAPANESE, {}),
     "KIT, a joint for each axis": (rigs.KIT, {}),
-    "KIT, bones along one axis": (rigs.KIT, {"rest": "one axis"}),
-    "roots and metres": (
-        "Armature|-|ground\nReference|Armature|ground\n" + PLAIN.replace("hips|-|", "hips|Reference|"),
-        {"unit": "m"},
-    ),
     "game with targets for feet, Z up": (
         "root|-|ground\n" + PLAIN.replace("hips|-|", "hips|root|") + rigs.GAME,
         {"z_up": True},
     ),
-    "pelvis beside the spine": (PELVIS.replace("thigh_l|", "pelvis|hips|Hips\nthigh_l|", 1), {}),
-    "skirt, hair, wings and tail": (PLAIN + rigs.CLOTHES, {}),
     "legs of a mechanism, and heels": (PLAIN + rigs.MECHANISM, {}),
-    "hind limbs and wide wings": (PLAIN + rigs.HIND, {}),
     "skirt, hair, wings and tail, without names": (rigs.nameless(PLAIN + rigs.CLOTHES), {"rest": "one axis"}),
-}  # fmt: skip
+}
 
 
 @pytest.fixture(scope="module")
@@ -95,25 +55,13 @@ def both(tmp_path, make):
 
 
 @pytest.mark.shared
-@pytest.mark.parametrize(
-    "name", [pytest.param(k, marks=SLOW) if "KIT, b" in k or "Spanish" in k else k for k in RIGS]
-)
+@pytest.mark.parametrize("name", RIGS)
 def test_a_clip_on_another_rig_is_retargeted_within_a_centimetre(both, clip, name):
     rig, how = RIGS[name]
     first, second, report, names = both(clip, rig, **how)
     off = compare(first, second, names)
     assert off.mean() < 1.0, (name, report["roles"])
     assert off.max() < 1.5, dict(zip(names, off.round(1), strict=True))
-
-
-@pytest.mark.shared
-@pytest.mark.parametrize("rest", ["own", "one axis"])
-def test_arms_that_hang_from_the_neck_as_in_3ds_max_belong_to_the_chest(both, clip, rest):
-    rig = PLAIN.replace("shoulder_l|chest", "shoulder_l|neck").replace("shoulder_r|chest", "shoulder_r|neck")
-    first, second, report, names = both(clip, rig, rest=rest)
-    assert (report["roles"]["chest"], report["roles"]["neck"]) == ("chest", "neck")
-    assert not any("neck" in note for note in report["unsure"])
-    assert compare(first, second, names).max() < 1.5
 
 
 def without(*joints: str) -> str:
@@ -137,7 +85,6 @@ PAIRS = r"in doubt .*two equal legs and two equal arms\. .* cannot be used"
     [
         (without("shoulder", "upper_arm", "forearm", "hand"), PAIRS),
         (without("thigh", "shin", "foot", "toe"), PAIRS),
-        (without("upper_arm_r", "forearm_r", "hand_r"), PAIRS),
         (without("neck", "head"), r"in doubt .*no joint for the head"),
         (two_figures(), r"two figures, \w*hips and \w*hips. Export each figure on its own"),
     ],
@@ -145,21 +92,6 @@ PAIRS = r"in doubt .*two equal legs and two equal arms\. .* cannot be used"
 def test_no_body_or_two_are_refused(both, clip, rig, why):
     with pytest.raises(InputError, match=why):
         both(clip, rig)
-
-
-@pytest.mark.shared
-def test_a_crawling_figure_is_right_or_refused_with_a_question(both, clip):
-    crawl = rigs.crawling(clip)
-    first, second, _, names = both(crawl, PLAIN)
-    assert compare(first, second, names).mean() < 1.0
-    with pytest.raises(InputError, match=r"the up axis is in doubt.*Set motion.up"):
-        both(crawl, PLAIN, rest="heap")
-
-
-def test_a_figure_on_four_legs_is_refused(tmp_path, make):
-    write_bvh(tmp_path / "dog.bvh", rigs.dog())
-    with pytest.raises(InputError, match=r"dog.bvh: the figure goes on four legs"):
-        make(tmp_path / "dog.bvh")
 
 
 @pytest.mark.shared
@@ -191,7 +123,6 @@ def nodding(walk):
     "trunk",
     [
         "Hips=Hips ToSpine=LowerBack Spine=Spine Spine1=Spine1 Neck=Neck1 Head=Head",
-        "Hips=Hips LowerBack=LowerBack Spine=Spine Spine1=Spine1 Neck=Neck1 Head=Head",
         "Hips=Hips Spine=LowerBack Spine1=Spine Spine2=Spine1 Neck=Neck1 Head=Head",
     ],
 )
@@ -210,36 +141,6 @@ def test_a_spine_that_moves_in_its_parent_bends(both, nodding):
     assert max(off[joint] for joint in ("Spine", "Spine1", "Neck1", "Head")) < 0.5
     swing = second.positions[:, second.skeleton.index("Spine")] - second.root
     assert np.ptp(swing[:, 2]) > 1.5  # cm
-
-
-def test_a_frame_of_zeros_does_not_turn_the_spine(both, nodding):
-    """Some programs write a first frame in which all angles and positions are 0."""
-
-    def with_zeros(text: str) -> str:
-        head, rows = text.split("Frame Time:")
-        line, _, table = rows.partition("\n")
-        zeros = " ".join("0" for _ in table.splitlines()[0].split())
-        frames = len(table.splitlines())
-        head = head.replace(f"Frames: {frames}", f"Frames: {frames + 1}")
-        return f"{head}Frame Time:{line}\n{zeros}\n{table}"
-
-    trunk = "Hips=Hips Back=Spine Chest=Spine1 Neck=Neck1 Head=Head"
-    first, second, _, names = both(nodding, named(trunk), with_zeros, six=True)
-    assert len(second) == pytest.approx(len(first), abs=1)
-    assert compare(first, second, names).mean() < 1.0
-
-
-def test_a_very_short_bone_above_the_chest_does_not_turn_it(both, walk):
-    """The chest lies 3 cm below the neck and 1.2 cm behind it. By this bone alone, arms are 2.5 cm off."""
-    rig = named("Hips=Hips Low=LowerBack Mid=Spine High=Spine1 Neck=Neck1 Head=Head")
-    rig = rig.replace("Neck|High|", "Chest|High|Spine1+0,12,-0.7\nNeck|Chest|")
-    rig = rig.replace("LeftShoulder|High|", "LeftShoulder|Chest|").replace(
-        "RightShoulder|High|", "RightShoulder|Chest|"
-    )
-    first, second, _, names = both(walk, rig)
-    off = dict(zip(names, compare(first, second, names), strict=True))
-    assert off["LeftArm"] < 1.5
-    assert off["Head"] < 1.5
 
 
 @pytest.mark.shared

@@ -84,23 +84,6 @@ def test_the_same_proportions_come_out_exactly(walk, rigs):
     assert quat.angle(again.rotations, walk.rotations).max() < 1e-4
 
 
-def test_a_rig_of_191_joints_moves_like_its_31_known_ones(walk, rigs):
-    """ava191 has the proportions of holden31, so the 31 joints are at the same places in both."""
-    assert sorted(rigs["ava191"].maps["holden31"].values()) == sorted(walk.skeleton.joints)
-    neck = quat.from_axis_angle(np.array([1.0, 0, 0]), np.full(len(walk), 0.4))
-    walk = replace(walk, rotations=walk.rotations.copy())
-    walk.rotations[:, walk.skeleton.index("Neck")] = neck
-    ava = onto(walk, rigs["holden31"], rigs["ava191"])
-    for mine, theirs in rigs["ava191"].maps["holden31"].items():
-        if any(word in mine for word in ("Index", "Thumb", "Ass")):
-            continue  # placed elsewhere on the hand and the pelvis
-        apart = ava.positions[:, ava.skeleton.index(mine)] - walk.positions[:, walk.skeleton.index(theirs)]
-        assert np.linalg.norm(apart, axis=-1).max() < 1e-4, mine
-    moved = rigs["ava191"].maps["holden31"]
-    still = [i for i, name in enumerate(ava.skeleton.joints) if name not in moved]
-    assert quat.angle(ava.rotations[:, still], quat.IDENTITY).max() < 1e-6  # rigid below their parents
-
-
 def test_a_figure_whose_legs_nothing_moves_is_refused(walk, rigs):
     pairs = {n: n for n in walk.skeleton.joints if n != "LeftLeg"}
     with pytest.raises(HobbleError, match=r"no joint of holden31 moves LeftLeg \(left_knee\) of holden31"):
@@ -172,23 +155,6 @@ def test_foreign_rigs_are_recognised_by_their_names(walker, rigs, bvh, make):
         assert -3 < lowest.min() < lowest.max() < 6
 
 
-def test_a_rig_without_fingers_is_recognised(walker, rigs, bvh, make):
-    full = rigs["mixamo55"].skeleton
-    keep = [
-        i for i, n in enumerate(full.joints) if not any(f in n for f in ("Index", "Middle", "Ring", "Pinky"))
-    ]
-    new = {old: i for i, old in enumerate(keep)}
-    bare = replace(
-        full,
-        joints=tuple(full.joints[i] for i in keep),
-        parents=tuple(new.get(full.parents[i], -1) for i in keep),
-        offsets=full.offsets[keep],
-        end_sites={},
-    )
-    _, report = make(bvh(walker(bare, 30, 30.0)))
-    assert report["rig"] == "mixamo55"
-
-
 # The clips on which standing heels are hardest to keep, by every performer, and each of the injured ones.
 SLIDING = ["cmu/02_01", "pfnn/LocomotionFlat09_000", "ferre/Injured_Walk_LLL", "ferre/Injured_LUL_Backwards"]
 MORE = """cmu/02_03 cmu/03_01 cmu/07_09 cmu/08_01 cmu/08_05 cmu/08_06 cmu/08_11 cmu/09_04 cmu/09_07 cmu/09_08
@@ -210,25 +176,6 @@ def test_feet_of_real_clips_slide_no_more_than_before_in_every_direction(shared,
             frames = standing(clip, role)
             before = slide(clip, role)[frames].sum() * how.scale
             assert slide(made, role)[frames].sum() <= 1.2 * before, (end, role)
-
-
-@pytest.mark.shared
-def test_a_real_walk_keeps_knee_bend_lean_and_stride(shared, rigs):
-    """Knee bend, trunk lean and stride over leg length stay those of the source."""
-    target = rigs["holden31"]
-    source, clip = sourced(shared / "mocap/cmu/02_01.bvh", target)
-    made = retarget_clip(clip, plan(clip.skeleton, target.skeleton, source.match.followed_joints))
-
-    def knee(of):
-        cosine = np.sum(bone(of, "left_hip", "left_knee") * bone(of, "left_knee", "left_heel"), -1)
-        return np.degrees(np.arccos(cosine))
-
-    def lean(of):
-        trunk = of.positions[:, of.skeleton.role("head")] - of.positions[:, 0]
-        return np.degrees(np.arccos(trunk[:, 1] / np.linalg.norm(trunk, axis=-1)))
-
-    assert np.abs(knee(made) - knee(clip)).mean() < 5
-    assert np.abs(lean(made) - lean(clip)).mean() < 3
 
 
 @pytest.mark.shared

@@ -27,16 +27,6 @@ def test_the_bones_of_the_wrong_joint_are_red(walk, part, bones):
     assert sum(line["stroke"] == WRONG for line in drawn) == bones * PICTURES * ROWS
 
 
-def test_equal_clips_are_drawn_alike_and_at_their_own_height(walk):
-    drawn = lines(retarget_picture(walk, walk, "left knee", 0.0))
-    row = len(drawn) // ROWS
-    assert drawn[:row] == drawn[row : 2 * row]
-    assert drawn[2 * row : 3 * row] == drawn[3 * row :]
-    assert drawn[:row] != drawn[2 * row : 3 * row]
-    lowest = max(float(line[y]) for line in drawn for y in ("y1", "y2"))
-    assert lowest == pytest.approx(0.0, abs=0.06)
-
-
 def test_a_wrong_map_is_refused_with_the_joint_and_a_picture(root, walker, tmp_path, capsys) -> None:
     """Here the left arm follows the right one."""
     maps = tmp_path / "skeletons"

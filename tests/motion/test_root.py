@@ -28,17 +28,6 @@ def turned(clip, angle, shift):
     )
 
 
-def test_a_figure_facing_z_has_the_world_as_its_root(walk):
-    still = replace(
-        walk, rotations=np.tile(quat.IDENTITY, (4, 31, 1)), root=np.tile([3.0, 93.0, -7.0], (4, 1))
-    )
-    root = root_frames(still, 20)
-    np.testing.assert_allclose(root.direction, [[0, 0, 1]] * 4, atol=1e-12)
-    np.testing.assert_allclose(root.position, [[3, -7]] * 4)
-    np.testing.assert_allclose(quat.angle(root.rotation, quat.IDENTITY), 0, atol=1e-9)
-    np.testing.assert_allclose(root.turn, 0, atol=1e-12)
-
-
 @settings(max_examples=15, deadline=None)
 @given(angle=st.floats(-3.1, 3.1), shift=st.floats(-500, 500))
 def test_rows_do_not_depend_on_place_and_heading(walk, angle, shift):
@@ -48,15 +37,6 @@ def test_rows_do_not_depend_on_place_and_heading(walk, angle, shift):
     for a, b in zip(local_pose(clip, ours), local_pose(other, theirs), strict=True):
         np.testing.assert_allclose(a, b, atol=1e-7)
     np.testing.assert_allclose(ours.turn, theirs.turn, atol=1e-9)
-
-
-def test_turning_left_is_positive(walk):
-    """If the figure turns left by d in a frame, q[i+1] q[i]^-1 turns by -d, so the runtime applies the
-    negative.
-    """
-    clip = replace(walk, rotations=np.tile(quat.IDENTITY, (5, 31, 1)), root=np.zeros((5, 3)))
-    clip.rotations[:, 0] = quat.yaw(0.1 * np.arange(5))
-    np.testing.assert_allclose(root_frames(clip, 0).turn, -0.1, atol=1e-12)
 
 
 @pytest.mark.shared

@@ -53,27 +53,17 @@ def replaced(old: str, new: str):
     ("edit", "line", "problem"),
     [
         (swapped("elbow", "wrist"), "left_wrist", "which does not hang from Hand_L, the left_elbow"),
-        (swapped("hip", "knee"), "left_knee", "UpperLeg_L, which does not hang from LowerLeg_L"),
-        (swapped("heel", "toe"), "left_toe", "left_toe is Foot_L, which does not hang from Toes_L"),
         (knees_crossed, "left_knee", "LowerLeg_R, which does not hang from UpperLeg_L, the left_hip"),
         (sides_swapped, "left_shoulder", "left_shoulder is UpperArm_R, whose name says right"),
         (role("head", "Chest"), "head", "head is Chest, which does not hang from Neck, the neck"),
-        (role("head", "Neck"), "head", "head and neck are the same joint, Neck"),
         (role("chest", "Chest"), "chest", "chest is Chest, but the arms hang from UpperChest"),
         (role("hips", "Spine"), "spine", "spine and hips are the same joint, Spine"),
-        (role("left_elbow", "Hand_L"), "left_wrist", "left_wrist and left_elbow are the same joint, Hand_L"),
         (role("left_knee", "LowerLeg"), "left_knee", "there is no joint 'LowerLeg' (is it 'LowerLeg_"),
         (role("left_elbow", "[Hand_L]"), "left_elbow", "there is no joint ['Hand_L']"),
-        (role("left_elbow", "7"), "left_elbow", "there is no joint 7"),
         (replaced("left_knee:", "left_kne:"), "left_kne", "there is no role left_kne (is it left_knee?)"),
         (without("left_elbow", "head"), "roles", "these roles are missing: head, left_elbow"),
         (without("left_toe"), "roles", "these roles are missing: left_toe"),
         (replaced("{parent: null", "{parent: Spine"), "Hips", "its parent 'Spine' must be listed above it"),
-        (
-            replaced("{parent: Hips", "{parent: [Hips]"),
-            "Spine",
-            "its parent ['Hips'] must be listed above it",
-        ),
         (replaced("{parent: Hips", "{parent: null"), "Spine", "only the first joint may have no parent"),
         (replaced("[0, 10, 0]", "[0, 10]"), "Spine", "its offset must be three numbers of 100000 cm at most"),
         (replaced("[0, 10, 0]", "[0, .nan, 0]"), "Spine", "its offset must be three numbers"),
@@ -105,20 +95,6 @@ def test_hips_far_above_the_legs_are_refused(root, tmp_path):
     text = role("hips", "Root")(text)
     (tmp_path / "mine.yaml").write_text(text)
     with pytest.raises(InputError, match="hips is Root, but the legs hang from Hips"):
-        load_skeleton(tmp_path / "mine.yaml")
-
-
-def test_hips_far_up_the_spine_are_refused(root, tmp_path):
-    """The legs then hang from a joint above the hips in the tree. Its own offset does not matter."""
-    text = (root / "config/skeletons/holden31.yaml").read_text()
-    near = without("spine")(role("hips", "Spine")(text))
-    (tmp_path / "near.yaml").write_text(near)
-    load_skeleton(tmp_path / "near.yaml")
-    far = near.replace(
-        "Spine: {parent: LowerBack, offset: [0, 11.5, -1]}", "Spine: {parent: LowerBack, offset: [0, 30, -1]}"
-    )
-    (tmp_path / "mine.yaml").write_text(far)
-    with pytest.raises(InputError, match="hips is Spine, but the legs hang from Hips"):
         load_skeleton(tmp_path / "mine.yaml")
 
 

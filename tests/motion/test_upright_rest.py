@@ -17,9 +17,8 @@ from hobble.motion.options import ClipMotion
 from hobble.motion.read import read_bvh
 from hobble.motion.skeleton_file import load_skeleton
 from tests.motion.other_rigs import PLAIN, rigged
-from tests.motion.scramble import SKELETONS, X, compare, outcome, source_of
+from tests.motion.scramble import SKELETONS, X, compare, source_of
 
-LIMBS = {"arm": ("shoulder", "elbow", "wrist"), "leg": ("hip", "knee", "heel")}
 SIDES = ("left", "right")
 
 
@@ -29,50 +28,6 @@ def of_file(path, clip: Clip, names: dict[str, str], role: str):
     raw = raw_clip(file)
     at = np.minimum(np.round(np.arange(len(clip)) / 60 / file.frame_time).astype(int), len(raw) - 1)
     return raw.positions[at, raw.skeleton.index(names[role])], clip.positions[:, clip.skeleton.role(role)]
-
-
-def bend(a, b, c):
-    """The bend of a limb at b, in degrees."""
-    u, v = b - a, c - b
-    return np.degrees(np.arccos(np.sum(u * v, -1) / np.linalg.norm(u, axis=-1) / np.linalg.norm(v, axis=-1)))
-
-
-def same_bends(path, clip: Clip, names: dict[str, str]) -> None:
-    """Whether knees and elbows bend as in the file: the middle of their range, and its size."""
-    for side in SIDES:
-        for kind, limb in LIMBS.items():
-            joints = [of_file(path, clip, names, f"{side}_{part}") for part in limb]
-            before, after = (bend(*places) for places in zip(*joints, strict=True))
-            assert np.abs(after - before).mean() < (12 if kind == "leg" else 4), (path.name, side, kind)
-
-
-@pytest.mark.shared
-def test_feet_on_uneven_ground_cast_no_doubt_on_the_zero_pose(shared, make):
-    """In this walk on uneven ground the feet stand 18 degrees steeper than in the zero pose."""
-    assert make(shared / "mocap/cmu/03_02.bvh")[1]["unsure"] == []
-
-
-@pytest.mark.shared
-@pytest.mark.parametrize("name", ["walk-back_tired_001", "dash_angry_001"])
-def test_a_rig_whose_zero_pose_is_a_line_comes_out_upright(shared, make, name):
-    path = shared / f"mocap/styles/dataset-1_{name}.bvh"
-    clip, report = make(path)
-    assert report["stance"].startswith("its motion, because in its zero pose")
-    same_bends(path, clip, report["roles"])
-    left, right = (clip.positions[:, clip.skeleton.role(f"{side}_hip"), 1] for side in SIDES)
-    assert np.ptp(left - right) < 8
-
-
-@pytest.mark.shared
-@pytest.mark.parametrize("name", ["D4_Cycle2"])
-def test_a_rig_without_a_file_is_found(shared, make, name):
-    path = shared / f"mocap/patients/Subject{name}.bvh"
-    clip, report = make(path)
-    assert (report["rig"], report["stance"]) == ("found", "its zero pose")
-    roles = report["roles"]
-    assert (roles["chest"], roles["head"], roles["left_shoulder"]) == ("Spine1", "HEad", "LeftArm")
-    assert "neck" not in roles
-    same_bends(path, clip, roles)
 
 
 @pytest.mark.shared
@@ -89,14 +44,6 @@ def test_hips_and_shoulders_are_as_level_as_in_the_file(shared, make, name):
 
 
 @pytest.mark.shared
-def test_feet_that_stand_at_different_angles_get_a_note(shared, tmp_path):
-    """On uneven ground, with a zero pose in which nobody could stand, the tilt of the feet is a guess."""
-    one = outcome(shared / "mocap/cmu/03_02.bvh", 100, tmp_path, 420)
-    assert one.how.rest == "heap"
-    assert "feet stand at different angles" in one.said + one.refused
-
-
-@pytest.mark.shared
 def test_a_clip_too_short_to_show_its_feet_is_refused_or_accepted(shared, tmp_path, make):
     """A third of a second of a walk on a rig whose zero pose is a heap."""
     clip = source_of(shared / "mocap/cmu/07_01.bvh", 40)
@@ -106,15 +53,6 @@ def test_a_clip_too_short_to_show_its_feet_is_refused_or_accepted(shared, tmp_pa
     assert make(tmp_path / "short.bvh", accept_doubt=True)[1]["unsure"]
     write_bvh(tmp_path / "stands.bvh", rigged(clip, PLAIN)[0], decimals=8)
     assert "too short" not in " ".join(make(tmp_path / "stands.bvh")[1]["unsure"])
-
-
-@pytest.mark.shared
-def test_one_foot_that_agrees_with_the_rest_pose_decides(shared, tmp_path):
-    """On uneven ground one foot never comes down. The mean of both would be 2.5 cm off."""
-    one = outcome(shared / "mocap/cmu/03_02.bvh", 99, tmp_path, 900)
-    assert one.how.rest == "twisted"
-    assert one.right, one
-    assert "ankles" not in one.said
 
 
 @pytest.mark.shared
@@ -171,12 +109,6 @@ def squat(clip: Clip, tiptoe: float) -> Clip:
         out = bent(out, (f"Left{joint}", f"Right{joint}"), angle)
     low = out.positions[:, clip.skeleton.role("left_toe"), 1]
     return replace(out, root=out.root - np.outer(low - 2.0, [0.0, 1.0, 0.0]))
-
-
-def test_in_a_squat_the_zero_pose_shows_the_pelvis(standing, tmp_path, make):
-    first, second, names, report = rewritten(squat(standing, 0.5), "own", tmp_path, make)
-    assert compare(first, second, names).mean() < 0.1
-    assert report["unsure"] == []
 
 
 def test_a_squat_without_a_standing_zero_pose_is_noted_and_on_tiptoe_refused(standing, tmp_path, make):

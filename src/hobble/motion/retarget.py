@@ -23,9 +23,9 @@ from hobble.core.clip import Clip
 from hobble.core.errors import HobbleError
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton, aim_bone, local_rotations, rest_positions, two_bone_knee
-from hobble.core.smooth import smooth_above, smoothstep
+from hobble.core.smooth import gaussian, lowest, smooth_above, smoothstep
 from hobble.motion.axes import UP, bend_direction, rest_frame, unit
-from hobble.motion.body import SIDES
+from hobble.motion.body import SIDES, path_between
 from hobble.motion.ground import steady_heels
 from hobble.motion.options import Problem
 from hobble.motion.rig import leg_length, leg_lengths, missing_bone
@@ -45,6 +45,11 @@ MOST_DROP = 6.0  # cm by which the hips come down at most
 # cm: a knee that is nearer than this to the line from hip to ankle hardly shows which way it bends. So its
 # direction is mixed with the forward direction.
 STRAIGHT = 0.5
+# cm a second: a ball of the foot that is slower than the first stands, one faster than the second swings.
+SWING = (40.0, 120.0)
+# Radians by which a pelvis that is turned to make the feet level may lean. The feet count as level in the source
+# if their heights differ by less than UNEVEN cm.
+LEVEL, UNEVEN = np.radians(2.0), 3.0
 
 
 @dataclass(frozen=True)
@@ -175,7 +180,7 @@ def retarget_clip(clip: Clip, how: Retarget) -> Clip:
     # World rotations of the target, from those of the source. Only those of `how.joints` are set.
     rotations = np.empty((len(clip), len(how.target.joints), 4))
     rotations[:, how.joints] = quat.mul(clip.global_rotations[:, how.follows], how.turns)
-    how = _with_measured_lifts(how, clip, rotations)
+    how = _with_level_pelvis(_with_measured_lifts(how, clip, rotations), clip, rotations)
     for side in SIDES:
         heel, toe = (clip.positions[:, how.source.role(f"{side}_{part}")] for part in ("heel", "toe"))
         ankle, ball = how.target.role(f"{side}_heel"), how.target.role(f"{side}_toe")
@@ -203,6 +208,37 @@ def _with_measured_lifts(how: Retarget, clip: Clip, rotations: Array) -> Retarge
     return replace(how, lifts=lifts)
 
 
+def _with_level_pelvis(how: Retarget, clip: Clip, rotations: Array) -> Retarget:
+    """The plan with `lifts` that let the feet stand equally high; the pelvis is turned by the difference.
+
+    If the figure's legs are not equally long, its pelvis leans to the shorter leg while its feet are level.
+    Legs of equal length then have level feet only with a level pelvis. So the pelvis is turned until the feet
+    are level, but it does not lean to the other side by more than LEVEL. rotations: (F, J, 4) of the target's
+    joints in the world, of which those of the pelvis are changed.
+    """
+    at = clip.at_roles()
+    heights = []  # of the standing ball of each foot, cm
+    for side in SIDES:
+        ball = at[f"{side}_toe"] * how.scale
+        slow = np.linalg.norm(np.gradient(ball, axis=0), axis=-1) if len(ball) > 1 else np.zeros(len(ball))
+        heights.append(float(np.median(ball[slow <= np.quantile(slow, 0.25), 1])))
+    if abs(heights[0] - heights[1]) > UNEVEN:
+        return how
+    left = at["left_hip"] - at["right_hip"]
+    width = how.scale * float(np.median(np.linalg.norm(left, axis=-1)))
+    lean = float(np.mean(np.arcsin(np.clip(unit(left)[:, 1], -1.0, 1.0))))
+    needed = np.arcsin(np.clip((how.lifts[0] - how.lifts[1] - heights[0] + heights[1]) / width, -0.3, 0.3))
+    sign = np.sign(needed)
+    turn = sign * np.clip(LEVEL - sign * lean, 0.0, abs(needed))
+    parents, hips = how.target.parents, how.target.role("hips")
+    tops = [parents[how.target.role(f"{side}_hip")] for side in SIDES]
+    pelvis = sorted({j for top in tops for j in path_between(parents, hips, top)})
+    ahead = unit(np.cross(left, UP))
+    by = quat.normalize(quat.from_axis_angle(ahead, np.full(len(ahead), turn)))
+    rotations[:, pelvis] = quat.mul(by[:, None], rotations[:, pelvis])
+    return replace(how, lifts=how.lifts - 0.5 * width * np.sin(turn) * np.array([1.0, -1.0]))
+
+
 def _bend_legs(how: Retarget, clip: Clip, rotations: Array) -> Array:
     """Turn thighs and shanks so that the balls of the feet are where they are in the scaled source.
 
@@ -214,7 +250,7 @@ def _bend_legs(how: Retarget, clip: Clip, rotations: Array) -> Array:
     too_high = [np.maximum(excess, 0.0) * weight for excess, weight in (leg.excess(SPARED) for leg in legs)]
     drop = smooth_above(np.maximum(*too_high), max(1, round(SMOOTH * clip.fps)))[:, None] * UP
     for leg in legs:
-        leg.bend(leg.start - drop)
+        leg.bend(leg.start - drop, clip.fps)
     return hips - drop
 
 
@@ -250,9 +286,9 @@ class _Leg:
             above = how.drivers[how.target.parents[joint]]
             self.start = self.start + quat.rotate(rotations[..., above, :], how.driver_offsets[joint])
             joint = above
-        toe = source[..., how.source.role(roles[3]), :] * how.scale
-        toe = toe + np.array([0.0, np.mean(how.lifts) - how.lifts[SIDES.index(side)], 0.0])
-        self.ankle = toe - quat.rotate(rotations[..., heel, :], how.driver_offsets[ball])
+        self.toe = source[..., how.source.role(roles[3]), :] * how.scale
+        self.toe = self.toe + (np.mean(how.lifts) - how.lifts[SIDES.index(side)]) * UP
+        self.ankle = self.toe - quat.rotate(rotations[..., heel, :], how.driver_offsets[ball])
         hip_at, knee_at, heel_at = (source[..., how.source.role(role), :] for role in roles[:3])
         length = np.linalg.norm(knee_at - hip_at, axis=-1) + np.linalg.norm(heel_at - knee_at, axis=-1)
         self.stretch = np.linalg.norm(heel_at - hip_at, axis=-1) / length
@@ -265,9 +301,7 @@ class _Leg:
         spared: radians by which the knee may bend less than in the source. The weight is from 0 for a bent
         leg, which changes little with the height of the hips, to 1.
         """
-        thigh, shank = np.linalg.norm(self.thigh), np.linalg.norm(self.shank)
-        bend = np.maximum(self.knee_bend - spared, 0.0)
-        reach = np.sqrt(thigh**2 + shank**2 + 2 * thigh * shank * np.cos(bend))
+        reach = self._reach(np.maximum(self.knee_bend - spared, 0.0))
         from_ankle = self.start - self.ankle
         # At the right height, the hip is at the distance `reach` from the ankle (Pythagoras).
         level_squared = np.minimum(from_ankle[..., 0] ** 2 + from_ankle[..., 2] ** 2, reach**2)
@@ -275,15 +309,39 @@ class _Leg:
         straightness = np.clip((self.stretch - BENT) / (NEARLY_STRAIGHT - BENT), 0.0, 1.0)
         return np.clip(excess, -MOST_DROP, MOST_DROP), smoothstep(straightness)
 
-    def bend(self, start: Array) -> None:
+    def _reach(self, bend: Array) -> Array:
+        """(...) distance from hip to ankle while the knee is bent by so many radians."""
+        thigh, shank = np.linalg.norm(self.thigh), np.linalg.norm(self.shank)
+        return np.sqrt(thigh**2 + shank**2 + 2 * thigh * shank * np.cos(bend))
+
+    def _swinging_ankle(self, start: Array, fps: float) -> Array:
+        """(F, 3) where the ankle must be. While the foot swings, the knee bends as in the source.
+
+        While the foot stands, the ball stays where it is in the source, and a foot of another size bends the
+        knee by some degrees more or less. In a swing, the ball may be elsewhere, but not below
+        half its height.
+        """
+        line = self.ankle - start
+        distance = np.linalg.norm(line, axis=-1)
+        speed = np.zeros(len(line))
+        if len(line) > 1:
+            speed = np.linalg.norm(np.gradient(gaussian(self.toe, SMOOTH * fps), axis=0), axis=-1) * fps
+        swings = smoothstep(np.clip((speed - SWING[0]) / (SWING[1] - SWING[0]), 0.0, 1.0))
+        height = self.toe[:, 1] - lowest(self.toe[:, 1], 2 * round(0.25 * fps) + 1)
+        down = np.maximum(-line[:, 1] / np.maximum(distance, 1e-9), 0.1)
+        shift = np.minimum(swings * (self._reach(self.knee_bend) - distance), 0.5 * height / down)
+        return self.ankle + unit(line) * shift[:, None]
+
+    def bend(self, start: Array, fps: float) -> None:
         """Turn thigh and shank so that the ankle reaches its position. The foot keeps its rotation.
 
-        start: (..., 3) where the leg begins after the hips came down.
+        start: (F, 3) where the leg begins after the hips came down.
         """
+        ankle = self._swinging_ankle(start, fps)
         upper, lower = self.rotations[..., self.hip, :], self.rotations[..., self.knee, :]
         pole = _knee_direction(upper, lower, self.thigh, self.shank, self.forward)
         lengths = float(np.linalg.norm(self.thigh)), float(np.linalg.norm(self.shank))
-        knee_at, ankle_at = two_bone_knee(start, self.ankle, pole, *lengths)
+        knee_at, ankle_at = two_bone_knee(start, ankle, pole, *lengths)
         self.rotations[..., self.hip, :] = aim_bone(upper, self.thigh, knee_at - start)
         self.rotations[..., self.knee, :] = aim_bone(lower, self.shank, ankle_at - knee_at)
 
