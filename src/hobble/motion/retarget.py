@@ -47,8 +47,8 @@ MOST_DROP = 6.0  # cm by which the hips come down at most
 STRAIGHT = 0.5
 # cm a second: a ball of the foot that is slower than the first stands, one faster than the second swings.
 SWING = (40.0, 120.0)
-# Radians by which a pelvis that is turned to make the feet level may lean to the other side. UNEVEN: cm between
-# the heights of the source's standing feet from which on its ground is not flat.
+# Radians by which a pelvis that is turned to make the feet level may lean to the other side. UNEVEN: cm
+# between the heights of the standing feet of the source from which on its ground is not flat.
 LEVEL, UNEVEN = np.radians(2.0), 3.0
 
 
