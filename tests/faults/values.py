@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from hobble.core.files import save_npz
+from hobble.core.files import read_json, save_npz, write_json
 
 WRONG: tuple[Any, ...] = (
     None, True, "", "x", "<script>", -1, 0, 1e308, 10**400, 0.5, [], {}, [[]], [None], {"x": 1}, "9" * 500,
@@ -92,13 +92,16 @@ def change_npz(rng: Random, path: Path) -> None:
     save_npz(path, **arrays)
 
 
-def change_file(rng: Random, path: Path) -> None:
-    """Change one value of an npz or a JSON file, which stays valid as such."""
+def change_file(rng: Random, path: Path, refit: bool = False) -> None:
+    """Change one value of an npz or a JSON file, which stays valid as such.
+
+    refit: whether the checksum of a JSON object is made to fit, too.
+    """
     if path.suffix == ".npz":
         return change_npz(rng, path)
-    text = json.dumps(change_json(rng, json.loads(path.read_text())))
+    value = change_json(rng, read_json(path) if refit else json.loads(path.read_text()))
     path.unlink()
-    path.write_text(text)
+    write_json(path, value) if refit else path.write_text(json.dumps(value))
     return None
 
 
