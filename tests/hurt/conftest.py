@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import functools
-import importlib.util
-import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -20,13 +18,6 @@ from hobble.motion.make import make_clip
 from hobble.motion.options import ClipMotion
 from hobble.synthetic.generate_clip import walk_from_plan
 from hobble.synthetic.plan import Segment
-
-# The tests of this folder share these measurements. Tests are no package, so the module is loaded by path.
-SPEC = importlib.util.spec_from_file_location("hurt_gait", Path(__file__).with_name("gait.py"))
-assert SPEC is not None
-assert SPEC.loader is not None
-sys.modules["hurt_gait"] = importlib.util.module_from_spec(SPEC)
-SPEC.loader.exec_module(sys.modules["hurt_gait"])
 
 Healthy = tuple[Clip, Labels, bool]  # the bool: on flat ground
 SEGMENTS = {

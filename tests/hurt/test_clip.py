@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hurt_gait import SIDES, fastest, knee, slide, toe_heights
 
 from hobble.core import quat
 from hobble.core.errors import HobbleError
@@ -13,6 +12,7 @@ from hobble.hurt.hurt_clip import hurt_clip
 from hobble.labels.clip_labels import LabelReport
 from hobble.labels.label import mirror_labels
 from hobble.motion.edit import mirror_clip
+from tests.hurt.gait import SIDES, fastest, knee, slide, toe_heights
 
 MADE = ("straight", "turning", "jog", "starting", "uneven")
 CAPTURED = ("07_01", "105_29", "09_01", "03_01")
