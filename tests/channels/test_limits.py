@@ -75,18 +75,6 @@ def test_a_hurt_version_is_compared_with_its_own_healthy_clip() -> None:
     assert (limits.speeds[JOG] == UNLIMITED).all()
 
 
-def test_a_captured_injury_is_compared_with_the_usual_speed_of_its_gait() -> None:
-    found = pace()
-    found.add("healthy", **rows(np.full(30, 2.0), np.zeros((30, 2))))
-    found.add("jogs", **rows(np.full(30, 6.0), np.zeros((30, 2)), JOG))
-    found.add("limps", **rows(np.full(60, 1.0), np.tile([8.0, 0.0], (60, 1))))
-    limits = found.learn()
-    assert limits is not None
-    walk, jog = (limits.highest_speeds(np.array([[8.0, 0.0]]))[0, g] for g in (WALK, JOG))
-    assert walk == pytest.approx(1.0, rel=0.1)
-    assert jog == pytest.approx(3.0, rel=0.1)  # by what the link does in other gaits
-
-
 def test_learnt_limits_never_rise_with_severity_and_are_equal_on_both_sides() -> None:
     rng = np.random.default_rng(4)
     found = pace(3, across=[1, 0, 2])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hobble.gait.cycles import CURVES, SAMPLES, _share_below, find_landings, measure_cycles
+from hobble.gait.cycles import CURVES, SAMPLES, _share_below, measure_cycles
 
 CYCLE, LEG = 60, 81.0
 
@@ -113,11 +113,3 @@ def on_a_circle(positions):
 @pytest.mark.parametrize("change", [standing, backward, on_a_circle, lambda p: p[:20], lambda p: p[:1]])
 def test_only_straight_walking_has_cycles(holden31, stepper, change):
     assert len(measure_cycles(holden31, change(stepper().positions(holden31)))) == 0
-
-
-def test_landings_need_a_real_step():
-    wave = 0.3 * np.cos(2 * np.pi * np.arange(300) / 60)
-    assert find_landings(wave, 60.0) == [60, 120, 180, 240]
-    small = wave + 0.02 * np.cos(2 * np.pi * np.arange(300) / 7)
-    assert len(find_landings(small, 60.0)) == len(find_landings(wave, 60.0))
-    assert find_landings(0.01 * wave, 60.0) == []

@@ -28,7 +28,6 @@ from hobble.gait.recognise import (
     recognise,
     shares_of_answers,
 )
-from hobble.motion.edit import mirror_clip
 
 NORMAL_WALKS = ("105_29", "105_31", "105_34", "105_36")
 PEOPLE = range(10)
@@ -80,11 +79,6 @@ def test_mild_limps_are_recognised_by_the_graded_recogniser(left_out):
             assert judges[1](walk, healthy).side in (None, side)
     assert found[0] < found[1]
     assert found[1] >= 0.75 * 100
-
-
-def test_a_normal_walk_compared_with_another_persons_is_normal():
-    normal = [person[NORMAL] for person in read_people()]
-    assert np.mean([recognise(a, b).is_impaired for a in normal for b in normal if a is not b]) <= 0.03
 
 
 def test_limps_without_an_example_and_impossible_walks():
@@ -140,14 +134,6 @@ def test_a_leg_that_is_dragged_is_antalgic_on_its_side(cmu, healthy_105):
     assert sizes["step_hurt"] < 0.3
     assert sizes["knee_hurt"] < 0.5
     assert sizes["speed"] < 0.65
-
-
-@pytest.mark.shared
-def test_a_mirrored_limp_of_the_right_leg_is_one_of_the_left(cmu):
-    limp, *healthy = (mirror_clip(cmu(name), f"{name}_mirror") for name in ("105_25", *NORMAL_WALKS))
-    seen = compare_clip(limp, healthy_profile(healthy))
-    for answers in (seen.window_answers, seen.window_grades):
-        assert shares_of_answers(answers) == {"antalgic left": 1.0}
 
 
 @pytest.mark.shared

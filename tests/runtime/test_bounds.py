@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 import warnings
-from dataclasses import fields, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from hobble.core.errors import InputError
-from hobble.core.skeleton import Skeleton
-from hobble.models.load import read_facts
 from hobble.models.network import TrainingFacts
 from hobble.models.pfnn import Pfnn
 from hobble.runtime.animation import ProceduralAnimation
@@ -126,25 +123,3 @@ def test_a_state_that_is_not_finite_restarts_and_warns_once(hurtable, part: str,
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         assert np.isfinite(character.next_pose((0, 2.0)).positions).all()
-
-
-def test_the_ranges_of_the_training_data_survive_their_file(network, holden31: Skeleton) -> None:
-    seen, sizes = walked(network), (network.layout.x_size, network.layout.y_size)
-    back = read_facts("x.npz", seen.arrays(), *sizes)
-    assert back is not None
-    for f in fields(seen):
-        np.testing.assert_array_equal(getattr(back, f.name), getattr(seen, f.name))
-    assert read_facts("x.npz", {}, *sizes) is None
-    for broken in (
-        {"Xlow": seen.x_low[1:]},
-        {"Yhigh": seen.y_high * np.nan},
-        {"Ylow": seen.y_high, "Yhigh": seen.y_low},
-        {"fastest": np.array("fast")},
-        {"start_phase": np.float64(-3)},
-    ):
-        with pytest.raises(InputError, match=r"x\.npz"):
-            read_facts("x.npz", {**seen.arrays(), **broken}, *sizes)
-    whole = seen.arrays()
-    del whole["start_x"]
-    with pytest.raises(InputError, match="start_x"):
-        read_facts("x.npz", whole, *sizes)

@@ -12,7 +12,6 @@ import pytest
 
 from hobble.cli.__main__ import main
 from hobble.core.skeleton import Skeleton
-from hobble.models.load import load_network
 from hobble.models.onnx_file import OPSET, TOLERANCE, export, write_checked
 from hobble.models.pfnn import OPTIONS
 from hobble.models.pfnn.release import write_release
@@ -74,15 +73,3 @@ def test_the_command_exports_onnx(
     skeleton = ["--skeleton", str(root / "Makefile")]
     assert main(["export", "bin", str(tmp_path / "pfnn"), str(tmp_path), *skeleton]) == 1
     assert "Makefile" in capsys.readouterr().err
-
-
-@pytest.mark.shared
-def test_the_released_network_is_exported_exactly(shared: Path, tmp_path: Path) -> None:
-    data = np.load(shared / "reference" / "original_rows_LocomotionFlat09_000.npz")
-    network = load_network(shared / "reference" / "pfnn_release_network.npz")
-    x, phase = data["X"][::20].astype(np.float32), data["P"][::20].astype(np.float32)
-    for mode in ("cubic", "constant"):
-        export(tmp_path / "network.onnx", network, mode)
-        y = run(tmp_path / "network.onnx", x, phase)
-        assert np.abs(y - network.predictor(mode).predict(x, phase.astype(float))).max() < 1e-4
-    assert np.abs(y - data["Y_release"][::20]).max() < 1e-3

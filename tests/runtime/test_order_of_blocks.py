@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from hobble.models.pfnn import Pfnn
-from hobble.rows.layout import RowLayout, compose, frame_inputs
+from hobble.rows.layout import RowLayout
 from hobble.runtime.animation import ProceduralAnimation
 
 ORDERS = [
@@ -19,22 +19,6 @@ def columns(layout: RowLayout, ordered: RowLayout) -> np.ndarray:
     """The place of each column of `ordered` in `layout`."""
     blocks = layout.blocks("x")
     return np.concatenate([np.arange(layout.x_size)[blocks[name]] for name in ordered.blocks("x")])
-
-
-@pytest.mark.parametrize("order", ORDERS)
-def test_blocks_of_columns_may_be_in_any_order(order: tuple[str, ...]) -> None:
-    layout = RowLayout(3, channels=(("injury", 4),))
-    ordered = replace(layout, order=order)
-    rng = np.random.default_rng(2)
-    x, y = np.zeros((2, layout.x_size)), np.zeros((2, layout.y_size))
-    other_x, other_y = np.zeros_like(x), np.zeros_like(y)
-    body = rng.normal(size=(2, layout.x_size - 3 * layout.samples - 4))
-    values = {"injury": rng.uniform(0, 10, (2, 4))}
-    ground, lift = rng.normal(size=(2, 3 * layout.samples)), rng.normal(size=(2, 1))
-    compose(layout, frame_inputs(layout, body, values), ground, lift, x, y)
-    compose(ordered, frame_inputs(ordered, body, values), ground, lift, other_x, other_y)
-    np.testing.assert_array_equal(other_x, x[:, columns(layout, ordered)])
-    np.testing.assert_array_equal(other_y, y)
 
 
 @pytest.mark.parametrize("order", ORDERS)

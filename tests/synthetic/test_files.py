@@ -51,11 +51,6 @@ def test_equal_arguments_give_equal_bytes_and_others_another_walk(written, tmp_p
     assert write("b", 1)[0] != once[0]
 
 
-def test_an_unknown_recipe_is_refused_with_the_known_ones(written):
-    with pytest.raises(HobbleError, match=r"clip x: there is no recipe 'moonwalk'.*walk-straight"):
-        written("x", recipe="moonwalk")
-
-
 def test_gait_keys_name_the_gait_and_fade_between_two(written):
     clip = written("any", recipe="walk-jog-walk")
     keys = [line.split() for line in clip.text("_gait.txt").splitlines()]

@@ -65,12 +65,6 @@ def test_a_faster_jog_has_larger_movements(holden31):
     assert flight[0] > 0.15
 
 
-def test_both_feet_are_on_the_ground_for_a_fifth_of_the_cycle(walking):
-    both = walking.down("Left") & walking.down("Right")
-    shares = [both[a:b].mean() for a, b in brisk(walking, "Right")]
-    assert np.mean(shares) == pytest.approx(0.20, abs=0.035)
-
-
 def test_only_a_jog_has_both_feet_off_the_ground(walking, written):
     assert (walking.down("Left") | walking.down("Right")).mean() > 0.999
     jog = written("jog", recipe="jog", frames=700)

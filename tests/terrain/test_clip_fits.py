@@ -82,22 +82,6 @@ def test_heights_are_ordered_left_centre_right_from_past_to_future() -> None:
             assert np.allclose(heights[row, 1, side], 7 + at[:, 1])
 
 
-def test_the_file_holds_the_data_for_database_and_picture(
-    made: SimpleNamespace, patches: Patches, tmp_path: Path
-) -> None:
-    walk = made.walk(GROUNDS["waves"])
-    fits = clip_fits(walk.clip, walk.labels, patches, "rocky", made.options(), made.database())
-    save_fits(tmp_path / "f.npz", fits)
-    data = np.load(tmp_path / "f.npz")
-    assert {"frame", "cycle", "fits", "heights", "patch", "error", "foot_error", "foot_below"} <= {*data}
-    assert data["pictures"] == 2
-    assert data["picture0_ground"].shape == (24, 24)
-    assert data["picture1_soles"].shape[1:] == (4, 3)
-    soles, x, z = data["picture0_soles"], data["picture0_x"], data["picture0_z"]
-    assert x[0] < soles[..., 0].min() < soles[..., 0].max() < x[-1]
-    assert z[0] < soles[..., 2].min() < soles[..., 2].max() < z[-1]
-
-
 def test_a_clip_without_cycles_has_no_fits(made: SimpleNamespace, patches: Patches, tmp_path: Path) -> None:
     walk = made.walk(GROUNDS["waves"])
     labels = {**walk.labels, "cycles": np.zeros((0, 2), int)}
@@ -140,18 +124,6 @@ def test_heights_of_joints_above_their_soles(made: SimpleNamespace, holden31: Sk
     expected = walk.clip.positions[:, -4:, 1] - np.where(IS_HEEL, 5.0, 4.5)
     assert np.allclose(given.soles[..., 1], expected)
     assert heel_above_toe(holden31) == pytest.approx(4.5)
-
-
-def test_a_low_frame_lowers_the_soles_but_a_capture_error_does_not(made: SimpleNamespace) -> None:
-    walk = made.walk(GROUNDS["level"])
-    frames = np.arange(60, 360)
-    for depth, expected in ((1.6, 2.5 - 0.6), (9.0, 2.5)):
-        feet = walk.clip.positions[:, -4:].copy()
-        feet[100, 1, 1] = 2.5 - depth
-        clip = made.figure(feet, walk.clip.root)
-        found = find_soles(clip, walk.labels["contacts"], frames, True, **AUTO)
-        assert found.toe_height == pytest.approx(expected)
-        assert replace(found).heel_height == pytest.approx(7.0)
 
 
 def honest_over(heightmap: dict, files: list[Path], made: SimpleNamespace) -> None:

@@ -40,18 +40,6 @@ def test_the_surface_solves_the_regularised_system_of_the_original() -> None:
     assert np.allclose(fit_surfaces(at, residual, 0.1)[0].heights_at(elsewhere), expected)
 
 
-def test_a_point_with_weight_m_equals_m_points_at_one_place() -> None:
-    at, residual = points(2, 6)
-    count = np.array([1, 2, 5, 1, 3, 8])
-    many = Stances(np.repeat(at.place, count, axis=0), np.zeros(20), np.ones(20))
-    few = Stances(at.place, at.height, count.astype(float))
-    elsewhere = np.random.default_rng(5).uniform(-300, 300, (40, 2))
-    one = fit_surfaces(many, np.repeat(residual, count, axis=1), 0.1)
-    other = fit_surfaces(few, residual, 0.1)
-    for a, b in zip(one, other, strict=True):
-        assert np.allclose(a.heights_at(elsewhere), b.heights_at(elsewhere), atol=1e-9)
-
-
 @settings(max_examples=20, deadline=None)
 @given(st.integers(0, 10_000))
 def test_only_large_residuals_are_fitted_more_closely_than_in_the_original(seed: int) -> None:

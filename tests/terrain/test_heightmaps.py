@@ -123,11 +123,3 @@ def test_a_bad_file_is_refused_by_name(tmp_path: Path, name: str) -> None:
     with pytest.raises(InputError, match=name) as raised:
         read_heights(tmp_path / name)
     assert says in str(raised.value)
-
-
-def test_a_missing_file_and_an_npz_that_could_mean_two_arrays_are_refused(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="no such heightmap"):
-        read_heights(tmp_path / "gone.txt")
-    np.savez(tmp_path / "two.npz", a=RAMP, b=RAMP)
-    with pytest.raises(InputError, match="which array holds the heights"):
-        read_heights(tmp_path / "two.npz")

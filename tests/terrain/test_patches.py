@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.ndimage import map_coordinates
 
 from hobble.core.errors import HobbleError, InputError
 from hobble.terrain.heightmaps import TerrainMap
@@ -38,20 +37,6 @@ def test_patches_of_a_plane_are_planes_of_mean_zero(a: float, b: float, seed: in
     middle = np.array([-0.5, -0.5])  # of the cells -64 .. 63
     expected = np.einsum("pj,nj->pn", slope, points - middle)
     assert np.allclose(patches.heights_at(range(5), points), expected, atol=1e-3)
-
-
-def test_heights_between_cells_are_bilinear(patches: Patches) -> None:
-    k = np.arange(0, len(patches), 23)
-    points = np.random.default_rng(0).uniform(-64, 63, (200, 2)).astype(np.float32)
-    for p, heights in zip(k, patches.heights_at(k, points), strict=True):
-        m = patches.which[p]
-        rows, columns = patches.shapes[m]
-        start = patches.starts[m]
-        cells = patches.heights[start : start + rows * columns].reshape(rows, columns)
-        at = patches.affine[p].astype(float) @ np.column_stack([points, np.ones(len(points))]).T
-        assert np.allclose(
-            heights, map_coordinates(cells.astype(float), at, order=1) - patches.mean[p], atol=0.02
-        )
 
 
 def test_every_patch_has_mean_zero_and_no_cell_beyond_the_limit(patches: Patches) -> None:
@@ -114,10 +99,3 @@ def test_maps_without_patches_are_refused_by_name() -> None:
         draw(plane(0, 0, rows=90))
     with pytest.raises(HobbleError, match="heightmaps is empty"):
         draw()
-
-
-def test_a_damaged_file_is_refused(tmp_path: Path, patches: Patches) -> None:
-    path = tmp_path / "p.npz"
-    np.savez(path, heights=np.zeros(3))
-    with pytest.raises(InputError, match=r"p\.npz: has no shapes"):
-        load_patches(path)

@@ -83,14 +83,6 @@ def test_a_file_that_is_not_csv_is_refused_with_one_message(folder, root, capsys
     assert len(capsys.readouterr().err) < 300 + len(str(folder))
 
 
-def test_clips_in_subfolders_and_in_capitals_are_found(folder):
-    (folder / "takes").mkdir()
-    (folder / "walk.bvh").rename(folder / "takes/walk.BVH")
-    (path,) = write_statuses(table(folder, "walk,LowerBack-Spine,3,,\n"), folder, LINKS)
-    assert path == folder / "takes/walk_injuries.txt"
-    assert path.is_file()
-
-
 def test_the_command_writes_status_files_and_reports_an_unknown_link(folder, root, capsys):
     skeleton = str(root / "config/skeletons/holden31.yaml")
     path = table(folder, "walk,RightFoot-RightToeBase,5,,\n")

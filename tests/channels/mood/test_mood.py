@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from pydantic import ValidationError
 
 from hobble.channels import ClipSource, channel
 from hobble.channels.clip_values import read_clip_values
@@ -46,11 +45,3 @@ def test_a_mood_holds_in_every_frame_of_a_clip(clip: Clip, name: str, value: obj
 def test_an_unknown_mood_in_a_clip_entry_is_refused(holden31: Skeleton, value: object) -> None:
     with pytest.raises(InputError, match=r"walk\.channels\.mood: cannot be .*sad"):
         channel("mood").check(source("walk", value), holden31)
-
-
-def test_a_misspelt_option_of_the_mood_channel_is_refused() -> None:
-    with pytest.raises(ValidationError, match="pattern"):
-        CHANNEL.make_source({"clip": "walk_tired_1", "options": {"pattern": {"*": {"sad": 1}}}})
-    with pytest.raises(ValidationError, match="bored"):
-        CHANNEL.make_source({"clip": "walk_tired_1", "options": {"patterns": {"*": {"bored": 1}}}})
-    assert CHANNEL.make_source({"clip": "walk", "options": PATTERNS}).options == CHANNEL.options_of(PATTERNS)
