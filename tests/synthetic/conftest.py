@@ -1,4 +1,4 @@
-"""Measures the walker from its files, without any of the code that wrote them."""
+"""Measures the walker from its files."""
 
 from __future__ import annotations
 
@@ -13,9 +13,10 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
-from scipy.spatial.transform import Rotation
 
 from hobble.core.skeleton import Skeleton
+from hobble.motion.make import raw_clip
+from hobble.motion.read import read_bvh
 from hobble.synthetic.generate_clip import write_clip
 from hobble.synthetic.options import Synthetic
 
@@ -36,7 +37,9 @@ class Files:
     @cached_property
     def bvh(self) -> tuple[list[str], float, Array]:
         """Joint names, frame time, (F, J, 3) positions of every frame of the file."""
-        return read_bvh(self.text(".bvh"))
+        bvh = read_bvh(self.folder / f"{self.name}.bvh")
+        clip = raw_clip(bvh)
+        return list(clip.skeleton.joints), bvh.frame_time, clip.positions
 
     @cached_property
     def positions(self) -> Array:
@@ -97,38 +100,6 @@ class Files:
             if slowest <= speed <= fastest:
                 out.append((int(a), int(b)))
         return out
-
-
-def read_bvh(text: str) -> tuple[list[str], float, Array]:
-    """Names, frame time and world positions, by matrices; every joint must rotate in the order ZYX."""
-    head, motion = text.split("MOTION\n")
-    names: list[str] = []
-    parents: list[int] = []
-    offsets: list[list[float]] = []
-    stack: list[int] = []
-    for words in (line.split() for line in head.splitlines()):
-        if words[0] in ("ROOT", "JOINT", "End"):
-            parents.append(stack[-1] if stack else -1)
-            names.append(words[1])
-            stack.append(len(names) - 1)
-        elif words[0] == "OFFSET":
-            offsets.append([float(x) for x in words[1:]])
-        elif words[0] == "}":
-            stack.pop()
-        elif words[0] == "CHANNELS":
-            assert words[-3:] == ["Zrotation", "Yrotation", "Xrotation"]
-    lines = motion.splitlines()
-    table = np.array([np.fromstring(line, sep=" ") for line in lines[2:]])
-    assert int(lines[0].split()[1]) == len(table)
-    moving = [i for i, name in enumerate(names) if name != "Site"]
-    turns: dict[int, Array] = {}
-    places = np.empty((len(table), len(names), 3))
-    for n, i in enumerate(moving):
-        turn = Rotation.from_euler("ZYX", table[:, 3 + 3 * n : 6 + 3 * n], degrees=True).as_matrix()
-        p = parents[i]
-        turns[i] = turn if p < 0 else turns[p] @ turn
-        places[:, i] = table[:, :3] if p < 0 else places[:, p] + turns[p] @ np.array(offsets[i])
-    return [names[i] for i in moving], float(lines[1].split()[2]), places[:, moving]
 
 
 @pytest.fixture(scope="session")
