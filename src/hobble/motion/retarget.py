@@ -225,7 +225,8 @@ def _with_level_pelvis(how: Retarget, clip: Clip, rotations: Array) -> Retarget:
     if abs(heights[0] - heights[1]) > UNEVEN:
         return how
     left = at["left_hip"] - at["right_hip"]
-    width = how.scale * float(np.median(np.linalg.norm(left, axis=-1)))
+    rest = rest_positions(how.target)
+    width = float(np.linalg.norm(rest[how.target.role("left_hip")] - rest[how.target.role("right_hip")]))
     lean = float(np.mean(np.arcsin(np.clip(unit(left)[:, 1], -1.0, 1.0))))
     needed = np.arcsin(np.clip((how.lifts[0] - how.lifts[1] - heights[0] + heights[1]) / width, -0.3, 0.3))
     sign = np.sign(needed)
