@@ -134,3 +134,45 @@ rule export_engine:
         ),
     script:
         "../scripts/export_engine.py"
+
+
+rule engine_libraries:
+    """The runtime in C as shared libraries for Windows, macOS and Linux, the same for all configurations."""
+    input:
+        sources=rules.engine_wasm.input.sources,
+    output:
+        folder=directory("results/page/engine_libraries"),
+    log:
+        "results/page/logs/runtime/engine_libraries.log",
+    resources:
+        mem_mb=1500,
+        runtime=10,
+    params:
+        code=package.code("engine_libraries"),
+    script:
+        "../scripts/engine_libraries.py"
+
+
+rule blender_addon:
+    """An add-on for Blender that walks the character along a curve, with the runtime in C and the body."""
+    input:
+        engine=rules.export_engine.output.folder,
+        body=rules.export_glb.output.glb,
+        libraries=rules.engine_libraries.output.folder,
+        addon=keep_local(
+            [
+                f"{package.base}/workflow/blender/hobble_blender/{name}"
+                for name in ("__init__.py", "blender_manifest.toml")
+            ]
+        ),
+    output:
+        addon="results/{configuration}/export/hobble_blender.zip",
+    log:
+        "results/{configuration}/logs/runtime/blender_addon.log",
+    resources:
+        mem_mb=500,
+        runtime=5,
+    params:
+        code=package.code("blender_addon"),
+    script:
+        "../scripts/blender_addon.py"

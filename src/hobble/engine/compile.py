@@ -18,6 +18,15 @@ WASM_OPTIONS = (
 )
 WASM_SOURCES = tuple(SOURCES / name for name in ("hobble.c", "hobble_gait.c", "hobble_web.c"))
 
+# The runtime as a library for other programs: name of the file -> target of the compiler.
+LIBRARIES = {
+    "windows-x64.dll": "x86_64-windows-gnu",
+    "macos-arm64.dylib": "aarch64-macos",
+    "macos-x64.dylib": "x86_64-macos",
+    "linux-x64.so": "x86_64-linux-gnu.2.17",
+    "linux-arm64.so": "aarch64-linux-gnu.2.17",
+}
+
 
 def compile_c(sources: Sequence[str | Path], target: str | Path, options: Sequence[str]) -> None:
     """Compile C files into the file `target`. Raises HobbleError with what the compiler says."""
@@ -34,3 +43,18 @@ def compile_c(sources: Sequence[str | Path], target: str | Path, options: Sequen
 def compile_wasm(target: str | Path) -> None:
     """Compile the runtime to WebAssembly. The first time takes half a minute: zig builds its C library."""
     compile_c(WASM_SOURCES, target, WASM_OPTIONS)
+
+
+def compile_libraries(folder: str | Path) -> None:
+    """Compile the runtime to a shared library for each of LIBRARIES."""
+    Path(folder).mkdir(parents=True, exist_ok=True)
+    for name in LIBRARIES:
+        compile_library(Path(folder) / name)
+
+
+def compile_library(target: Path) -> None:
+    """Compile the runtime to a shared library. The file's name is one of LIBRARIES."""
+    system = LIBRARIES[target.name]
+    processor = ["-mcpu=x86_64_v2"] if system.startswith("x86_64") else []
+    options = ["-target", system, *processor, "-O3", "-shared", "-fPIC", "-s"]
+    compile_c([SOURCES / "hobble.c"], target, options)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+import zipfile
 from pathlib import Path
 
 from hobble.core.files import atomic_path
@@ -35,3 +36,25 @@ def export_engine(folder: str | Path, network: Network, runtime: Runtime, wasm: 
         target.parent.mkdir(parents=True, exist_ok=True)
         with atomic_path(target) as temporary:
             shutil.copyfile(source, temporary)
+
+
+def write_blender_addon(
+    path: str | Path, addon: str | Path, libraries: str | Path, character: str | Path, body: str | Path
+) -> None:
+    """Write the add-on for Blender as a zip file that Blender installs, with the character.
+
+    addon: the folder of its code. libraries: the folder of `hobble.engine.compile.compile_libraries`.
+    character: character.hob. body: character.glb.
+    """
+    files = {file.name: file for file in Path(addon).iterdir() if file.is_file()}
+    # For Windows, the compiler also leaves a file for linkers in the folder.
+    compiled = (file for file in Path(libraries).iterdir() if file.suffix != ".lib")
+    files |= {f"libraries/{file.name}": file for file in compiled}
+    files |= {"hobble_ctypes.py": EXAMPLES / "hobble_ctypes.py"}
+    files |= {"character.hob": Path(character), "character.glb": Path(body)}
+    with atomic_path(path) as temporary, zipfile.ZipFile(temporary, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, file in sorted(files.items()):
+            # With a fixed time, the same files give the same bytes.
+            archive.writestr(
+                zipfile.ZipInfo(f"hobble_blender/{name}"), file.read_bytes(), zipfile.ZIP_DEFLATED
+            )
