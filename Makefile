@@ -61,7 +61,8 @@ check: env       ## check lint, format and types
 	$(BIN)/snakemake --lint >/dev/null || $(BIN)/snakemake --lint
 	$(BIN)/mypy
 
-docs: env        ## build the documentation site in site/
+docs: env        ## build the documentation site in site/, with loops of the limps of results/limp
+	$(BIN)/snakemake -c$(CORES) results/limp/stimuli
 	$(BIN)/python -m pip install --quiet --editable ".[docs]"
 	$(BIN)/mkdocs build --strict --quiet
 

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from hobble.channels import channel as channel_named
 from hobble.core.skeleton import Skeleton, forward_kinematics
 from hobble.models.pfnn import Pfnn
 from hobble.rows.layout import RowLayout
@@ -39,13 +40,14 @@ def make_network(holden31: Skeleton) -> MakeNetwork:
 
     def make(
         links: int = 0,
+        channel: str = "injury",
         scale: float = 1.0,
         speed: float = 1.5,
         turn: float = 0.0,
         control_points: int = 4,
         skeleton: Skeleton = holden31,
     ) -> Pfnn:
-        layout = RowLayout(len(skeleton.joints), channels=(("injury", links),) if links else ())
+        layout = RowLayout(len(skeleton.joints), channels=((channel, links),) if links else ())
         rng = np.random.default_rng(5)
         sizes = (layout.x_size, 23, 17, layout.y_size)
         shapes = list(zip(sizes[1:], sizes, strict=False))
@@ -65,7 +67,7 @@ def make_network(holden31: Skeleton) -> MakeNetwork:
             y_std=np.full(layout.y_size, 0.05, np.float32),
             layout=layout,
             skeleton=skeleton,
-            channels={"injury": skeleton.link_names[:links]} if links else {},
+            channels={channel: channel_named(channel).columns(skeleton)[:links]} if links else {},
         )
 
     return make

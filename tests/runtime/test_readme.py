@@ -1,9 +1,8 @@
-"""The code in README runs as it stands, and the three names of a link are one."""
+"""The Python in README and docs runs as it stands, and the three names of a link are one."""
 
 from __future__ import annotations
 
-import textwrap
-from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,25 +11,31 @@ from hobble.channels.injury.shown import other_names, spoken_links
 from hobble.core.skeleton import Skeleton
 from hobble.models.network import Network
 from hobble.runtime import ProceduralAnimation
+from tests.conftest import ROOT
+from tests.snippets import blocks
+
+PYTHON = list(blocks(ROOT, "python"))
 
 
-def test_the_code_in_readme_runs(
-    root: Path, hurtable: Network, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize("page", sorted({block.page for block in PYTHON}))
+def test_the_code_of_a_page_runs(
+    hurtable: Network, make_network: Any, page: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    text = (root / "README.md").read_text(encoding="utf-8")
-    section = text.partition("## The character in your program\n")[2].partition("\n##")[0]
-    code = textwrap.dedent("".join(line for line in section.splitlines(True) if line.startswith("    ")))
-    assert "next_pose" in code
+    """Its blocks one after another, with fewer frames and with untrained networks."""
+    network = make_network(links=5, channel="mood") if "moods" in page else hurtable
     loaded: list[str] = []
 
-    def load(path: str) -> ProceduralAnimation:
+    def load(path: str, **options: Any) -> ProceduralAnimation:
         loaded.append(path)
-        return ProceduralAnimation(hurtable)
+        return ProceduralAnimation(network, **options)
 
     monkeypatch.setattr(ProceduralAnimation, "load", load)
-    names: dict = {}
-    exec(compile(code.replace("range(600)", "range(20)"), "README.md", "exec"), names)
-    assert loaded == ["results/limp/network"]
+    monkeypatch.chdir(ROOT)
+    names: dict[str, Any] = {}
+    for block in PYTHON:
+        if block.page == page:
+            exec(compile(block.text.replace("range(600)", "range(20)"), page, "exec"), names)
+    assert loaded
     assert np.isfinite(names["pose"].positions).all()
 
 
