@@ -13,6 +13,7 @@ from hobble.channels import channel
 from hobble.gait.cycles import CURVES, SCALARS, SIGN_CHANGES, Cycle, WalkCycles
 from hobble.gait.profile import NORMAL, profile_of_walk, read_people
 from hobble.measures import limp_run as module
+from hobble.measures.limp import gallery_chart
 from hobble.measures.limp_run import (
     SEVERITIES,
     CapturedWalk,
@@ -198,6 +199,22 @@ def test_a_captured_limp_is_compared_with_its_own_performer() -> None:
     assert healthy == profile_of_walk(own.walk)
     assert healthy_reference(hurt, [hurt])[1] == "people"
     assert limp_distance(healthy, healthy, healthy, healthy) == 0
+
+
+def test_captured_limps_stand_beside_the_character_with_their_injury(hurtable, holden31) -> None:
+    """Held-out clips first, no mirrors, at most six; without captured limps the page says how to get them."""
+    cycle = np.arange(24.0)[:, None, None] * np.ones((24, 31, 3))
+    names = [*(f"8_{n}" for n in range(8)), "7_1", "7_1_mirror"]
+    every = [replace(clip(name, {RIGHT_KNEE: 8.0}, {}), cycle=cycle) for name in names]
+    rows = module.gallery(hurtable, [*every, clip("7_2", {}, {})], {"7_1": "held_out"}, 1.0, Runtime())
+    assert [row["clip"] for row in rows] == ["7_1", "8_0", "8_1", "8_2", "8_3", "8_4"]
+    assert rows[0]["poses"]["captured"] == cycle[::3].tolist()
+    assert {np.shape(poses) for poses in rows[0]["poses"].values()} == {(8, 31, 3)}
+    skeleton = holden31.to_dict()
+    chart = gallery_chart({"gallery": rows[:1]}, skeleton)
+    assert list(chart.options) == [f"7_1 ({RIGHT_KNEE} 8), from {view}" for view in ("the side", "behind")]
+    assert len(chart.options[next(iter(chart.options))]) == 4
+    assert "no captured limp" in gallery_chart({"gallery": []}, skeleton).text
 
 
 def test_generated_hurt_clips_are_recognised_by_their_names() -> None:

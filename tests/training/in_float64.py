@@ -76,7 +76,7 @@ def one(job: dict[str, Any], processes: Processes) -> None:
     Database.chunks_per_window = (lambda *_: window) if window else WINDOW  # type: ignore[method-assign]
     training = Training.model_validate(job["training"])
     state = module.train(
-        Database.open(job["database"], training.memory_mb, training.phase_weight),
+        Database.open(job["database"], training.memory_mb, training.phase_weight, training.scales),
         network=network_options(job["network"]),
         training=training,
         checkpoints=Path(job["checkpoints"]),

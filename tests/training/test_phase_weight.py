@@ -1,4 +1,4 @@
-"""The weight of the phase in the loss."""
+"""The weight of the phase in the loss, and channels whose inputs are divided."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import torch
 
+from hobble.core.errors import InputError
 from hobble.database.reader import Database
 from hobble.models.forward import forward, phase_shares
 from hobble.models.pfnn import PfnnOptions
@@ -29,6 +30,21 @@ def test_only_the_error_of_the_phase_gets_the_weight(data: Database) -> None:
     assert np.array_equal(weighted_x, x)
     np.testing.assert_allclose(weighted_y[:, at], 8 * y[:, at], rtol=1e-4, atol=1e-5)
     assert np.array_equal(np.delete(weighted_y, at, axis=1), np.delete(y, at, axis=1))
+
+
+def test_only_the_inputs_of_a_divided_channel_are_smaller(data: Database, small_database: Path) -> None:
+    """Raw values stay the same, so a network of the divided rows takes the same severities as any other."""
+    whole, divided = data, Database.open(small_database, 64, scales={"injury": 5.0})
+    (x, y), (divided_x, divided_y) = block(whole), block(divided)
+    columns = data.layout.x_channel("injury")
+    assert np.abs(x[:, columns]).max() > 0
+    np.testing.assert_allclose(5 * divided_x[:, columns], x[:, columns], rtol=2e-3, atol=1e-6)
+    assert np.array_equal(np.delete(divided_x, columns, axis=1), np.delete(x, columns, axis=1))
+    assert np.array_equal(divided_y, y)
+    raw = [block(d)[0] * d.statistics.x_std + d.statistics.x_mean for d in (whole, divided)]
+    np.testing.assert_allclose(*raw, rtol=2e-3, atol=1e-3)
+    with pytest.raises(InputError, match="the channel mood is not in this database"):
+        Database.open(small_database, 64, scales={"mood": 2.0})
 
 
 class Means:

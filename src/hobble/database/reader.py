@@ -18,7 +18,7 @@ from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
-from hobble.core.errors import HobbleError
+from hobble.core.errors import HobbleError, InputError
 from hobble.core.quat import Array
 from hobble.database import order
 from hobble.database.chunks import (
@@ -132,16 +132,24 @@ class Database:
     _loaded: dict[str, ChunkWindow] = field(default_factory=dict, repr=False)
     _verified: set[str] = field(default_factory=set, repr=False)
     phase_weight: float = 1.0
-    _phase_factor: float = 1.0  # of the stored standardised change of phase
+    # Table of rows, columns in it, and the factor of what is stored there.
+    _factors: tuple[tuple[str, slice, float], ...] = ()
 
     @classmethod
-    def open(cls, path: str | Path, memory_mb: int = 512, phase_weight: float = 1.0) -> Database:
+    def open(
+        cls,
+        path: str | Path,
+        memory_mb: int = 512,
+        phase_weight: float = 1.0,
+        scales: Mapping[str, float] | None = None,
+    ) -> Database:
         """Open the database folder `path`.
 
         memory_mb: MiB of memory for rows, for each section that is being read. A database that fits is read
         once. The chunks of a larger one are read again for every layer. phase_weight: factor of the
         standardised change of phase. Its squared error then counts `phase_weight`^2 times in a mean over the
-        columns of Y. Raises InputError if the database is not complete.
+        columns of Y. scales: channel -> number by which its standardised columns of X are divided. Raises
+        InputError if the database is not complete or has no such channel.
         """
         path = Path(path)
         manifest = Manifest.load(path)
@@ -149,8 +157,18 @@ class Database:
         column = manifest.layout.y_phase_change
         stored = float(statistics.y_std[column][0])
         statistics.y_std[column] /= phase_weight
-        factor = stored / float(statistics.y_std[column][0])
-        return cls(path, manifest, statistics, memory_mb, phase_weight=phase_weight, _phase_factor=factor)
+        factors = [("y", column, stored / float(statistics.y_std[column][0]))]
+        body = np.delete(np.arange(manifest.layout.x_size), manifest.layout.x_terrain)  # columns of a row
+        for name, scale in (scales or {}).items():
+            if name not in dict(manifest.layout.channels):
+                fix = "Leave it out of `scales`, or add it to the configuration's `channels`."
+                raise InputError(path, f"the channel {name} is not in this database", fix=fix)
+            block = manifest.layout.x_channel(name)
+            statistics.x_std[block] *= scale
+            first = int(np.searchsorted(body, block.start))
+            factors.append(("x", slice(first, first + block.stop - block.start), 1 / scale))
+        changed = tuple(each for each in factors if each[-1] != 1.0)
+        return cls(path, manifest, statistics, memory_mb, phase_weight=phase_weight, _factors=changed)
 
     @property
     def layout(self) -> RowLayout:
@@ -338,10 +356,10 @@ class Database:
             )
             self._verified.add(chunk.file)
             row, fit = rows.stop, fits.stop
-        if self._phase_factor != 1.0:
-            phase_change = tables["y"][:, self.layout.y_phase_change]
-            weighted = to_floats(phase_change).astype(np.float32) * np.float32(self._phase_factor)
-            phase_change[...] = to_stored_type(weighted, self.manifest.dtype)
+        for table, columns, factor in self._factors:
+            values = tables[table][:, columns]
+            changed = to_floats(values).astype(np.float32) * np.float32(factor)
+            values[...] = to_stored_type(changed, self.manifest.dtype)
         return ChunkWindow(numbers, [c.rows for c in wanted], order.first_fits(tables["count"]), **tables)
 
     def _compose_blocks(self, picked: Iterator[PickedRows], total: int, block_rows: int) -> Iterator[Block]:

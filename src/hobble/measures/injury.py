@@ -19,7 +19,17 @@ from hobble.core.files import Json
 from hobble.core.section import PositiveFloat, Section
 from hobble.measures.compare import ComparisonAddition, ConfigurationResults
 from hobble.measures.measure import Cost, Measure
-from hobble.measures.shown import Records, chart, table, words
+from hobble.measures.shown import (
+    BARE,
+    STRIP_HEIGHT,
+    STRIP_WIDTH,
+    Records,
+    chart,
+    stick_figures,
+    strip_texts,
+    table,
+    words,
+)
 from hobble.report.parts import (
     Chart,
     ChartGroup,
@@ -69,7 +79,6 @@ GAIT_COLOURS = {"walk": "@accent", "jog": "@g2"}
 COLOURS = ("@accent", "@g2", "@g3", "@g4", "@g5", "@g0")  # of the lines in a chart
 # The marker of links that were never hurt in training.
 HOLLOW = {"symbol": "circle-open", "size": 8, "line": {"width": 1.2}}
-STRIP_WIDTH, STRIP_HEIGHT = 110.0, 205.0  # cm between the figures of a strip
 SIDES = (("left", "@accent"), ("right", "@g2"))  # side of the body, colour
 # A small chart: its name, title and unit; its lines as (key of a row, label, colour).
 Panel = tuple[str, str, str, Sequence[tuple[str, str, str]]]
@@ -232,27 +241,17 @@ def strip_chart(strips: Rows, skeleton: Json) -> Chart | None:
     """Poses at rising severity, from the side and from the front: Figures 3 and 4 of Ferre et al. (2019)."""
     if not strips:
         return None
-    joints = list(skeleton["joints"])
-    bones = [(joints.index(j["parent"]), i) for i, j in enumerate(skeleton["joints"].values()) if j["parent"]]
-
-    def figure(pose: Any, place: float) -> list[Trace]:
-        """A pose from the side, walking to the right, and above it from the front."""
-        p = np.array(pose)
-        views = [(p[:, 2] + place, p[:, 1]), (p[:, 0] + place, p[:, 1] + STRIP_HEIGHT)]
-        points = [((x[a], x[b], None), (y[a], y[b], None)) for x, y in views for a, b in bones]
-        xs, ys = ([v for point in points for v in point[axis_]] for axis_ in (0, 1))
-        return [line_trace("", xs, ys, "@accent", width=3, showlegend=False, hoverinfo="skip")]
-
     options: dict[str, list[Trace]] = {}
     for strip in strips:
         first = f"{strip['first']} at {strip['first_severity']:g}, and " if strip["first"] else ""
-        places = [STRIP_WIDTH * n for n in range(len(strip["poses"]))]
-        texts = [f"{severity:g}" for severity in strip["severities"]]
-        label = marker_trace("", places, [-14.0] * len(places), {"size": 1}, mode="text", text=texts)
-        figures = [t for p, x in zip(strip["poses"], places, strict=True) for t in figure(p, x)]
-        options[first + strip["link"]] = [*figures, {**label, "showlegend": False, "hoverinfo": "skip"}]
-    bare = {"showgrid": False, "zeroline": False, "showticklabels": False}
-    layout = {"xaxis": {**bare, "title": {"text": "severity"}}, "yaxis": {**bare, "scaleanchor": "x"}}
+        places = [(STRIP_WIDTH * n, -14.0) for n in range(len(strip["poses"]))]
+        poses = np.array(strip["poses"])
+        options[first + strip["link"]] = [
+            stick_figures(skeleton, poses, "@accent"),
+            stick_figures(skeleton, poses, "@accent", "front", STRIP_HEIGHT),
+            strip_texts([f"{severity:g}" for severity in strip["severities"]], places),
+        ]
+    layout = {"xaxis": {**BARE, "title": {"text": "severity"}}, "yaxis": {**BARE, "scaleanchor": "x"}}
     return chart("strips", layout=layout, height=520, choose="Injury", options=options)
 
 

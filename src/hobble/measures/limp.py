@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 from pydantic import Field
 
 from hobble.channels.shown import shown_names
@@ -16,7 +17,17 @@ from hobble.core.files import Json
 from hobble.core.section import PositiveFloat
 from hobble.measures.injury import with_spoken_links
 from hobble.measures.measure import Cost, Measure, SampleOptions, sample_sentence
-from hobble.measures.shown import Records, chart, table, words
+from hobble.measures.shown import (
+    BARE,
+    STRIP_HEIGHT,
+    STRIP_WIDTH,
+    Records,
+    chart,
+    stick_figures,
+    strip_texts,
+    table,
+    words,
+)
 from hobble.report.parts import (
     Chart,
     PageSection,
@@ -99,6 +110,7 @@ def section(found: Json, material: ReportMaterial) -> PageSection:
     parts = [
         SectionPart(1, Paragraph(sources)),
         SectionPart(2, size_chart(found)),
+        SectionPart(2, gallery_chart(found, material.network["skeleton"], shown_name)),
         SectionPart(3, Paragraph(words("limp.recognisers"))),
         SectionPart(3, of("named", found["named"], {"severity": "severity", "walks": "walks", **RECOGNISED})),
         SectionPart(4, of("exam", exam, EXAM)),
@@ -132,6 +144,32 @@ def hurt_motion_in_words(
     if any(len(by_link) > 1 for by_link in hurt_seconds.values()):
         sentences.append("A second in which two links hurt counts twice.")
     return " ".join(sentences) or "No link was hurt in training."
+
+
+def gallery_chart(found: Json, skeleton: Json, shown_name: Callable[[str], str] = str) -> Chart | Paragraph:
+    """Captured limps above the character with the same injury and the healthy character, over a gait cycle.
+
+    A menu chooses the limp, and whether it is seen from the side or from behind.
+    """
+    if not found["gallery"]:
+        return Paragraph(words("limp.no-gallery"))
+    options: dict[str, list[Trace]] = {}
+    rows = {"captured": ("@ink", 2), "character": ("@accent", 1), "healthy": ("@muted", 0)}
+    for limp in found["gallery"]:
+        hurt = ", ".join(f"{shown_name(link)} {severity:g}" for link, severity in limp["hurt"].items())
+        labels = (f"{limp['clip']}, captured", f"the character, {hurt}", "the healthy character")
+        for view in ("side", "behind"):
+            options[f"{limp['clip']} ({hurt}), from {'the ' * (view == 'side')}{view}"] = [
+                *(
+                    stick_figures(skeleton, np.array(limp["poses"][key]), colour, view, STRIP_HEIGHT * row)
+                    for key, (colour, row) in rows.items()
+                ),
+                strip_texts(
+                    labels, [(1.5 * STRIP_WIDTH, STRIP_HEIGHT * (row + 1) - 12) for row in (2, 1, 0)]
+                ),
+            ]
+    layout = {"xaxis": BARE, "yaxis": {**BARE, "scaleanchor": "x"}}
+    return chart("limp-gallery", layout=layout, height=560, choose="Captured limp", options=options)
 
 
 def size_chart(found: Json) -> Chart:

@@ -36,7 +36,17 @@ from hobble.gait.recognise import SIDES, compare_walk, examples_of_people
 from hobble.hurt.effects import part_of_link
 from hobble.measures.measure import MeasureInputs, Outcome
 from hobble.measures.sample import HURT_VERSION, ClipPart, clip_parts, sample_to_measure, with_sample
-from hobble.measures.walks import FPS, channel_values, mean_of_known, share_of_true, spearman
+from hobble.measures.walks import (
+    FPS,
+    PHASES,
+    CrowdTarget,
+    channel_values,
+    generate_walks,
+    mean_cycle,
+    mean_of_known,
+    share_of_true,
+    spearman,
+)
 from hobble.models.load import load_network
 from hobble.models.network import Network
 from hobble.rows.clip_rows import ClipRows, captured_stretches, rotate_by_yaw
@@ -50,6 +60,7 @@ SPEEDS = {"walk": 2.0, "jog": 7.0}  # target speeds, cm a frame; 2 is 1.2 m/s, a
 LEG = ("hip", "thigh", "shank", "foot")  # parts of the body that belong to a leg
 WARM_UP_FRAMES = 5 * FPS  # frames that are not measured, while figures reach their speed and begin to limp
 RECOGNISED = ("impaired", "named", "wrong_side")  # keys of a row: shares of its windows
+IN_GALLERY = 6  # captured limps that the report shows beside the character
 MIRROR = "_mirror"  # end of the name of a mirrored clip
 Rows = list[dict[str, Any]]
 Injury = Mapping[str, float]  # link -> severity
@@ -73,12 +84,14 @@ class FigureWalk:
 class CapturedWalk:
     """The walk in one captured clip. The severities are the same in all its frames.
 
-    severity_by_link: those of the links that hurt. walk: the gait cycles.
+    severity_by_link: those of the links that hurt. walk: the gait cycles. cycle: their mean poses, see
+    `hobble.measures.walks.mean_cycle`.
     """
 
     clip: str
     severity_by_link: Injury
     walk: WalkCycles = field(repr=False)
+    cycle: Array = field(default_factory=lambda: np.zeros((PHASES, 0, 3)), repr=False)
 
     @property
     def performer(self) -> str:
@@ -169,7 +182,7 @@ def _walk_of_clip(
     )
     if np.ptp(severity, axis=0).any():
         return None
-    walks = []
+    walks, stretches = [], []
     for rows in rows_of_clip:
         turn = rows.y[:, rows.layout.y_turn][:, 0].astype(float)
         for stretch in captured_stretches(rows):
@@ -180,9 +193,13 @@ def _walk_of_clip(
             world = stretch.local.copy()
             world[..., ::2] = rotate_by_yaw(world[..., ::2], yaw[:, None])
             walks.append(measure_cycles(skeleton, world + stretch.root[:, None], FPS))
+            stretches.append(stretch)
     walk = join_walks(walks) if walks else WalkCycles(FPS, (), ())
     hurt = {link: float(value) for link, value in zip(links, severity[0], strict=True) if value > 0}
-    return CapturedWalk(clip, hurt, walk) if len(walk) else None
+    if not len(walk):
+        return None
+    local, phase = (np.concatenate([getattr(s, name) for s in stretches]) for name in ("local", "phase"))
+    return CapturedWalk(clip, hurt, walk, mean_cycle(local, phase))
 
 
 def healthy_reference(captured_walk: CapturedWalk, walks: Sequence[CapturedWalk]) -> tuple[Profile, str]:
@@ -242,6 +259,7 @@ def measure_limps(
             _row_of_clip(network.skeleton, clip, captured) for clip in captured if clip.severity_by_link
         ],
         "held_out_limps": compare_held_out(network, captured, splits, seconds, runtime),
+        "gallery": gallery(network, captured, splits, seconds, runtime),
         "together": together,
         "named_together": _recognition_by_column(together),
     }
@@ -452,6 +470,49 @@ def compare_held_out(
         distances = {"healthy": round(from_healthy, 5), "hurt": round(from_hurt, 5)}
         out.append({**row, **distances, "nearer": from_hurt < from_healthy})
     return out
+
+
+def gallery(
+    network: Network,
+    captured: Sequence[CapturedWalk],
+    splits: Mapping[str, str],
+    seconds: float,
+    runtime: Runtime,
+) -> Rows:
+    """Poses of captured limps over a gait cycle, and of the character with the same injuries and healthy.
+
+    There are at most IN_GALLERY, held-out clips and strong limps first. `poses`: "captured", "character" or
+    "healthy" -> (8, J, 3) places of the joints relative to the root at 8 phases, cm; `phases`.
+    """
+    limps = [clip for clip in captured if clip.severity_by_link and not clip.clip.endswith(MIRROR)]
+    limps.sort(key=lambda c: (splits.get(c.clip) != "held_out", -max(c.severity_by_link.values()), c.clip))
+    limps = limps[:IN_GALLERY]
+    if not limps:
+        return []
+    injuries = [{}, *(clip.severity_by_link for clip in limps)]
+    target = CrowdTarget(
+        WARM_UP_FRAMES + max(FPS, round(seconds * FPS)),
+        ["walk"] * len(injuries),
+        channel_values(network, INJURY, injuries),
+        [SPEEDS["walk"]] * len(injuries),
+    )
+    walks = generate_walks(network, [target], runtime)
+    healthy, *hurt = (
+        mean_cycle(walks.local[WARM_UP_FRAMES:, i], walks.phase[WARM_UP_FRAMES:, i])
+        for i in range(len(injuries))
+    )
+    return [
+        {
+            "clip": clip.clip,
+            "hurt": dict(clip.severity_by_link),
+            "phases": [round(b / PHASES, 5) for b in range(0, PHASES, PHASES // 8)],
+            "poses": {
+                name: np.round(cycle[:: PHASES // 8], 1).tolist()
+                for name, cycle in (("captured", clip.cycle), ("character", own), ("healthy", healthy))
+            },
+        }
+        for clip, own in zip(limps, hurt, strict=True)
+    ]
 
 
 def run(inputs: MeasureInputs, options: Any) -> Outcome:

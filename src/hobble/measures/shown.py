@@ -10,12 +10,18 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import yaml
 
+from hobble.core.files import Json
+from hobble.core.quat import Array
 from hobble.report.gather import PUBLISHED
-from hobble.report.parts import Chart, Column, Table, Trace
+from hobble.report.parts import Chart, Column, Table, Trace, line_trace, marker_trace
 
 CAPTIONS = PUBLISHED.with_name("captions.yaml")
+STRIP_WIDTH, STRIP_HEIGHT = 110.0, 205.0  # cm between the figures of a strip
+# Of a strip, whose figures stand for themselves.
+BARE = {"showgrid": False, "zeroline": False, "showticklabels": False}
 Records = Sequence[Mapping[str, Any]]  # rows of a measurement's JSON
 
 
@@ -97,3 +103,25 @@ def boxes(name: str, colour: str, **values: Any) -> Trace:
         "boxpoints": False,
         **values,
     }
+
+
+def stick_figures(skeleton: Json, poses: Array, colour: str, view: str = "side", up: float = 0.0) -> Trace:
+    """The trace of figures side by side, STRIP_WIDTH apart.
+
+    skeleton: the content of its file. poses: (N, J, 3) cm. view: from the "side" (walking to the right), the
+    "front" or "behind". up: how far they stand above the strip's ground, cm.
+    """
+    joints = list(skeleton["joints"])
+    bones = [(joints.index(j["parent"]), i) for i, j in enumerate(skeleton["joints"].values()) if j["parent"]]
+    across = {"side": poses[..., 2], "front": poses[..., 0], "behind": -poses[..., 0]}[view]
+    x, y = across + STRIP_WIDTH * np.arange(len(poses))[:, None], poses[..., 1] + up
+    lines = [[v for pose in axis for a, b in bones for v in (pose[a], pose[b], None)] for axis in (x, y)]
+    return line_trace("", *lines, colour, width=3, showlegend=False, hoverinfo="skip")
+
+
+def strip_texts(texts: Sequence[str], places: Sequence[tuple[float, float]]) -> Trace:
+    """The trace of texts at some places of a strip."""
+    trace = marker_trace(
+        "", *map(list, zip(*places, strict=True)), {"size": 1}, mode="text", text=list(texts)
+    )
+    return {**trace, "showlegend": False, "hoverinfo": "skip"}

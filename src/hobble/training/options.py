@@ -74,6 +74,11 @@ class Recipe(Section):
         description="factor of the error in the change of phase, before errors are squared. The change of "
         "phase is only one of 311 outputs, but decides when each foot lands",
     )
+    scales: dict[str, PositiveFloat] = Field(
+        {},
+        description="for each channel, a number by which its inputs are divided in training and at run time, "
+        "so that it counts less: the network learns milder and smoother effects; default: 1",
+    )
     keep: Literal["last", "best"] = Field(
         "last",
         description="weights to write: those at the end, as in Holden et al. (2017), or those with the "

@@ -110,7 +110,7 @@ def run(
     For a built network, the history has one line, because every frame is read once. Its checkpoint only
     describes the network; training cannot resume from it.
     """
-    data = Database.open(database, training.memory_mb, training.phase_weight)
+    data = Database.open(database, training.memory_mb, training.phase_weight, training.scales)
 
     def write(finished: FinishedNetwork, about: Mapping[str, Any]) -> None:
         write_weights(weights, finished, data, configuration, {**about, "terrain_side": terrain_side})

@@ -167,7 +167,7 @@ def _train(job: dict[str, Any]) -> None:
     training = Training.model_validate(job["training"])
     with join_processes(training.device == "cuda") as processes:
         train(
-            Database.open(job["database"], training.memory_mb, training.phase_weight),
+            Database.open(job["database"], training.memory_mb, training.phase_weight, training.scales),
             network=network_options(job["network"]),
             training=training,
             checkpoints=Path(job["checkpoints"]),
