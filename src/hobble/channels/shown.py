@@ -16,7 +16,6 @@ import importlib
 import importlib.util
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
-from types import ModuleType
 from typing import Any
 
 from hobble.channels import all_channels, channel
@@ -74,8 +73,7 @@ class SampleWalk:
 
 def channel_words(name: str) -> ChannelWords:
     """The texts of the channel `name`."""
-    own_words = _from_module(name, "WORDS")
-    return own_words if isinstance(own_words, ChannelWords) else ChannelWords()
+    return _own(name, "WORDS", ChannelWords())
 
 
 def channel_display(
@@ -85,9 +83,8 @@ def channel_display(
 
     columns: the labels of all columns. trained: the labels of the trained columns.
     """
-    if own_shown := _from_module(name, "shown"):
-        return own_shown(skeleton, columns, trained)
-    return ChannelDisplay(tuple(columns), {column: column for column in columns if column in trained})
+    sliders = {column: column for column in columns if column in trained}
+    return _own(name, "shown", ChannelDisplay(tuple(columns), sliders), skeleton, columns, trained)
 
 
 def channel_sweeps(
@@ -97,9 +94,8 @@ def channel_sweeps(
 
     columns, trained: as in `channel_display`.
     """
-    if own_sweeps := _from_module(name, "sweeps"):
-        return own_sweeps(skeleton, columns, trained)
-    return {column.replace(" ", "_"): column for column in columns if column in trained}
+    default = {column.replace(" ", "_"): column for column in columns if column in trained}
+    return _own(name, "sweeps", default, skeleton, columns, trained)
 
 
 def channel_loops(
@@ -110,13 +106,10 @@ def channel_loops(
     By default there is a walk with all values 0, then one for each trained column with its highest value.
     columns, trained: as in `channel_display`.
     """
-    if own_loops := _from_module(name, "loops"):
-        return own_loops(skeleton, columns, trained)
-    chosen, highest = [column for column in columns if column in trained], channel(name).highest
-    return [
-        SampleWalk(channel_words(name).neutral_button.lower(), {}),
-        *(SampleWalk(c.replace(" ", "-"), {c: highest}) for c in chosen),
-    ]
+    highest = {column: channel(name).highest for column in columns if column in trained}
+    neutral = SampleWalk(channel_words(name).neutral_button.lower(), {})
+    default = [neutral, *(SampleWalk(c.replace(" ", "-"), {c: value}) for c, value in highest.items())]
+    return _own(name, "loops", default, skeleton, columns, trained)
 
 
 def other_names(
@@ -126,8 +119,7 @@ def other_names(
 
     columns, trained: as in `channel_display`.
     """
-    own_names = _from_module(name, "other_names")
-    return own_names(skeleton, columns, trained) if own_names and skeleton is not None else {}
+    return {} if skeleton is None else _own(name, "other_names", {}, skeleton, columns, trained)
 
 
 def shown_names(skeleton: Mapping[str, Any]) -> Callable[[str], str]:
@@ -147,12 +139,13 @@ def shown_names(skeleton: Mapping[str, Any]) -> Callable[[str], str]:
     return lambda column: names.get(column, column)
 
 
-def _own_module(name: str) -> ModuleType | None:
-    """The module channels/<name>/shown.py, or None if the channel has none."""
+def _own(name: str, attribute: str, default: Any, *given: Any) -> Any:
+    """What the module channels/<name>/shown.py says: a value, or what its function returns for `given`.
+
+    default: if there is no such module, or the module has no such attribute.
+    """
     full_name = f"hobble.channels.{name}.shown"
-    return importlib.import_module(full_name) if importlib.util.find_spec(full_name) is not None else None
-
-
-def _from_module(name: str, attribute: str) -> Any:
-    """An attribute of the module channels/<name>/shown.py. None if the module or the attribute is missing."""
-    return getattr(_own_module(name), attribute, None)
+    if importlib.util.find_spec(full_name) is None:
+        return default
+    found = getattr(importlib.import_module(full_name), attribute, None)
+    return default if found is None else found(*given) if callable(found) else found

@@ -25,15 +25,9 @@ from hobble.core.smooth import gaussian
 SIDES = {"L": "left", "R": "right"}
 # Curves of each side.
 LIMBS = (
-    "hip_flexion",
-    "hip_abduction",
-    "knee_flexion",
-    "foot_pitch",
-    "ankle_height",
-    "ankle_forward",
-    "arm_forward",
-    "elbow_flexion",
-)
+    "hip_flexion", "hip_abduction", "knee_flexion", "foot_pitch", "ankle_height", "ankle_forward",
+    "arm_forward", "elbow_flexion",
+)  # fmt: skip
 # Curves of the whole body whose sign changes if the body is mirrored.
 SIGN_CHANGES = ("trunk_left", "pelvis_left_up", "pelvis_turn_left", "shoulders_turn_left")
 CURVES = (

@@ -6,7 +6,7 @@ import numpy as np
 
 from hobble.core import quat
 from hobble.core.quat import Array
-from hobble.core.skeleton import Skeleton, aim_bone
+from hobble.core.skeleton import Skeleton, aim_bone, forward_kinematics
 from hobble.core.smooth import gaussian
 from hobble.hurt.amounts import HARMONICS
 from hobble.hurt.effects import LEFT, RIGHT, SIDES, Effects, joint_and_ancestors
@@ -45,7 +45,7 @@ def change_body(source: HealthyClip, effects: Effects) -> Array:
     """
     skeleton = source.clip.skeleton
     local = _stiffen(source, effects)
-    world = _world_rotations(skeleton, local)
+    world, _ = forward_kinematics(skeleton, local, np.zeros((len(local), 3)))
     pelvis, chest, head = _added_rotations(source, effects)
     trunk_positions = _positions_in_trunk(skeleton)
     for j in range(len(skeleton.joints)):
@@ -57,14 +57,6 @@ def change_body(source: HealthyClip, effects: Effects) -> Array:
         world[:, j] = quat.mul(turn, world[:, j])
     for side in (LEFT, RIGHT):
         _hold_arm(source, effects, world, side)
-    return world
-
-
-def _world_rotations(skeleton: Skeleton, local: Array) -> Array:
-    """World rotations (F, J, 4) of local rotations (F, J, 4)."""
-    world = np.empty_like(local)
-    for j, parent in enumerate(skeleton.parents):
-        world[:, j] = local[:, j] if parent < 0 else quat.mul(world[:, parent], local[:, j])
     return world
 
 

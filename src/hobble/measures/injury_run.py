@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from hobble.channels.injury.shown import link_index_by_part
+from hobble.channels.injury.shown import link_by_part
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 from hobble.measures.measure import MeasureInputs, Outcome
@@ -289,7 +289,7 @@ def second_sweep(
     slower of the walks with only one) to 1 (as the faster).
     """
     assert network.skeleton is not None
-    named = {part: links[i] for part, i in link_index_by_part(network.skeleton, links).items()}
+    named = link_by_part(network.skeleton, links)
     pairs = [(named[a], named[b]) for a, b in PAIRS if a in named and b in named]
     # (first link, its severity, second link) of each figure; those without a first link show the second
     # alone.

@@ -19,7 +19,7 @@ from hobble.models.network import Network
 from hobble.runtime.bounds import SpeedLimiter
 from hobble.runtime.caller_targets import Axes, CallerTargets
 from hobble.runtime.character import Character, Snapshot, start_characters
-from hobble.runtime.controller import Controller, ControllerOptions
+from hobble.runtime.controller import Controller
 from hobble.runtime.ground import as_ground
 from hobble.runtime.network_rows import ChannelValues
 from hobble.runtime.pose import Pose, world_rotations
@@ -93,7 +93,7 @@ class ProceduralAnimation:
         self._channel_values = ChannelValues(network, scales or {})
         self._limit_speed = limits
         self._variation, self._seeds = variation, seed + np.arange(characters)
-        self._controller_options: ControllerOptions = {
+        self._controller_options: dict[str, Any] = {
             "rates": {name: channel(name).rate for name in network.channels} | dict(rates or {}),
             "foot_locking": foot_locking,
             "steering": steering,

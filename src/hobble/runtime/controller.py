@@ -11,7 +11,7 @@ import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import fields
 from time import perf_counter
-from typing import Any, TypedDict
+from typing import Any
 
 import numpy as np
 from numba.extending import register_jitable
@@ -176,35 +176,12 @@ HIGHEST_GROUND = 1e7  # cm, 100 km above or below 0; at larger heights, floats a
 # In each frame the runtime checks that these arrays of the state are finite and not too large. The other
 # arrays are checked when the caller gives them, are computed anew in each frame, or stay within 0 to 1.
 CHECKED = (
-    "position",
-    "direction",
-    "gait",
-    "joint_position",
-    "joint_velocity",
-    "joint_rotation",
-    "phase",
-    "channel_values",
-    "smoothed_velocity",
-    "smoothed_direction",
-    "correction",
-    "foot_hold",
-    "foot_lift",
-    "foot_added",
-    "leg_shown",
-    "body_lift",
-    "memory",
-)
+    "position", "direction", "gait", "joint_position", "joint_velocity", "joint_rotation", "phase",
+    "channel_values", "smoothed_velocity", "smoothed_direction", "correction", "foot_hold", "foot_lift",
+    "foot_added", "leg_shown", "body_lift", "memory",
+)  # fmt: skip
 
 Ground = Callable[[Array, Array], Array]  # x, z (N,), cm -> heights (N,), cm
-
-
-class ControllerOptions(TypedDict):
-    """The keyword arguments of `Controller`, which are described there."""
-
-    rates: Mapping[str, float]
-    foot_locking: bool
-    steering: float
-    side: float
 
 
 class Controller:

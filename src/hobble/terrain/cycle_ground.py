@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from hobble.core.clip import Clip
 from hobble.core.quat import Array
-from hobble.core.skeleton import Skeleton
+from hobble.core.skeleton import Skeleton, rest_positions
 from hobble.terrain.patches import FootPoints, Patches, best_patches
 
 Mask = NDArray[np.bool_]
@@ -93,12 +93,7 @@ def _flat_height(heights: Array, down: Array, deepest: float | None) -> float:
 
 def heel_above_toe(skeleton: Skeleton) -> float:
     """Height of the heel joint above the toe joint in the rest pose, cm, mean of both sides."""
-    from hobble.core.skeleton import forward_kinematics
-
-    rest = np.zeros((1, len(skeleton.joints), 4))
-    rest[..., 0] = 1  # no rotation: quaternions, w first
-    _, positions = forward_kinematics(skeleton, rest, np.zeros((1, 3)))
-    heights = positions[0, [skeleton.role(role) for role in FOOT_ROLES], 1]
+    heights = rest_positions(skeleton)[[skeleton.role(role) for role in FOOT_ROLES], 1]
     return float(heights[IS_HEEL].mean() - heights[~IS_HEEL].mean())
 
 

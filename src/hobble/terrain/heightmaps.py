@@ -23,14 +23,7 @@ MAX_HEIGHT = 1e7  # largest height, cm (100 km); the runtime has the same limit
 
 # The words with which lines of the header of an ESRI grid begin.
 ESRI_HEADER = {
-    "ncols",
-    "nrows",
-    "xllcorner",
-    "xllcenter",
-    "yllcorner",
-    "yllcenter",
-    "cellsize",
-    "nodata_value",
+    *["ncols", "nrows", "xllcorner", "xllcenter", "yllcorner", "yllcenter", "cellsize", "nodata_value"]
 }
 IMAGE_FORMATS = {".png": ("PNG",), ".tif": ("TIFF",), ".tiff": ("TIFF",)}  # suffix -> Pillow's formats
 GDAL_NODATA = 42113  # the TIFF tag with the value that means "no data", as text
@@ -311,10 +304,5 @@ def _cell_positions(cell: float) -> tuple[Array, Array]:
 
 # name -> function of a random generator and the width of a cell, cm
 KINDS: dict[str, Callable[[np.random.Generator, float], Array]] = {
-    "fractal": fractal,
-    "hills": hills,
-    "stairs": stairs,
-    "slope": slope,
-    "boxes": boxes,
-    "beams": beams,
+    f.__name__: f for f in (fractal, hills, stairs, slope, boxes, beams)
 }

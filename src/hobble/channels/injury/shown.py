@@ -88,8 +88,7 @@ def shown(skeleton: Skeleton, links: Sequence[str], trained: Collection[str]) ->
     Only parts that were hurt in training have sliders and presets. links: the labels of all links. trained:
     the labels of the links that were hurt in training.
     """
-    # Label of a part -> label of its link; then only those that were hurt in training.
-    parts = {label: links[i] for label, i in link_index_by_part(skeleton, links, trained).items()}
+    parts = link_by_part(skeleton, links, trained)
     trained_parts = {label: link for label, link in parts.items() if link in trained}
     presets = {
         name: {trained_parts[label]: float(value) for label, value in values.items()}
@@ -106,7 +105,7 @@ def loops(skeleton: Skeleton, links: Sequence[str], trained: Collection[str]) ->
 
     links, trained: as in `shown`.
     """
-    parts = {label: links[i] for label, i in link_index_by_part(skeleton, links, trained).items()}
+    parts = link_by_part(skeleton, links, trained)
     out = [
         SampleWalk(name, {parts[label]: LOOP_SEVERITY for label in labels}, False)
         for name, labels in PLAIN_LOOPS.items()
@@ -123,16 +122,14 @@ def sweeps(skeleton: Skeleton, links: Sequence[str], trained: Collection[str]) -
     return {name: link for name, link in found.items() if link is not None}
 
 
-def link_index_by_part(
-    skeleton: Skeleton, links: Sequence[str], hurt: Collection[str] = ()
-) -> dict[str, int]:
-    """Label of each part in PARTS_WITH_SLIDER -> index in `links` of the link that its slider sets.
+def link_by_part(skeleton: Skeleton, links: Sequence[str], hurt: Collection[str] = ()) -> dict[str, str]:
+    """Label of each part in PARTS_WITH_SLIDER -> the one of `links` that its slider sets.
 
     hurt: the links that were hurt in training. If no link of a part was hurt, its slider has no effect. Parts
     without a link are left out.
     """
     found = {label: link_of_part(skeleton, ends, links, hurt) for label, *ends in PARTS_WITH_SLIDER}
-    return {label: links.index(link) for label, link in found.items() if link is not None}
+    return {label: link for label, link in found.items() if link is not None}
 
 
 def link_of_part(
