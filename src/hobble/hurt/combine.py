@@ -17,7 +17,7 @@ from hobble.core.errors import HobbleError
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 from hobble.core.smooth import smoothstep
-from hobble.hurt.effects import joint_and_ancestors
+from hobble.hurt.effects import path_up
 from hobble.hurt.healthy_clip import interpolate_rotations
 from hobble.labels.clip_labels import Labels
 
@@ -55,11 +55,9 @@ def combine_clips(
 def joints_of_part(skeleton: Skeleton, part: str) -> list[int]:
     """Indices of the joints of a part of PARTS: all below the chest, or below the hips for the upper body."""
     above = skeleton.role("hips" if part == "upper body" else "chest")
-    roots = set()  # the uppermost joints of the part
-    for role in PARTS[part]:
-        path = joint_and_ancestors(skeleton, skeleton.role(role))
-        roots.add(path[path.index(above) - 1])
-    return [j for j in range(len(skeleton.joints)) if roots & set(joint_and_ancestors(skeleton, j))]
+    # The uppermost joints of the part.
+    roots = {path_up(skeleton, skeleton.role(role), above)[-1] for role in PARTS[part]}
+    return [j for j in range(len(skeleton.joints)) if roots & set(path_up(skeleton, j))]
 
 
 def _cycles(labels: Labels) -> Array:

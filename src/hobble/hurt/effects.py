@@ -39,32 +39,31 @@ def part_of_link(skeleton: Skeleton, link: tuple[str, str]) -> BodyPart:
             upper = skeleton.role(top)
             for role, name in limb:
                 lower = skeleton.role(f"{word}_{role}")
-                if child in _chain(skeleton, lower, upper):
+                if child in path_up(skeleton, lower, upper):
                     # Joints between the hips and the hip joint belong to the pelvis.
                     above_hip = role == "hip" and child != lower
                     return BodyPart("pelvis" if above_hip else name, side)
                 upper = lower
-            if upper in joint_and_ancestors(skeleton, child):  # below the ankle or the wrist
+            if upper in path_up(skeleton, child):  # below the ankle or the wrist
                 return BodyPart(last_part, side)
-    if child in _chain(skeleton, skeleton.role("chest"), skeleton.role("hips")):
+    if child in path_up(skeleton, skeleton.role("chest"), skeleton.role("hips")):
         return BodyPart("back", None)
-    if skeleton.role("chest") in joint_and_ancestors(skeleton, child):
+    if skeleton.role("chest") in path_up(skeleton, child):
         return BodyPart("neck", None)
     return BodyPart("back", None)
 
 
-def joint_and_ancestors(skeleton: Skeleton, joint: int) -> list[int]:
-    """Indices of the joint itself, its parent, and so on to the root."""
+def path_up(skeleton: Skeleton, joint: int, below: int = -1) -> list[int]:
+    """The joint itself, its parent, and so on: to the root, or to the joint under the joint `below`.
+
+    Empty if `below` is not an ancestor of the joint.
+    """
     out = [joint]
-    while skeleton.parents[out[-1]] >= 0:
+    while skeleton.parents[out[-1]] != below:
+        if skeleton.parents[out[-1]] < 0:
+            return []
         out.append(skeleton.parents[out[-1]])
     return out
-
-
-def _chain(skeleton: Skeleton, joint: int, above: int) -> list[int]:
-    """The joints from `joint` up to the one below `above`. Empty if `above` is not an ancestor."""
-    path = joint_and_ancestors(skeleton, joint)
-    return path[: path.index(above)] if above in path else []
 
 
 # Combines the severities of several links into the changes of each frame of a clip.

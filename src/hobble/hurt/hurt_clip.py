@@ -23,7 +23,6 @@ from hobble.hurt.legs import (
     HurtFoot,
     Leg,
     ShortenedPath,
-    footprints_of,
     ground_below,
     hips_height,
     knee_flexion,
@@ -103,28 +102,13 @@ def hurt_clip(
     changes = effects_of_severities(clip.skeleton, severity, clip.fps, guarding)
     timing = retime(source, changes)
     feet = [reduce_pitch(source, changes, side) for side in (LEFT, RIGHT)]
-    path = shorten(source, changes, timing.stride_ratio, None if flat else _ground_heights(source, feet))
+    path = shorten(source, changes, timing.stride_ratio, None if flat else ground_below(source, feet))
     feet = [move_foot(source, changes, path, feet[side], side) for side in (LEFT, RIGHT)]
     out = _assemble(source, changes, timing, path, feet, name)
     source_frame = np.clip(np.floor(timing.body_frames + 1e-6).astype(int), 0, len(clip) - 1)
     return HurtClip(
         out, changes.shown_severity[source_frame], relabel(labels, timing, zero, margins), timing.body_frames
     )
-
-
-def _ground_heights(source: HealthyClip, feet: list[HurtFoot]) -> Array:
-    """(F,) height of the ground below the body, cm, from the footprints."""
-    heights = []
-    for side in (LEFT, RIGHT):
-        stances = source.stances[side]
-        footprints = footprints_of(feet[side], stances)
-        heights.append(
-            [
-                (stance.middle, float(footprint[1]))
-                for stance, footprint in zip(stances, footprints, strict=True)
-            ]
-        )
-    return ground_below(source, heights)
 
 
 def _assemble(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -65,16 +66,18 @@ def shorten(
     )
 
 
-def ground_below(source: HealthyClip, heights: list[list[tuple[float, float]]]) -> Array:
-    """(F,) height of the ground below the body, cm, from the heights of the standing feet.
+def ground_below(source: HealthyClip, feet: Sequence[HurtFoot]) -> Array:
+    """(F,) height of the ground below the body, cm, from the footprints of both feet.
 
-    heights: for each foot a list of (middle frame of a stance, height of the ankle). The median height of
-    each foot counts as 0. Otherwise, if one ankle is higher than the other in stance, flat ground would seem
-    to rise and fall with each step.
+    The median height of each foot counts as 0. Otherwise, if one ankle is higher than the other in stance,
+    flat ground would seem to rise and fall with each step.
     """
-    points = sorted(
-        (when, y - float(np.median([h for _, h in of_foot]))) for of_foot in heights for when, y in of_foot
-    )
+    points: list[tuple[float, float]] = []
+    for foot, stances in zip(feet, source.stances, strict=True):
+        heights = [float(footprint[1]) for footprint in footprints_of(foot, stances)]
+        level = float(np.median(heights))
+        points += [(stance.middle, y - level) for stance, y in zip(stances, heights, strict=True)]
+    points.sort()
     height = np.interp(np.arange(len(source)), [p[0] for p in points], [p[1] for p in points])
     return gaussian(height, SLOPE_SECONDS * source.clip.fps)
 

@@ -9,7 +9,7 @@ from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton, aim_bone, forward_kinematics
 from hobble.core.smooth import gaussian
 from hobble.hurt.amounts import HARMONICS
-from hobble.hurt.effects import LEFT, RIGHT, SIDES, Effects, joint_and_ancestors
+from hobble.hurt.effects import LEFT, RIGHT, SIDES, Effects, path_up
 from hobble.hurt.healthy_clip import HealthyClip
 
 X, Y, Z = np.eye(3)
@@ -80,12 +80,8 @@ def _stiffen(source: HealthyClip, effects: Effects) -> Array:
 
 
 def _between(skeleton: Skeleton, role: str, above: str) -> list[int]:
-    """The joints on the way up from the joint with `role` to the joint with the role `above`.
-
-    The first of these two joints is included, the second is not.
-    """
-    path = joint_and_ancestors(skeleton, skeleton.role(role))
-    return path[: path.index(skeleton.role(above))]
+    """The joints from the one with `role` up to the one below the joint with the role `above`."""
+    return path_up(skeleton, skeleton.role(role), skeleton.role(above))
 
 
 def _positions_in_trunk(skeleton: Skeleton) -> list[tuple[str, float]]:
@@ -187,5 +183,5 @@ def _hold_arm(source: HealthyClip, effects: Effects, world: Array, side: int) ->
         fully_held = aim_bone(world[:, joint], np.broadcast_to(rest_bone, direction.shape), direction)
         turn = quat.mul(quat.slerp(world[:, joint], fully_held, held), quat.inv(world[:, joint]))
         for j in range(len(skeleton.joints)):
-            if joint in joint_and_ancestors(skeleton, j):
+            if joint in path_up(skeleton, j):
                 world[:, j] = quat.mul(turn, world[:, j])

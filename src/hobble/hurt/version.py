@@ -196,13 +196,7 @@ def cut_to_length(hurt: HurtClip, frames: int, report: LabelReport) -> HurtClip:
     ends_bout = np.isnan(labels.footsteps[:, :2]).all(axis=1)
     footsteps = footsteps[ends_bout | ~np.isnan(landings).all(axis=1)]
     cycles, _ = find_cycles(footsteps, frames, report.phase_zero, report.margins)
-    short = Labels(
-        labels.contacts[:frames],
-        labels.phase[:frames],
-        labels.phase_known[:frames],
-        labels.gait[:frames],
-        footsteps,
-        cycles,
-    )
-    part = Clip(clip.name, clip.skeleton, clip.fps, clip.rotations[:frames], clip.root[:frames])
+    cut = {name: getattr(labels, name)[:frames] for name in ("contacts", "phase", "phase_known", "gait")}
+    short = replace(labels, **cut, footsteps=footsteps, cycles=cycles)
+    part = clip.part(slice(frames))
     return HurtClip(part, hurt.severity[:frames], short, hurt.source_frames[:frames])

@@ -139,11 +139,7 @@ def gather_stances(soles: Array, contacts: Mask, longest: int) -> Stances:
 
 def join_points(a: Stances, b: Stances) -> Stances:
     """The points of `a`, then those of `b`."""
-    return Stances(
-        np.concatenate([a.place, b.place]),
-        np.concatenate([a.height, b.height]),
-        np.concatenate([a.count, b.count]),
-    )
+    return Stances(*(np.concatenate([getattr(one, name) for one in (a, b)]) for name in vars(a)))
 
 
 @dataclass(frozen=True)
@@ -343,12 +339,7 @@ def flat_ground(
         return uncorrected
     if np.abs(heights[contacts] - height).mean() > deepest:
         return meet_feet(uncorrected, soles, contacts, smoothing, deepest)
-    return replace(
-        uncorrected,
-        pits=_dig_pits_for_each_fit(
-            uncorrected, soles, gather_stances(soles, contacts, STANCE_FRAMES), deepest
-        ),
-    )
+    return _with_pits(uncorrected, soles, gather_stances(soles, contacts, STANCE_FRAMES), deepest)
 
 
 def meet_feet(
@@ -367,50 +358,22 @@ def meet_feet(
     ground = replace(uncorrected, surfaces=fit_surfaces(standing, residual, smoothing, most))
     if deepest is None:
         return ground
-    surfaces = [
-        _refit_surface(
-            uncorrected,
-            k,
-            standing,
-            gather_stances(soles, covered & ~contacts, COVERED_FRAMES),
-            smoothing,
-            most,
-        )
-        if covered.any()
-        else surface
-        for k, (covered, surface) in enumerate(
-            zip(ground.height_above_soles(soles) > deepest / 2, ground.surfaces, strict=True)
-        )
-    ]
-    ground = replace(uncorrected, surfaces=surfaces)
-    return replace(ground, pits=_dig_pits_for_each_fit(ground, soles, standing, deepest))
+    surfaces = list(ground.surfaces)
+    for k, covered in enumerate(ground.height_above_soles(soles) > deepest / 2):
+        if covered.any():
+            points = join_points(standing, gather_stances(soles, covered & ~contacts, COVERED_FRAMES))
+            residual = (points.height - uncorrected.heights_at(points.place)[k])[None]
+            (surfaces[k],) = fit_surfaces(points, residual, smoothing, most, len(standing.count))
+    return _with_pits(replace(uncorrected, surfaces=surfaces), soles, standing, deepest)
 
 
-def _dig_pits_for_each_fit(
-    ground: CycleGround, soles: Array, standing: Stances, deepest: float
-) -> list[Pits]:
-    """For each fit, pits for the feet that are more than `deepest` below the ground.
+def _with_pits(ground: CycleGround, soles: Array, standing: Stances, deepest: float) -> CycleGround:
+    """The ground of each fit with pits for the feet that are more than `deepest` below it.
 
     In a pit the ground is lowered until the foot is only deepest / 2 below it.
     """
-    return [
-        dig_pits(soles[covered], standing, deepest / 2)
-        for covered in ground.height_above_soles(soles) > deepest
-    ]
-
-
-def _refit_surface(
-    uncorrected: CycleGround,
-    k: int,
-    standing: Stances,
-    covered: Stances,
-    smoothing: float,
-    most: float | None,
-) -> Surface:
-    """The surface of fit k, fitted to feet in contact, `standing`, and feet below the ground, `covered`."""
-    points = join_points(standing, covered)
-    residual = points.height - uncorrected.heights_at(points.place)[k]
-    return fit_surfaces(points, residual[None], smoothing, most, len(standing.count))[0]
+    below = ground.height_above_soles(soles) > deepest
+    return replace(ground, pits=[dig_pits(soles[covered], standing, deepest / 2) for covered in below])
 
 
 def beam_side_points(patches: Patches, path: Array, sides: Array, centre: Array) -> Array:
