@@ -16,7 +16,7 @@ from hobble.motion.root import RootFrames
 from hobble.terrain.clip_fits import clip_fits, heights_under, sample_points, save_fits
 from hobble.terrain.cycle_ground import IS_HEEL, find_soles, fit_cycle, heel_above_toe
 from hobble.terrain.heightmaps import heightmaps
-from hobble.terrain.options import HeightmapOptions
+from hobble.terrain.options import FitOptions, HeightmapOptions
 from hobble.terrain.patches import Patches, draw_patches
 from tests.terrain.grounds import GROUNDS
 
@@ -39,7 +39,7 @@ def test_patch_and_feet_have_the_same_mean_height(made: SimpleNamespace, patches
     soles = walk.clip.positions[60:200, -4:] - np.array([0.0, 3.0, 0.0])
     contacts, path = walk.labels["contacts"][60:200], walk.clip.root[60:200, [0, 2]]
     sides = np.tile([1.0, 0.0], (len(path), 1))
-    ground = fit_cycle(patches, soles, contacts, path, sides, "rocky", fits=5, smoothing=0.1, deepest=1.0)
+    ground = fit_cycle(patches, soles, contacts, path, sides, "rocky", FitOptions(fits=5))
     patch = replace(ground, surfaces=(), pits=())
     assert np.allclose(patch.height_above_soles(soles)[:, contacts].mean(axis=1), 0, atol=1e-3)
     assert np.allclose(ground.centre, soles[contacts][:, [0, 2]].mean(axis=0))
@@ -109,18 +109,15 @@ def test_labels_of_another_clip_are_refused(made: SimpleNamespace, patches: Patc
         clip_fits(walk.clip, walk.labels, patches, "rocky", made.options(fits=400), made.database())
 
 
-AUTO = {"heel_height": "auto", "toe_height": "auto", "sole": 4.0, "deepest": 1.0}
-
-
 def test_heights_of_joints_above_their_soles(made: SimpleNamespace, holden31: Skeleton) -> None:
     walk = made.walk(GROUNDS["level"])
     contacts, frames = walk.labels["contacts"], np.arange(60, 360)
-    flat = find_soles(walk.clip, contacts, frames, True, **AUTO)
+    flat = find_soles(walk.clip, contacts, frames, True, FitOptions())
     assert (flat.heel_height, flat.toe_height) == (pytest.approx(7.0), pytest.approx(2.5))
     assert np.abs(flat.soles[contacts][:, 1]).max() < 1e-9
-    uneven = find_soles(walk.clip, contacts, frames, False, **AUTO)
+    uneven = find_soles(walk.clip, contacts, frames, False, FitOptions())
     assert (uneven.heel_height, uneven.toe_height) == (8.5, 4.0)
-    given = find_soles(walk.clip, contacts, frames, True, **AUTO | {"heel_height": 5.0, "toe_height": 4.5})
+    given = find_soles(walk.clip, contacts, frames, True, FitOptions(heel_height=5.0, toe_height=4.5))
     expected = walk.clip.positions[:, -4:, 1] - np.where(IS_HEEL, 5.0, 4.5)
     assert np.allclose(given.soles[..., 1], expected)
     assert heel_above_toe(holden31) == pytest.approx(4.5)

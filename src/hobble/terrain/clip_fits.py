@@ -147,16 +147,7 @@ def _standing_feet(
     counted = np.zeros(len(clip), bool)
     for start, end in cycles:
         counted[_fitted_frames(start, end, window, len(clip))] = True
-    feet = find_soles(
-        clip,
-        contacts,
-        np.flatnonzero(counted),
-        flat,
-        heel_height=options.heel_height,
-        toe_height=options.toe_height,
-        sole=options.sole,
-        deepest=options.deepest,
-    )
+    feet = find_soles(clip, contacts, np.flatnonzero(counted), flat, options)
     contacts = feet.contacts.copy()
     if flat and options.held_up is not None:
         contacts &= ~is_above_other_joint(feet, options.held_up)
@@ -187,30 +178,12 @@ def _fit_ground(
     kind: "flat", "rocky", "jumpy" or "beam".
     """
     soles, contacts = feet.soles[around], feet.contacts[around]
-    smoothing, deepest = options.smoothing, options.deepest
     if kind == "flat":
-        return flat_ground(
-            soles,
-            contacts,
-            options.flat_level,
-            smoothing=smoothing,
-            deepest=deepest,
-            correct=options.bend_flat,
-        )
+        return flat_ground(soles, contacts, options)
     path = samples[1, around]
     sides = samples[0, around] - path
     sides = sides / np.linalg.norm(sides, axis=-1, keepdims=True)
-    return fit_cycle(
-        patches,
-        soles,
-        contacts,
-        path,
-        sides,
-        kind,
-        fits=options.fits,
-        smoothing=smoothing,
-        deepest=deepest,
-    )
+    return fit_cycle(patches, soles, contacts, path, sides, kind, options)
 
 
 def _fit_statistics(fitted: Sequence[tuple[CycleGround, Array, Mask]], fits: int) -> dict[str, Any]:

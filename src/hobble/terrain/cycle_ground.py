@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from hobble.core.clip import Clip
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton, rest_positions
+from hobble.terrain.options import FitOptions
 from hobble.terrain.patches import FootPoints, Patches, best_patches
 
 Mask = NDArray[np.bool_]
@@ -39,22 +40,11 @@ class Feet:
     toe_height: float
 
 
-def find_soles(
-    clip: Clip,
-    contacts: Mask,
-    frames: np.ndarray,
-    flat: bool,
-    *,
-    heel_height: float | str,
-    toe_height: float | str,
-    sole: float,
-    deepest: float | None,
-) -> Feet:
-    """The soles of a clip: the contact joints, lowered by `heel_height` and `toe_height`.
+def find_soles(clip: Clip, contacts: Mask, frames: np.ndarray, flat: bool, options: FitOptions) -> Feet:
+    """The soles of a clip: the contact joints, lowered by `heel_height` and `toe_height` of the options.
 
-    contacts: (F, 4). heel_height, toe_height: height of the joints above their soles, cm, or "auto".
-    frames: (N,) the frames from which "auto" is computed. flat: whether the ground is flat, and then at
-    height 0.
+    contacts: (F, 4). frames: (N,) the frames from which "auto" is computed. flat: whether the ground is flat,
+    and then at height 0.
 
     On flat ground "auto" is the median height of the joints in contact. If this puts a sole more than
     `deepest` cm below the ground, the height is reduced by just enough to prevent that; but if more than
@@ -63,14 +53,14 @@ def find_soles(
     """
     joints = clip.positions[:, [clip.skeleton.role(role) for role in FOOT_ROLES]].copy()
     above_sole: list[float] = []
-    for setting, columns in ((heel_height, IS_HEEL), (toe_height, ~IS_HEEL)):
+    for setting, columns in ((options.heel_height, IS_HEEL), (options.toe_height, ~IS_HEEL)):
         heights, down = joints[frames][:, columns, 1], contacts[frames][:, columns]
         if setting != "auto":
             above_sole.append(float(setting))
         elif flat and down.any():
-            above_sole.append(_flat_height(heights, down, deepest))
+            above_sole.append(_flat_height(heights, down, options.deepest))
         else:
-            above_sole.append(sole + (heel_above_toe(clip.skeleton) if columns is IS_HEEL else 0.0))
+            above_sole.append(options.sole + (heel_above_toe(clip.skeleton) if columns is IS_HEEL else 0.0))
     joints[..., 1] -= np.where(IS_HEEL, *above_sole)
     return Feet(joints, contacts, *above_sole)
 
@@ -290,18 +280,13 @@ def fit_cycle(
     path: Array,
     sides: Array,
     kind: str,
-    *,
-    fits: int,
-    smoothing: float,
-    deepest: float | None,
+    options: FitOptions,
 ) -> CycleGround:
     """Fit the ground under one cycle and the frames around it, T frames together.
 
     soles: (T, 4, 3) positions of the soles at heels and toes, cm. contacts: (T, 4) bool, at least one true.
     path: (T, 2) x and z of the root. sides: (T, 2) unit vectors to the left of the path. kind: "rocky",
-    "jumpy" or "beam"; "jumpy" and "beam" add terms to the error. fits: number of fits. smoothing:
-    regularisation of the surfaces that are added. deepest: how far a foot may be below the ground, cm; None:
-    no limit.
+    "jumpy" or "beam"; "jumpy" and "beam" add terms to the error.
     """
 
     where, height = soles[..., [0, 2]], soles[..., 1]
@@ -310,41 +295,38 @@ def fit_cycle(
     foot_points = np.concatenate([cells, (height - level)[..., None]], axis=-1)
     beam_sides = beam_side_points(patches, path, sides, centre) if kind == "beam" else np.zeros((0, 4))
     footing = FootPoints(foot_points[contacts], foot_points[~contacts], kind == "jumpy", beam_sides)
-    chosen, error = best_patches(patches, footing, fits)
+    chosen, error = best_patches(patches, footing, options.fits)
     # Mean height of each patch under the feet in contact, subtracted to make the patch level with the feet.
     patch_level = patches.heights_at(chosen, cells[contacts]).mean(axis=1, dtype=float)
     uncorrected = CycleGround(patches, chosen, error, centre, level - patch_level)
-    return meet_feet(uncorrected, soles, contacts, smoothing, deepest)
+    return meet_feet(uncorrected, soles, contacts, options)
 
 
-def flat_ground(
-    soles: Array, contacts: Mask, level: str, *, smoothing: float, deepest: float | None, correct: bool
-) -> CycleGround:
+def flat_ground(soles: Array, contacts: Mask, options: FitOptions) -> CycleGround:
     """Flat ground, with one fit.
 
-    soles, contacts, smoothing, deepest: see `fit_cycle`. level: "zero", or "feet" for the mean height of the
-    soles in contact, as in Holden et al. (2017). They compute contacts from velocities, and the last frame
-    has no velocity. So for this mean, as in their work, the last frame gets the contacts of the frame before
-    it.
+    soles, contacts: see `fit_cycle`. With `flat_level: feet` its height is the mean height of the soles in
+    contact, as in Holden et al. (2017). They compute contacts from velocities, and the last frame has no
+    velocity. So for this mean, as in their work, the last frame gets the contacts of the frame before it.
 
-    correct: whether to correct the ground. If the feet in contact are on average more than `deepest` cm from
-    it (because the floor or the capture is uneven), a surface is added and pits are dug where a foot is still
-    too low. Otherwise only pits are dug, under feet that are more than `deepest` below the ground.
+    With `bend_flat`, if the feet in contact are on average more than `deepest` cm from it (because the floor
+    or the capture is uneven), a surface is added and pits are dug where a foot is still too low. Otherwise
+    only pits are dug, under feet that are more than `deepest` below the ground.
     """
+    deepest = options.deepest
     heights = soles[..., 1]
     by_velocity = np.concatenate([contacts[:-1], contacts[-2:-1]])
-    height = heights[by_velocity if by_velocity.any() else contacts].mean() if level == "feet" else 0.0
+    counted = by_velocity if by_velocity.any() else contacts
+    height = heights[counted].mean() if options.flat_level == "feet" else 0.0
     uncorrected = CycleGround(None, np.array([-1]), np.zeros(1), np.zeros(2), np.array([height]))
-    if deepest is None or not correct:
+    if deepest is None or not options.bend_flat:
         return uncorrected
     if np.abs(heights[contacts] - height).mean() > deepest:
-        return meet_feet(uncorrected, soles, contacts, smoothing, deepest)
+        return meet_feet(uncorrected, soles, contacts, options)
     return _with_pits(uncorrected, soles, gather_stances(soles, contacts, STANCE_FRAMES), deepest)
 
 
-def meet_feet(
-    uncorrected: CycleGround, soles: Array, contacts: Mask, smoothing: float, deepest: float | None
-) -> CycleGround:
+def meet_feet(uncorrected: CycleGround, soles: Array, contacts: Mask, options: FitOptions) -> CycleGround:
     """Correct the ground so that it meets the feet in contact.
 
     A smooth surface is fitted to the residual, the heights of feet in contact above the ground. At most
@@ -354,6 +336,7 @@ def meet_feet(
     """
     standing = gather_stances(soles, contacts, STANCE_FRAMES)
     residual = standing.height - uncorrected.heights_at(standing.place)
+    smoothing, deepest = options.smoothing, options.deepest
     most = None if deepest is None else deepest / 2
     ground = replace(uncorrected, surfaces=fit_surfaces(standing, residual, smoothing, most))
     if deepest is None:
