@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from typing import Any
 
@@ -18,9 +19,14 @@ def changed(material: ReportMaterial, **changes: Any) -> ReportMaterial:
     return replace(material, measurements={**material.measurements, **found}, **fields)
 
 
+REMEDY = re.compile(r"\b(add|check|expect|keep|list|look|measure|more passes|see|train|try)\b", re.IGNORECASE)
+
+
 def heads(material: ReportMaterial, **changes: Any) -> dict[str, str]:
-    """Title of each hint -> its kind."""
-    return {hint.head: hint.kind for hint in hints(changed(material, **changes))}
+    """Title of each hint -> its kind. Every hint about a fault says what to do."""
+    found = hints(changed(material, **changes))
+    assert [hint for hint in found if hint.kind in ("warn", "note") and not REMEDY.search(hint.text)] == []
+    return {hint.head: hint.kind for hint in found}
 
 
 def accuracy(material: ReportMaterial, held_out: float | None, train: float = 0.04) -> dict[str, Any]:

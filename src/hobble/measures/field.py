@@ -115,7 +115,8 @@ def hints(found: Json, material: ReportMaterial) -> Iterator[Hint]:
             yield Hint(
                 "note",
                 f"The character's {faults} more than captured people's.",
-                f"{OF_MOTION[key]}: {format_number(mine)} against {format_number(theirs)}.",
+                f"{OF_MOTION[key]}: {format_number(mine)} against {format_number(theirs)}. "
+                + words(f"field.{key}"),
                 order=40,
             )
 

@@ -496,7 +496,7 @@ def injury_hints(found: Json) -> Iterator[Hint]:
     sick = [r["link"] for r in trained if r["link"] not in unchanged and r["after_healing_cm"] > at_end]
     if sick:
         head = f"The walk does not recover after these links have healed: {named(sick)}."
-        yield Hint("note", head, "The character keeps limping although nothing hurts any more.")
+        yield Hint("note", head, words("injury.lasting"))
     if not unchanged:
         low, high = (format_number(f(r["from_healthy_cm"] for r in trained)) for f in (min, max))
         head = f"{len(trained)} of {len(responses)} links were hurt in training."

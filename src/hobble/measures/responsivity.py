@@ -329,7 +329,7 @@ def _track_hints(found: Json) -> Iterator[Hint]:
     drawn, predicted = found["largest_turn_degrees"], found["predicted_turn_degrees"]
     if drawn > FLIP_DEGREES:
         head = f"A joint turned by {drawn:.0f} degrees in one frame."
-        yield Hint("warn", head, "It flips, which is visible on a skinned character.")
+        yield Hint("warn", head, words("speed.flipped"))
     elif predicted > FLIP_DEGREES:
         head = f"The network predicted a turn of a joint by {predicted:.0f} degrees in one frame."
         yield Hint("note", head, words("speed.flips", drawn=f"{drawn:.0f}"))

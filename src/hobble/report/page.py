@@ -299,4 +299,9 @@ def _cost_hints(material: ReportMaterial) -> Iterator[Hint]:
     for stage in material.pipeline.get("stages") or ():
         if stage["seconds"] > 0.5 * total > 0:
             share = 100 * stage["seconds"] / total
-            yield Hint("fact", f"The {stage['stage']} stage took {share:.0f} % of the time.", "")
+            faster = (
+                "`--config training=fast` shortens it (docs/training.md)"
+                if stage["stage"] == "training"
+                else "More cores shorten it (`snakemake -c8`), or a cluster (docs/cluster.md)"
+            )
+            yield Hint("fact", f"The {stage['stage']} stage took {share:.0f} % of the time.", f"{faster}.")
