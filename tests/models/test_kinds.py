@@ -24,25 +24,30 @@ from hobble.models.network import STORAGES, Network, standardise_inputs
 from hobble.rows.layout import GAITS, RowLayout
 from hobble.runtime.animation import ProceduralAnimation
 
+from .matching.example import built
+
 OPTIONS: dict[str, dict[str, Any]] = {
     "mann": {"units": 18, "experts": 3},
     "plain": {"units": 18},
     "pfnn": {"units": 18},
 }
 KINDS = sorted(OPTIONS)
+BUILT = {"learned": {"steps": 2, "units": 18, "decompressor_units": 24, "latent": 4}}
 Made = tuple[Trainable, dict[str, Any], Network]
 
 
 def test_every_kind_is_tested_here() -> None:
     assert set(KINDS) == {k for k in NETWORK_KINDS if issubclass(options_of_kind(k), TrainedOptions)}
     built = {kind for kind in NETWORK_KINDS if issubclass(options_of_kind(kind), BuiltOptions)}
-    assert built == {"matching"}, "its tests are in a folder of its own"
+    assert built == {"matching", *BUILT}, "the tests of matching are in a folder of its own"
 
 
-@pytest.fixture(params=KINDS)
-def made(request: pytest.FixtureRequest, holden31: Skeleton) -> Made:
-    """An untrained network, the arrays of its file, and the network read from them."""
+@pytest.fixture(params=[*KINDS, *BUILT], scope="module")
+def made(request: pytest.FixtureRequest, holden31: Skeleton, tmp_path_factory: Any) -> Any:
+    """An untrained network (or a built one), the arrays of its file, and the network read from them."""
     kind = request.param
+    if kind in BUILT:
+        return built(holden31, tmp_path_factory.mktemp(kind), kind, **BUILT[kind])
     layout = RowLayout(len(holden31.joints), channels=(("injury", 30),))
     options = network_options({"kind": kind, **OPTIONS[kind]})
     assert isinstance(options, TrainedOptions)
@@ -85,6 +90,8 @@ def test_the_modes_that_a_kind_names_are_those_of_its_networks(made: Made) -> No
 
 def test_the_read_network_equals_the_trained_one(made: Made) -> None:
     trainable, _, network = made
+    if not isinstance(trainable, Trainable):
+        pytest.skip("it is built")
     x, phase = random_inputs(network)
     y = trainable(
         torch.from_numpy(standardise_inputs(network, x)), torch.from_numpy(phase.astype(np.float32))

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import prod
 from pathlib import Path
@@ -87,12 +87,12 @@ class BuiltOptions(Options):
 
 
 class FinishedNetwork(Protocol):
-    """The result of training or building, ready to be written to a file.
+    """The result of training or building, ready to be written to a file."""
 
-    kind: name of its kind, and of the kind's folder in hobble.models.
-    """
-
-    kind: ClassVar[str]
+    @property
+    @abstractmethod
+    def kind(self) -> str:
+        """The name of its kind, and of the kind's folder in hobble.models."""
 
     @abstractmethod
     def arrays(self) -> dict[str, np.ndarray]:
@@ -107,6 +107,20 @@ class FinishedNetwork(Protocol):
     @abstractmethod
     def description(self) -> str:
         """Its size in a few words. A training resumes only from a checkpoint with the same words."""
+
+
+@dataclass(frozen=True)
+class BuiltNetwork:
+    """A `FinishedNetwork` of a kind that is built. tables: the arrays of its file."""
+
+    kind: str
+    tables: dict[str, np.ndarray] = field(repr=False)
+    file_metadata: dict[str, Any] = field(repr=False)
+    description: str
+
+    def arrays(self) -> dict[str, np.ndarray]:
+        """As in `FinishedNetwork`."""
+        return self.tables
 
 
 class TrainingStep(Protocol):

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from hobble.core.skeleton import Skeleton
+from hobble.models import network_options
 from hobble.models.load import network_from_arrays
-from hobble.models.matching import MatchingOptions
-from hobble.models.matching.network import Matching
+from hobble.models.model import BuiltNetwork, BuiltOptions
 from hobble.rows.clip_rows import ClipRows, save_clip_rows
 from hobble.rows.layout import RowLayout, body_column_count
 
@@ -58,26 +58,33 @@ def clip(skeleton: Skeleton, number: int, seed: int = 1) -> ClipRows:
     )
 
 
-def built(skeleton: Skeleton, folder: Path, **options: Any) -> tuple[Any, dict[str, Any], Matching]:
-    """The tables of both clips, the arrays of their file, and the network read from them."""
+def clip_files(skeleton: Skeleton, folder: Path) -> list[Path]:
+    """The files of both clips."""
     files = []
     for number in range(len(FRAMES)):
         files.append(folder / f"clip-{number}.npz")
         save_clip_rows(files[-1], clip(skeleton, number))
+    return files
+
+
+def built(
+    skeleton: Skeleton, folder: Path, kind: str = "matching", **options: Any
+) -> tuple[BuiltNetwork, dict[str, Any], Any]:
+    """The network built from both clips, the arrays of its file, and the network read from them."""
     layout = layout_of(skeleton)
-    tables = MatchingOptions(**options).build(files, layout, skeleton)
+    chosen = network_options({"kind": kind, **options})
+    assert isinstance(chosen, BuiltOptions)
+    tables = chosen.build(clip_files(skeleton, folder), layout, skeleton)
     rng = np.random.default_rng(1)
     arrays: dict[str, Any] = dict(tables.arrays())
     for name, size in (("X", layout.x_size), ("Y", layout.y_size)):
         arrays[f"{name}mean"] = rng.normal(0, 10, size).astype(np.float32)
         arrays[f"{name}std"] = rng.uniform(0.5, 2, size).astype(np.float32)
     meta = {
-        "kind": "matching",
+        "kind": kind,
         "layout": layout.to_dict(),
         "skeleton": skeleton.to_dict(),
         **tables.file_metadata,
     }
     arrays["meta"] = np.array(json.dumps(meta))
-    network = network_from_arrays("weights.npz", arrays)
-    assert isinstance(network, Matching)
-    return tables, arrays, network
+    return tables, arrays, network_from_arrays("weights.npz", arrays)

@@ -52,12 +52,12 @@ def test_rows_lie_on_the_mean_of_their_fits(holden31: Skeleton) -> None:
 
 
 def test_tables_hold_the_clips_in_order(holden31: Skeleton, tmp_path: Path) -> None:
-    tables, _, network = built(holden31, tmp_path)
+    _, arrays, network = built(holden31, tmp_path)
     each = [
         on_mean_ground(rows, rows.layout)[1][find_runs(rows)[0]] for rows in map(clip, [holden31] * 2, (0, 1))
     ]
-    np.testing.assert_allclose(tables.y, np.concatenate(each), atol=1e-6)
-    assert tables.remaining[FRAMES[0] - 1] == tables.remaining[-1] == 0
+    np.testing.assert_allclose(arrays["frames"], np.concatenate(each), atol=1e-6)
+    assert arrays["remaining"][FRAMES[0] - 1] == arrays["remaining"][-1] == 0
     assert set(network.start_rows) == {*range(1, FRAMES[0] - 20), *range(FRAMES[0] + 1, sum(FRAMES) - 20)}
 
 
@@ -76,14 +76,14 @@ def test_features_are_the_columns_that_their_names_say(holden31: Skeleton) -> No
 
 
 def test_a_group_has_its_configured_weight(holden31: Skeleton, tmp_path: Path) -> None:
-    tables, _, _ = built(holden31, tmp_path, path=3.0, channels=20.0, gait=0.0)
-    spread = tables.features[:, :6].std(axis=0)
+    _, tables, _ = built(holden31, tmp_path, path=3.0, channels=20.0, gait=0.0)
+    spread = tables["features"][:, :6].std(axis=0)
     assert spread.mean() == pytest.approx(3.0, rel=1e-4)
     assert spread.std() > 0.01, "its columns are divided by one number, not each by its own"
-    gait = [i for i, column in enumerate(tables.columns) if 48 <= column < 120]
-    assert not tables.weights[gait].any()
+    gait = [i for i, column in enumerate(tables["columns"]) if 48 <= column < 120]
+    assert not tables["feature_weights"][gait].any()
     # Severity 7 of at most 10.
-    np.testing.assert_allclose(tables.features[FRAMES[0] :, -26], 14.0, rtol=1e-6)
+    np.testing.assert_allclose(tables["features"][FRAMES[0] :, -26], 14.0, rtol=1e-6)
 
 
 def test_rows_of_another_layout_are_refused(holden31: Skeleton, tmp_path: Path) -> None:

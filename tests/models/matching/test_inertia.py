@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from hobble.core import quat
-from hobble.models.matching.network import OFFSETS, OFFSETS_PER_JOINT, ROW, memory_size, show_rows
+from hobble.models.matching.network import OFFSETS, OFFSETS_PER_JOINT, ROW, show_rows
 
 J, HALFLIFE = 3, 6.0
+MEMORY = OFFSETS + OFFSETS_PER_JOINT * J
 AT = np.array([0, 3 * J, 6 * J, 9 * J])  # positions, velocities, rotations, change of phase
 
 
@@ -32,7 +33,7 @@ def two_runs(rng: np.random.Generator) -> np.ndarray:
 
 def played(frames: np.ndarray, rows: list[int]) -> np.ndarray:
     """What is shown if these rows are played, one in each frame."""
-    memory, shown = np.zeros((1, memory_size(J))), []
+    memory, shown = np.zeros((1, MEMORY)), []
     phases = (0.02 * np.arange(len(frames)) % 1).astype(np.float32)
     before = -1
     for row in rows:
@@ -92,14 +93,14 @@ def test_offsets_of_overlapping_transitions_add_up() -> None:
     frames = two_runs(np.random.default_rng(5))
     there_and_back = played(frames, [*range(1, 20), 70, *range(21, 30)])
     assert np.abs(there_and_back[20:24, : 3 * J] - frames[21:25, : 3 * J]).max() > 0.01
-    memory = np.zeros((1, memory_size(J)))
+    memory = np.zeros((1, MEMORY))
     assert memory.shape[1] == OFFSETS + OFFSETS_PER_JOINT * J
 
 
 @pytest.mark.parametrize("off", [0.3, -0.3])
 def test_the_phase_moves_to_that_of_the_clips(off: float) -> None:
     frames = two_runs(np.random.default_rng(6))
-    memory, phases = np.zeros((1, memory_size(J))), (0.02 * np.arange(120) % 1).astype(np.float32)
+    memory, phases = np.zeros((1, MEMORY)), (0.02 * np.arange(120) % 1).astype(np.float32)
     phase = np.array([off % 1.0])
     for row in range(60):
         out = np.zeros((1, frames.shape[1]), np.float32)

@@ -10,11 +10,10 @@ from pydantic import Field
 
 from hobble.core.section import Positive, PositiveFloat
 from hobble.core.skeleton import Skeleton
-from hobble.models.model import BuiltOptions
+from hobble.models.model import BuiltNetwork, BuiltOptions
 from hobble.rows.layout import RowLayout
 
 if TYPE_CHECKING:
-    from hobble.models.matching.build import Tables
     from hobble.models.matching.network import Matching
 
 Weight = Annotated[float, Field(ge=0, le=1000, allow_inf_nan=False)]
@@ -53,7 +52,7 @@ class MatchingOptions(BuiltOptions):
 
         return Matching
 
-    def build(self, clips: Sequence[str | Path], layout: RowLayout, skeleton: Skeleton) -> Tables:
+    def build(self, clips: Sequence[str | Path], layout: RowLayout, skeleton: Skeleton) -> BuiltNetwork:
         """As in `BuiltOptions`."""
         from hobble.models.matching.build import build
 

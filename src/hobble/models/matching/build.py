@@ -15,7 +15,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,10 +24,14 @@ from hobble.channels import channel
 from hobble.core.errors import InputError
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
+from hobble.models.model import BuiltNetwork
 from hobble.rows.clip_rows import ClipRows, load_clip_rows
 from hobble.rows.layout import GAITS, RowLayout, compose, frame_inputs
 
 FEET = ("left_heel", "right_heel")  # the joints of the skeleton with these roles
+# A run is a sequence of consecutive frames of a clip. A search skips rows with fewer frames left in their
+# run, because playback would soon reach its end.
+FEWEST_LEFT = 20
 LEAST_SPREAD = 1e-6  # a group of columns with a smaller mean standard deviation gets weight 0
 
 
@@ -39,16 +43,10 @@ SearchOptions = Any
 class Tables:
     """R frames of clips, in runs. A run is a sequence of consecutive frames of one clip.
 
-    It is a `FinishedNetwork` of `hobble.models.model`, which explains the methods.
-
     features: (R, n) float32, the columns of x that a search compares, each times its weight. y: (R, Y)
     float32, raw units. phase: (R,) in cycles. remaining: (R,) int32, how many frames of the run follow.
-    columns: (n,) which columns of x are features. weights: (n,) their weights. every: frames between two
-    searches. halflife: frames in which the offset of a transition falls to about half, see
-    `hobble.models.matching.network`.
+    columns: (n,) which columns of x are features. weights: (n,) their weights.
     """
-
-    kind: ClassVar[str] = "matching"
 
     features: Array = field(repr=False)
     y: Array = field(repr=False)
@@ -56,37 +54,32 @@ class Tables:
     remaining: NDArray[np.int32] = field(repr=False)
     columns: NDArray[np.int64]
     weights: Array
-    every: int
-    halflife: float
-
-    def arrays(self) -> dict[str, np.ndarray]:
-        """As in `FinishedNetwork`."""
-        return {
-            "features": self.features,
-            "frames": self.y,
-            "phase": self.phase,
-            "remaining": self.remaining,
-            "columns": self.columns,
-            "feature_weights": self.weights,
-        }
-
-    @property
-    def file_metadata(self) -> dict[str, Any]:
-        """As in `FinishedNetwork`."""
-        return {
-            "network": "a search compares features (weighted columns of x) and finds the frame of the clips "
-            "nearest to the input; from there the clip is played, one y a frame, until the next search",
-            "every": self.every,
-            "halflife": self.halflife,
-        }
-
-    @property
-    def description(self) -> str:
-        """As in `FinishedNetwork`."""
-        return f"{len(self.y):,} frames of clips, compared by {len(self.columns)} features"
 
 
 def build(
+    options: SearchOptions, clips: Sequence[str | Path], layout: RowLayout, skeleton: Skeleton
+) -> BuiltNetwork:
+    """Motion matching over the frames of clips; see `read_tables`."""
+    tables = read_tables(options, clips, layout, skeleton)
+    arrays = {
+        "features": tables.features,
+        "frames": tables.y,
+        "phase": tables.phase,
+        "remaining": tables.remaining,
+        "columns": tables.columns,
+        "feature_weights": tables.weights,
+    }
+    metadata = {
+        "network": "a search compares features (weighted columns of x) and finds the frame of the clips "
+        "nearest to the input; from there the clip is played, one y a frame, until the next search",
+        "every": options.every,
+        "halflife": options.halflife,
+    }
+    words = f"{len(tables.y):,} frames of clips, compared by {len(tables.columns)} features"
+    return BuiltNetwork("matching", arrays, metadata, words)
+
+
+def read_tables(
     options: SearchOptions, clips: Sequence[str | Path], layout: RowLayout, skeleton: Skeleton
 ) -> Tables:
     """Build the tables.
@@ -119,8 +112,6 @@ def build(
         remaining=np.concatenate(remainings),
         columns=columns,
         weights=weights,
-        every=options.every,
-        halflife=options.halflife,
     )
 
 
@@ -158,6 +149,20 @@ def find_runs(rows: ClipRows) -> tuple[NDArray[np.int64], NDArray[np.int32]]:
     ends = np.flatnonzero(np.diff(frame, append=frame[-1] + 2 if len(frame) else 0) != 1)
     index = np.arange(len(kept))
     return kept, (ends[np.searchsorted(ends, index)] - index).astype(np.int32)
+
+
+def findable_rows(remaining: NDArray[Any]) -> NDArray[np.int64]:
+    """Indices (S,) of the rows that a search may find. remaining: (R,) as in `Tables`.
+
+    These rows are not near the end of a run (FEWEST_LEFT), and not the first of a run: rotation speeds are
+    computed from the row before. If all runs are too short, a search may find all rows but the first of each
+    run. If every run has only one row, it may find all rows.
+    """
+    is_first = np.r_[True, remaining[:-1] == 0]
+    far_from_end = np.flatnonzero((remaining >= FEWEST_LEFT) & ~is_first)
+    if len(far_from_end):
+        return far_from_end
+    return np.flatnonzero(~is_first) if (~is_first).any() else np.arange(len(is_first))
 
 
 def feature_groups(

@@ -28,16 +28,15 @@ from hobble.core.declared import ArrayOf, read_declared
 from hobble.core.errors import InputError
 from hobble.core.quat import Array
 from hobble.models.load import LARGEST_MEAN, read_arrays
+from hobble.models.matching.build import findable_rows
 from hobble.models.network import RECORDED, STORAGES, Network, standardise_inputs
 from hobble.models.predict import StandardisingPredictor
+from hobble.rows.layout import RowLayout
 
 # Largest number of rows of the tables. The page keeps row numbers in float32, which is exact up to here.
 MOST_ROWS = 1 << 24
 MOST_WEIGHT = 1e9  # largest weight of a feature
 MOST_FRAMES = 1_000_000  # largest number of frames between two searches, and largest half-life in frames
-# A run is a sequence of consecutive frames of a clip. A search skips rows with fewer frames left in their
-# run, because playback would soon reach its end.
-FEWEST_LEFT = 20
 # About this many rows are put in the report's page, as 5.5 MB of text. A page with several characters should
 # stay below 20 MB.
 MOST_ON_PAGE = 5500
@@ -90,7 +89,7 @@ class Matching(Network):
 
     @classmethod
     def read(cls, path: str | Path, arrays: Mapping[str, Any], shared_fields: Mapping[str, Any]) -> Matching:
-        """As in `Model`. arrays: those of `hobble.models.matching.build.Tables`."""
+        """As in `Model`. arrays: those of `hobble.models.matching.build.build`."""
         inputs, outputs = len(shared_fields["x_mean"]), len(shared_fields["y_mean"])
         declared = {
             "frames": ArrayOf(("frames", outputs), "fiu", -LARGEST_MEAN, LARGEST_MEAN),
@@ -149,17 +148,8 @@ class Matching(Network):
 
     @cached_property
     def start_rows(self) -> NDArray[np.int64]:
-        """Indices (S,) of the rows that a search may find.
-
-        These rows are not near the end of a run (FEWEST_LEFT), and not the first of a run: rotation speeds
-        are computed from the row before. If all runs are too short, a search may find all rows but the first
-        of each run. If every run has only one row, it may find all rows.
-        """
-        is_first = np.r_[True, self.remaining[:-1] == 0]
-        far_from_end = np.flatnonzero((self.remaining >= FEWEST_LEFT) & ~is_first)
-        if len(far_from_end):
-            return far_from_end
-        return np.flatnonzero(~is_first) if (~is_first).any() else np.arange(len(is_first))
+        """As `findable_rows`."""
+        return findable_rows(self.remaining)
 
     @cached_property
     def tree(self) -> cKDTree:
@@ -169,7 +159,7 @@ class Matching(Network):
     @property
     def memory_size(self) -> int:
         """As in `Network`: the row shown, the number of frames since the last search, and the offsets."""
-        return memory_size(self.layout.joints)
+        return OFFSETS + OFFSETS_PER_JOINT * self.layout.joints
 
     @property
     def sizes(self) -> tuple[int, ...]:
@@ -247,11 +237,7 @@ class MatchingPredictor(StandardisingPredictor):
         if storage == "int16":
             self.scale = np.maximum(np.abs(network.frames).max(axis=0) / 32767, 1e-30).astype(np.float32)
             self.frames = np.round(network.frames / self.scale).astype(np.int16)
-        layout = network.layout
-        blocks = (
-            layout.y_joint_position, layout.y_joint_velocity, layout.y_joint_rotation, layout.y_phase_change
-        )  # fmt: skip
-        self._first_columns = np.array([block.start for block in blocks], np.int64)
+        self._first_columns = first_columns(network.layout)
         _ = network.tree  # build the tree now, not in the first frame
 
     def evaluate(self, z: Array, phase: Array, out: Array, memory: Any = None, *_: Any) -> None:
@@ -290,9 +276,10 @@ class MatchingPredictor(StandardisingPredictor):
         return np.where(stay & (following >= 0), following, found)
 
 
-def memory_size(joints: int) -> int:
-    """How many numbers the memory of one character has."""
-    return OFFSETS + OFFSETS_PER_JOINT * joints
+def first_columns(layout: RowLayout) -> NDArray[np.int64]:
+    """The columns of Y at POSITION, VELOCITY, ROTATION and PHASE_CHANGE."""
+    blocks = layout.y_joint_position, layout.y_joint_velocity, layout.y_joint_rotation, layout.y_phase_change
+    return np.array([block.start for block in blocks], np.int64)
 
 
 @njit
@@ -349,11 +336,43 @@ def show_rows(memory: Any, table: Table, choice: Choice, phase: Any, shape: Shap
                 _start_transition(memory[c], frames, scale, before[c], following[c], row, joints, at)
             _decay_offsets(memory[c, OFFSETS:], damping)
             _add_offsets(memory[c, OFFSETS:], joints, at, out[c])
-            lag = phases[row] - phase[c]
-            lag -= np.floor(lag + 0.5)  # at most half a cycle, forwards or backwards
-            out[c, at[PHASE_CHANGE]] += min(max(lag, -FASTEST_PULL), FASTEST_PULL)
+            out[c, at[PHASE_CHANGE]] += _pull(phases[row], phase[c])
         memory[c, ROW] = row + 1
         memory[c, SINCE] = 0 if due[c] else memory[c, SINCE] + 1
+
+
+@njit(error_model="numpy")
+def smooth_jumps(offsets: Any, before: Any, jumps: Any, at: Any, halflife: float, out: Any) -> None:
+    """Add the offsets (C, 12 joints) of C characters to their poses in `out` (C, Y), after they have decayed.
+
+    Where `jumps` (C,) is true, the difference between the pose that would have come, in `before` (C, Y), and
+    that in `out` is first added to the offsets. at, halflife: as in `show_rows`.
+    """
+    joints, damping = offsets.shape[1] // OFFSETS_PER_JOINT, 2.0 * np.log(2.0) / halflife
+    for c in range(len(out)):
+        if jumps[c]:
+            _add_difference(offsets[c], before[c], out[c], joints, at)
+        _decay_offsets(offsets[c], damping)
+        _add_offsets(offsets[c], joints, at, out[c])
+
+
+@njit(error_model="numpy")
+def pull_phase(phases: Any, phase: Any, chosen: Any, at: Any, out: Any) -> None:
+    """Correct the change of phase in `out` (C, Y) of the `chosen` (C,) characters, as `show_rows` does.
+
+    phases, phase: (C,) of the poses and of the characters, in cycles.
+    """
+    for c in range(len(out)):
+        if chosen[c]:
+            out[c, at[PHASE_CHANGE]] += _pull(phases[c], phase[c])
+
+
+@njit(forceinline=True, cache=False)
+def _pull(wanted: float, phase: float) -> float:
+    """What to add to the change of a phase so that it approaches the phase `wanted`."""
+    lag = wanted - phase
+    lag -= np.floor(lag + 0.5)  # at most half a cycle, forwards or backwards
+    return min(max(lag, -FASTEST_PULL), FASTEST_PULL)
 
 
 @njit(forceinline=True, cache=False)
@@ -368,6 +387,23 @@ def _start_transition(
     old, new = frames[following if following >= 0 else before] * scale, frames[row] * scale
     # A joint's rotation speed is its rotation from one row to the next of the same run.
     before_old, before_new = frames[before] * scale, frames[max(row - 1, 0)] * scale
+    _add_difference(offsets, old, new, joints, at)
+    if following < 0:
+        return
+    r = np.empty(3)
+    for j in range(joints):
+        column, k = at[ROTATION] + 3 * j, OFFSETS_PER_JOINT * j + 9
+        _rotation_since(before_old, old, column, r)
+        for i in range(3):
+            offsets[k + i] += r[i]
+        _rotation_since(before_new, new, column, r)
+        for i in range(3):
+            offsets[k + i] -= r[i]
+
+
+@njit(forceinline=True, cache=False)
+def _add_difference(offsets: Any, old: Any, new: Any, joints: int, at: Any) -> None:
+    """Add pose `old` minus pose `new`, rows of Y, to the offsets of positions, velocities and rotations."""
     q, p, r = np.empty(4), np.empty(4), np.empty(3)  # two quaternions and a rotation vector
     for j in range(joints):
         k = OFFSETS_PER_JOINT * j
@@ -381,13 +417,6 @@ def _start_transition(
         _exp(offsets, k + 6, p)
         _exp(r, 0, q)
         _log_of_product(p, q, offsets, k + 6)
-        if following >= 0:
-            _rotation_since(before_old, old, column, r)
-            for i in range(3):
-                offsets[k + 9 + i] += r[i]
-            _rotation_since(before_new, new, column, r)
-            for i in range(3):
-                offsets[k + 9 + i] -= r[i]
 
 
 @njit(forceinline=True, cache=False)
