@@ -37,8 +37,7 @@ from hobble.runtime.options import Runtime
 from hobble.runtime.waypoints import TRACK, Waypoint
 from hobble.training.batches import HeldOutErrors
 from hobble.training.options import Training
-from hobble.training.run import write_weights
-from hobble.training.train import train
+from hobble.training.train import train, write_weights
 
 LENGTHS = (1, 10, 60)
 

@@ -21,7 +21,7 @@ from hobble.database.write import write_database
 from hobble.measures.accuracy_run import measure_accuracy
 from hobble.models.pfnn import PfnnOptions
 from hobble.training.options import Training
-from hobble.training.run import run
+from hobble.training.train import run
 
 DTYPES = ("float32", "float16", "bfloat16")
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -72,16 +71,6 @@ def test_damaged_cache_files_are_compiled_again(tmp_path, content):
     assert result.stderr.count("RuntimeWarning") == 1
 
 
-def test_folders_in_place_of_cache_files_are_compiled_again(tmp_path):
-    cache = str(tmp_path / "cache")
-    run(tmp_path, NUMBA_CACHE_DIR=cache)
-    for path in cached(tmp_path):
-        path.unlink()
-        path.mkdir()
-    assert run(tmp_path, NUMBA_CACHE_DIR=cache).stdout == "8 12.0\n"
-    shutil.rmtree(cache)
-
-
 def test_every_compiled_function_works_without_its_cache():
     """numba's own `njit(cache=True)` raises if it finds no folder that it can write."""
     source = Path(__file__).resolve().parents[2] / "src"
@@ -91,34 +80,3 @@ def test_every_compiled_function_works_without_its_cache():
         str(path) for path in own if "numba.njit" in (text := path.read_text()) or "numba import njit" in text
     ]
     assert found == []
-
-
-def test_the_runtime_starts_on_a_full_disk(tmp_path):
-    """With the package on a full disk and no home folder, there is one warning and everything works."""
-    disk = tmp_path / "disk"
-    disk.mkdir()
-    if (
-        os.name != "posix"
-        or os.getuid()
-        or subprocess.run(
-            ["mount", "-t", "tmpfs", "-o", "size=4m", "tmpfs", disk], capture_output=True
-        ).returncode
-    ):
-        pytest.skip("needs root to mount a small disk")
-    try:
-        source = Path(__file__).resolve().parents[2] / "src/hobble"
-        ignore = shutil.ignore_patterns("__pycache__", "*.j2", "web")
-        shutil.copytree(source, disk / "hobble", ignore=ignore)
-        with pytest.raises(OSError, match="No space"):
-            (disk / "filling").write_bytes(bytes(8 << 20))
-        script = "from hobble.runtime.ground import Heightmap; import numpy as np\n"
-        script += "print(Heightmap(np.ones((4, 4)))(np.zeros(2), np.zeros(2)))"
-        variables = {"PATH": os.environ["PATH"], "PYTHONPATH": str(disk), "HOME": str(disk / "home")}
-        result = subprocess.run(
-            [sys.executable, "-B", "-c", script], env=variables, capture_output=True, text=True, timeout=120
-        )
-    finally:
-        subprocess.run(["umount", disk], check=True)
-    assert result.stdout == "[1. 1.]\n", result.stderr
-    assert result.stderr.count("RuntimeWarning: compiled functions are not kept") == 1
-    assert "Traceback" not in result.stderr

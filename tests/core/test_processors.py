@@ -20,11 +20,6 @@ def test_two_threads_of_one_core_count_once(tmp_path: Path) -> None:
     assert count_cores([0, 1, 4, 5], folder) == 2
 
 
-def test_without_topology_each_processor_counts(tmp_path: Path) -> None:
-    assert count_cores([0, 1, 2], tmp_path) == 3
-    assert count_cores([], tmp_path) == 1
-
-
 @pytest.mark.parametrize(
     ("flags", "limit", "fast"),
     [
@@ -43,7 +38,3 @@ def test_bfloat16_depends_on_the_cpu_and_on_the_onednn_limit(
     file.write_text(f"flags\t\t: fpu {flags}\n")
     environment = {} if limit is None else {"ONEDNN_MAX_CPU_ISA": limit}
     assert multiplies_bfloat16(file, environment) is fast
-
-
-def test_a_system_without_the_file_has_no_bfloat16(tmp_path: Path) -> None:
-    assert not multiplies_bfloat16(tmp_path / "missing", {})

@@ -19,7 +19,7 @@ import pytest
 from hobble.core.errors import HobbleError, InputError
 from hobble.database import write
 from hobble.database.reader import Database
-from hobble.database.write import ROW_INDEX, Buckets, write_database
+from hobble.database.write import write_database
 from hobble.rows.clip_rows import load_clip_rows, save_clip_rows
 from hobble.rows.layout import RowLayout
 
@@ -77,56 +77,6 @@ def test_training_may_use_every_fourth_frame(rows_of, tmp_path):
     kept = [range(60, 100, 4), range(60, 100), range(60, 100, 8), range(64, 100, 8)]
     expected = [(clip, frame) for clip, frames in enumerate(kept) for frame in frames]
     np.testing.assert_array_equal(read_all(tmp_path / "db"), expected)
-
-
-def test_buckets_put_rows_and_their_fits_into_the_final_order(tmp_path):
-    rng = np.random.default_rng(0)
-    count = rng.choice([1, 3], 100)
-    index = np.zeros(100, ROW_INDEX)
-    index["place"], index["count"] = rng.permutation(100), count
-    index["frame"] = index["place"]
-    frames = index["place"][:, None].astype(np.float32)
-    fits = np.repeat(frames, count, axis=0) + np.concatenate([np.arange(n) for n in count])[:, None] / 10
-    buckets = Buckets(tmp_path / "b", 100, 30, 1, 1)
-    for start in range(0, 100, 40):
-        part, first = slice(start, start + 40), count[:start].sum()
-        buckets.add(frames[part], fits[first : first + count[part].sum()], index[part])
-    got = list(buckets.drain())
-    assert [len(i) for _, _, i in got] == [30, 30, 30, 10]
-    np.testing.assert_array_equal(np.concatenate([f for f, _, _ in got])[:, 0], np.arange(100))
-    fits_of = np.concatenate([np.floor(g[:, 0]) for _, g, _ in got])
-    np.testing.assert_array_equal(fits_of, np.repeat(np.arange(100), count[np.argsort(index["place"])]))
-    assert not any((tmp_path / "b").iterdir())
-
-
-def test_the_database_is_smaller_than_the_original_layout(rows_of, tmp_path):
-    """31 joints: at most 27% of the original's bytes in float32, half of that in float16 or bfloat16."""
-    layout = RowLayout(31, channels=(("injury", 30),))
-    rng = np.random.default_rng(0)
-    joints = {f"j{i}": {} for i in range(31)}
-
-    def clip(name: str, fits: int):
-        n = 300
-        return replace(
-            rows_of(name, n, fits),
-            layout=layout,
-            skeleton={"name": "s", "joints": joints},
-            x=rng.normal(size=(n, layout.x_terrain.start)).astype(np.float32),
-            y=rng.normal(size=(n, layout.y_size)).astype(np.float32),
-            channels={"injury": np.zeros((n, 30), np.float32)},
-        )
-
-    for fits in (1, 10):
-        clips = {"a": clip("a", fits)}
-        sizes = {}
-        for dtype in ("float32", "float16", "bfloat16"):
-            options = {**OPTIONS, "channels": [], "dtype": dtype}
-            manifest = write_database(tmp_path / f"{dtype}{fits}", clips, {"a": "train"}, **options)
-            assert manifest.original_bytes == 300 * 10 * (342 + 311 + 1) * 4
-            files = (tmp_path / f"{dtype}{fits}").rglob("*")
-            sizes[dtype] = sum(f.stat().st_size for f in files if f.is_file()) / manifest.original_bytes
-        assert sizes["float32"] < 0.17
-        assert max(sizes["float16"], sizes["bfloat16"]) < 0.55 * sizes["float32"]
 
 
 def test_memory_does_not_grow_with_the_number_of_clips(rows_of, tmp_path, monkeypatch):

@@ -34,13 +34,6 @@ def test_over_all_layers_each_row_uses_each_fit_equally_often(rows, seed, pass_i
         np.testing.assert_array_equal(np.bincount(of_row, minlength=fits), np.full(fits, 10 // fits))
 
 
-def test_each_row_has_its_own_order_of_fits():
-    shown = np.stack([order.pick_fits(np.full(500, 10), 10, 1, 0, layer, 0) for layer in range(10)], axis=1)
-    assert len(np.unique(shown, axis=0)) > 480
-    again = np.stack([order.pick_fits(np.full(500, 10), 10, 1, 1, layer, 0) for layer in range(10)], axis=1)
-    assert (shown == again).mean() < 0.15  # a tenth by chance
-
-
 def test_every_layer_has_every_chunk_once_in_a_new_order():
     groups = order.chunk_groups(37, 8, seed=1, pass_index=0, layer=0)
     assert [len(g) for g in groups] == [1, 2, 4, 8, 8, 8, 6]  # the first is soon read

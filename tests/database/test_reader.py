@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 from collections import Counter
-from itertools import islice, pairwise
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +13,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hobble.core.errors import HobbleError, InputError
+from hobble.core.errors import InputError
 from hobble.core.files import read_json
 from hobble.database.reader import Block, Database, read_ahead
 from hobble.database.write import write_database
@@ -228,11 +228,6 @@ def test_an_incomplete_database_is_refused(path, tmp_path):
         Database.open(tmp_path)
 
 
-def test_a_section_that_does_not_exist_is_refused(path):
-    with pytest.raises(HobbleError, match="no section 10"):
-        Database.open(path).blocks("train", 0, 10, 10, 1)
-
-
 def test_reading_ahead_keeps_the_order_and_raises_errors():
     assert list(read_ahead(iter(range(100)))) == list(range(100))
 
@@ -260,9 +255,3 @@ def test_a_chunk_can_be_opened_with_numpy(path):
     assert all(a[1] == b[0] for a, b in pairwise(ends))
     assert ends[-1][1] == len(data) - 8 - length
     assert os.path.getsize(path / db.manifest.folder / chunk.file) == chunk.bytes
-
-
-def test_reading_can_stop_at_any_block(path):
-    db = Database.open(path, DISK)
-    for count in range(4):
-        assert len(list(islice(db.blocks("train", 0, 0, 10, 1, 32), count))) == count

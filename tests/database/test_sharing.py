@@ -37,7 +37,3 @@ def test_processes_read_the_parts_of_the_batches_of_one(
             found == of_all[places.start : places.stop]
             for found, of_all in zip(own[:-1], whole, strict=False)
         )
-
-
-def test_one_stretch_is_the_section_in_order() -> None:
-    assert list(chain(*batches(95, 32, 1, range(1)))) == list(range(95))

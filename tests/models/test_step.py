@@ -66,15 +66,6 @@ def test_loss_and_gradient_are_those_of_the_definition(step_class, kind, argumen
 
 
 @pytest.mark.parametrize("step_class", STEPS)
-@pytest.mark.parametrize(("kind", "arguments", "rows"), CASES[1::3])
-def test_without_dropout_the_error_is_that_of_the_network(step_class, kind, arguments, rows) -> None:
-    network, x, y, p = problem(kind, arguments, rows)
-    step = step_class(network, 0.0)
-    step(x.clone(), y, p, step.masks(rows))
-    assert torch.allclose(step.error, network(x, p) - y, rtol=1e-10, atol=1e-12)
-
-
-@pytest.mark.parametrize("step_class", STEPS)
 def test_ten_training_steps_equal_those_of_torch_adam(step_class) -> None:
     """Ten steps with dropout, the L1 term and Adam, against PyTorch's own Adam on the plain definition."""
     network, x, y, p = problem(TrainablePfnn, ((6, 5, 5, 3), 4), 12)

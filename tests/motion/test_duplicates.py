@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from hobble.core.errors import HobbleError
-from hobble.database.split_check import refuse_split_pairs
+from hobble.database.write import refuse_split_pairs
 from hobble.motion.axes import turned_about_vertical
 from hobble.motion.duplicates import clip_digest, duplicate_pairs
 from hobble.motion.edit import mirror_clip, resample

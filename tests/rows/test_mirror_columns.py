@@ -72,21 +72,6 @@ def test_the_rows_of_a_mirrored_clip_are_the_mirrored_rows(holden31, walked):
             assert apart > 1e-3 or name in ("gait", "mood", "phase_change"), f"{name} is not symmetric itself"
 
 
-def test_the_phase_of_a_mirrored_clip_is_half_a_cycle_later(walked):
-    a, b, i, j = in_both(*walked)
-    between = (a.p[i] % 0.5 > 0) & (b.p[j] % 0.5 > 0)  # the first and last frame of a cycle are 0 and 1
-    late = (a.p[i] + 0.5 - b.p[j])[between] % 1.0
-    np.testing.assert_allclose(np.minimum(late, 1 - late), 0, atol=0.05)
-    assert between.sum() > 200
-
-
-def test_mirroring_twice_gives_the_same_rows(holden31):
-    layout = RowLayout(31, channels=(("injury", 30), ("mood", 5)))
-    x = np.random.default_rng(1).normal(size=(3, layout.x_size))
-    mirror = mirror_of_x(layout, holden31)
-    assert np.array_equal(mirror(mirror(x)), x)
-
-
 def test_standardised_rows_are_mirrored_as_raw_ones_are(holden31):
     layout = RowLayout(31)
     raw = mirror_of_y(layout, holden31)

@@ -19,7 +19,7 @@ from hobble.database.reader import Database
 from hobble.models import network_options
 from hobble.models.model import Trainable
 from hobble.training import train as module
-from hobble.training.augment import OtherPoses, RollOut
+from hobble.training.augment import OtherPaces, OtherPoses, RollOut
 from hobble.training.batches import HostRows, SampleBatch
 from hobble.training.options import Training
 from hobble.training.processes import ALONE, Processes, join_processes
@@ -43,7 +43,7 @@ def in_double() -> None:
     to = Trainable.to
     Trainable.to = lambda self, device, dtype=None: to(self, device, torch.float64)  # type: ignore[method-assign]
 
-    for kind in (RollOut, OtherPoses):
+    for kind in (RollOut, OtherPoses, OtherPaces):
         widen_state(kind)
 
 

@@ -16,7 +16,7 @@ from hobble.models.load import load_network
 from hobble.models.matching import MatchingOptions
 from hobble.rows.clip_rows import save_clip_rows
 from hobble.training.options import Training
-from hobble.training.run import run
+from hobble.training.train import run
 from tests.models.matching.example import FRAMES, clip
 
 SPLITS = {"clip-0": "train", "clip-1": "held_out"}

@@ -16,7 +16,7 @@ import torch
 
 from hobble.core.files import load_npz, save_npz
 from hobble.database.reader import Database
-from hobble.training import checkpoint
+from hobble.training import train as module
 from hobble.training.checkpoint import State, pack
 from hobble.training.train import train
 
@@ -74,7 +74,7 @@ def _sections(folder: Path) -> int:
 
 @pytest.mark.parametrize(
     ("recipe", "written", "number"),
-    [({}, False, 0), ({}, True, 5), (HURRIED, True, 1), (HURRIED, False, 3)],
+    [({}, False, 0), (HURRIED, True, 1), (HURRIED, False, 3)],
 )
 def test_a_training_killed_at_any_write_ends_with_the_same_bits(
     data: Database,
@@ -101,7 +101,7 @@ def test_a_training_killed_at_any_write_ends_with_the_same_bits(
         raise SystemExit
 
     with monkeypatch.context() as patch:
-        patch.setattr(checkpoint, "save_npz", dying)
+        patch.setattr(module, "save_npz", dying)
         with pytest.raises(SystemExit):
             train(data, **arguments, checkpoints=tmp_path / "killed")
     final = train(data, **arguments, checkpoints=tmp_path / "killed")

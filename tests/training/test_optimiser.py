@@ -22,24 +22,3 @@ def test_the_compiled_adam_equals_the_plain_one(monkeypatch: pytest.MonkeyPatch)
             adams[1].step(gradients, share)
     assert torch.allclose(networks[0].flat, networks[1].flat, rtol=1e-4, atol=1e-6)
     assert torch.allclose(adams[0].first_moment, adams[1].first_moment, rtol=1e-4, atol=1e-6)
-
-
-def test_only_the_l1_term_moves_weights_that_have_no_gradient() -> None:
-    network = fresh((8, 6, 4))
-    network.layers[0][0, 0, 0] = 0.0
-    before = network.flat.clone()
-    adam = Adam(network, 0.001, 0.9, 0.999, 0.01)
-    adam.step([torch.zeros_like(layer) for layer in network.layers])
-    old, new = network.views(before), network.layers
-    for was, now in zip(old, new, strict=True):
-        assert torch.equal(was[:, :, -1], now[:, :, -1])  # biases are not weighed
-        moved = was[:, :, :-1] - now[:, :, :-1]
-        assert torch.all(torch.sign(moved) == torch.sign(was[:, :, :-1]))
-    assert float(new[0][0, 0, 0]) == 0
-
-
-def test_the_share_of_a_layer_in_the_l1_term() -> None:
-    """.01 * mean|W| / 6 for three layers, because the original divides by its six arrays."""
-    network = fresh((342, 512, 512, 311))
-    slopes = optimiser.l1_slopes(network, 0.01)
-    assert slopes == pytest.approx([0.01 / 6 / (4 * n) for n in (342 * 512, 512 * 512, 512 * 311)])

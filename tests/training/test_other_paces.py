@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pytest
 import torch
 
 from hobble.database.reader import Database
 from hobble.training.augment import RISE, OtherPaces
-from hobble.training.optimiser import Update
-from hobble.training.train import train
 
 from .conftest import change
 
@@ -128,66 +124,3 @@ def test_sway_shrinks_by_shares_spread_evenly_and_a_curve_stays(data: Database) 
     rest = rest[rise.abs() < 0.02]
     assert len(rest) > 20
     np.testing.assert_allclose(np.sort(rest), np.linspace(0, 1, len(rest)), atol=0.15)
-
-
-def test_channels_keep_their_bits(data: Database) -> None:
-    x, y = walkers(data)
-    x, y = x.float(), y.float()
-    before = x.clone(), y.clone()
-    change(OtherPaces(data, FACTOR, range(ROWS), CPU), x, y=y)
-    injury = data.layout.x_channel("injury")
-    assert torch.equal(x[:, injury], before[0][:, injury])
-    assert not torch.equal(x, before[0])
-    assert not torch.equal(y, before[1])
-
-
-def test_two_processes_change_what_one_changes_and_sections_are_alike(data: Database) -> None:
-    whole = [table.float() for table in walkers(data)]
-    parts = [[table[some].clone() for table in whole] for some in (slice(0, 150), slice(150, ROWS))]
-    one = OtherPaces(data, FACTOR, range(ROWS), CPU)
-    two = [OtherPaces(data, FACTOR, places, CPU) for places in (range(150), range(150, ROWS))]
-    start = [table.clone() for table in whole]
-    for _ in range(2):
-        change(one, whole[0], y=whole[1])
-        for each, part in zip(two, parts, strict=True):
-            change(each, part[0], y=part[1])
-    for k in range(2):
-        np.testing.assert_allclose(whole[k], torch.cat([part[k] for part in parts]), rtol=1e-4, atol=1e-3)
-    first = [table.clone() for table in start]
-    one.begin_section()
-    change(one, first[0], y=first[1])
-    one.begin_section()
-    change(one, start[0], y=start[1])
-    assert all(torch.equal(a, b) for a, b in zip(first, start, strict=True))
-
-
-def test_training_plays_other_paces_and_keeps_channels_only_if_asked(
-    data: Database,
-    network: Any,
-    training: Any,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    given: list[torch.Tensor],
-) -> None:
-    dropped: list[float] = []
-
-    def drawn(self: Update, *rest: Any) -> Any:
-        masks = of_update(self, *rest)
-        injury = data.layout.x_channel("injury")
-        dropped.append(float((masks[0][:, injury] != 1).float().mean()))
-        assert (masks[0] == 0).any(), "other inputs are dropped"
-        return masks
-
-    of_update = Update._masks
-    monkeypatch.setattr(Update, "_masks", drawn)
-    for factor, keep in ((1.0, False), (1.2, True)):
-        settings = training | {"passes": 1, "sections": 2, "batch": 90, "dropout": 0.2}
-        settings |= {"other_paces": factor, "keep_channels": keep}
-        train(data, network=network, training=settings, checkpoints=tmp_path / str(factor))
-    half = len(given) // 2
-    injury = data.layout.x_channel("injury")
-    for without, other in zip(given[:half], given[half:], strict=True):
-        assert torch.equal(without[:, injury], other[:, injury])
-        assert (without != other).any(dim=1).all()
-    assert min(dropped[:half]) > 0
-    assert max(dropped[half:]) == 0

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,7 +10,6 @@ import torch
 
 from hobble.database.reader import Database
 from hobble.training.augment import BEYOND, NEAR, OtherPoses
-from hobble.training.train import train
 
 from .conftest import change
 
@@ -84,19 +82,3 @@ def test_the_nearest_phase_is_taken_also_over_the_end_of_the_cycle(data: Databas
     x, p = batch(data, 0.0, 0.01)
     change(others, x, p)
     assert float(x[:, of_pose(data)].max()) == pytest.approx(20.0, rel=0.02)
-
-
-def test_training_mixes_poses_only_if_configured(
-    data: Database, network: Any, training: Any, tmp_path: Path, given: list[torch.Tensor]
-) -> None:
-    for share in (0.0, 0.5):
-        settings = training | {"passes": 1, "sections": 2, "batch": 90, "other_poses": share}
-        train(data, network=network, training=settings, checkpoints=tmp_path / str(share))
-    half = len(given) // 2
-    columns = of_pose(data)
-    rest = [column for column in range(data.layout.x_size) if column not in columns]
-    changed = 0
-    for without, mixed in zip(given[:half], given[half:], strict=True):
-        assert torch.equal(without[:, rest], mixed[:, rest])
-        changed += int((without != mixed).any(dim=1).sum())
-    assert 0 < changed < sum(len(x) for x in given[:half]) / 2

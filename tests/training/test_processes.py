@@ -34,6 +34,7 @@ HARD = {
     "batch": 90,
     "rollout": 4,
     "other_poses": 0.5,
+    "other_paces": 1.2,
     "dropout": 0.2,
     "l1": 0.1,
     "learning_rate": 1e-3,
@@ -207,8 +208,9 @@ def test_several_machines_need_slurm(monkeypatch: pytest.MonkeyPatch, tmp_path: 
         ({"nodes": 5, "processes": 8}, "40 processes share a batch of 32"),
         ({"stretches": 33}, "must not be more than `batch`"),
         ({"stretches": 4, "processes": 3}, "must be a multiple of the 3 processes"),
+        ({"schedule": "cosine", "continues": "holden"}, "`continues` needs `schedule: constant`"),
     ],
 )
-def test_invalid_machines_are_refused(training: Recipe, changes: dict[str, Any], message: str) -> None:
+def test_invalid_settings_are_refused(training: Recipe, changes: dict[str, Any], message: str) -> None:
     with pytest.raises(ValueError, match=message):
         training | changes

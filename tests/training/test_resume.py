@@ -15,8 +15,7 @@ from hobble.core.files import load_npz, save_npz
 from hobble.database.reader import Database
 from hobble.rows.layout import CONTACTS, GAITS, RowLayout
 from hobble.training.checkpoint import State, pack, recipe_hash
-from hobble.training.run import run
-from hobble.training.train import train
+from hobble.training.train import run, train
 
 Settings = dict[str, Any]
 
@@ -24,22 +23,8 @@ Settings = dict[str, Any]
 def test_more_passes_resume_and_fewer_start_again(
     data: Database, network: Settings, training: Settings, tmp_path: Path
 ) -> None:
-    def to(passes: int, folder: str) -> torch.Tensor:
-        settings = training | {"passes": passes}
-        state = train(data, network=network, training=settings, checkpoints=tmp_path / folder, threads=2)
-        assert len(state.history) == 3 * passes
-        return state.network.flat
+    """A fraction of a pass is its first sections."""
 
-    to(1, "a")
-    three = to(3, "a")
-    assert len(list((tmp_path / "a").iterdir())) == 1
-    assert torch.equal(three, to(3, "b"))
-    assert torch.equal(to(2, "b"), to(2, "c"))
-
-
-def test_a_fraction_of_a_pass_is_its_first_sections(
-    data: Database, network: Settings, training: Settings, tmp_path: Path
-) -> None:
     def to(passes: float, folder: str) -> State:
         settings = training | {"passes": passes}
         return train(data, network=network, training=settings, checkpoints=tmp_path / folder, threads=2)
@@ -47,10 +32,12 @@ def test_a_fraction_of_a_pass_is_its_first_sections(
     third, whole = to(1 / 3, "a"), to(1, "b")
     assert third.samples == data.section_sample_count("train", 0, 3) < data.sample_count("train")
     assert [row[:3] for row in third.history] == [row[:3] for row in whole.history[:1]]
-    resumed = to(1, "a")
-    assert torch.equal(resumed.network.flat, whole.network.flat)
-    assert not torch.equal(third.network.flat, whole.network.flat)
-    assert torch.equal(to(4 / 3, "a").network.flat, to(4 / 3, "c").network.flat)
+    for passes in (1, 4 / 3, 3):
+        resumed = to(passes, "a")
+        assert len(resumed.history) == round(3 * passes)
+        assert torch.equal(resumed.network.flat, to(passes, f"to {passes}").network.flat)
+    assert len(list((tmp_path / "a").iterdir())) == 1
+    assert torch.equal(to(2, "a").network.flat, to(2, "c").network.flat)
     with pytest.raises(ValueError, match="whole number"):
         training | {"passes": 0.5}
 
@@ -113,10 +100,11 @@ def test_another_start_network_ignores_the_earlier_checkpoint(
 
 
 @pytest.mark.parametrize(
-    ("settings", "message"),
+    ("units", "settings", "message"),
     [
-        ({"passes": 4, "sections": 2}, "was trained with 3 sections a pass, but training.sections is 2"),
-        ({"passes": 1}, "has 2 passes, but training.passes is 1"),
+        (24, {"passes": 4, "sections": 2}, "was trained with 3 sections a pass, but training.sections is 2"),
+        (24, {"passes": 1}, "has 2 passes, but training.passes is 1"),
+        (30, {}, r"holds a network of \d+-24-24-\d+ units.* not of .*-30-30-"),
     ],
 )
 def test_an_unusable_start_network_is_refused(
@@ -124,19 +112,16 @@ def test_an_unusable_start_network_is_refused(
     network: Settings,
     training: Settings,
     tmp_path: Path,
+    units: int,
     settings: Settings,
     message: str,
 ) -> None:
     state = train(data, network=network, training=training, checkpoints=tmp_path / "a")
-    save_npz(tmp_path / "start.npz", **pack(state))
+    start = tmp_path / "start.npz"
+    save_npz(start, **pack(state))
+    other = network.model_copy(update={"units": units})
     with pytest.raises(InputError, match=rf"start\.npz: {message}"):
-        train(
-            data,
-            network=network,
-            training=training | settings,
-            checkpoints=tmp_path / "b",
-            start=tmp_path / "start.npz",
-        )
+        train(data, network=other, training=training | settings, checkpoints=tmp_path / "b", start=start)
 
 
 def _checkpoints(folder: Path) -> list[dict[str, np.ndarray]]:
@@ -174,38 +159,6 @@ def test_the_weights_file_is_enough_for_the_runtime(
     state = train(data, network=network, training=training, checkpoints=tmp_path / "c", threads=2)
     ours = state.network(torch.from_numpy(block.x[:2]), torch.from_numpy(p.astype(np.float32)))
     assert np.allclose(ours.numpy(), np.stack(y), rtol=1e-4, atol=1e-4)
-
-
-def test_a_checkpoint_of_another_network_is_refused(
-    data: Database, network: Settings, training: Settings, tmp_path: Path
-) -> None:
-    state = train(data, network=network, training=training, checkpoints=tmp_path / "a", threads=2)
-    save_npz(tmp_path / "other.npz", **pack(state))
-    with pytest.raises(
-        InputError, match=r"other\.npz: holds a network of \d+-24-24-\d+ units.* not of .*-30-30-"
-    ):
-        train(
-            data,
-            network=network.model_copy(update={"units": 30}),
-            training=training,
-            checkpoints=tmp_path / "b",
-            start=tmp_path / "other.npz",
-        )
-
-
-@pytest.mark.parametrize("damage", ["cut", "other"])
-def test_a_damaged_checkpoint_is_named(
-    data: Database, network: Settings, training: Settings, tmp_path: Path, damage: str
-) -> None:
-    arguments: Settings = {"network": network, "training": training, "threads": 2}
-    train(data, **arguments, checkpoints=tmp_path)
-    path = next(tmp_path.glob("*/checkpoint.npz"))
-    if damage == "cut":
-        path.write_bytes(path.read_bytes()[:5000])
-    else:
-        save_npz(path, something=np.zeros(3))
-    with pytest.raises(InputError, match=r"checkpoint\.npz"):
-        train(data, **arguments, checkpoints=tmp_path)
 
 
 def test_the_recipe_hash_has_all_that_determines_a_training(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -13,9 +12,6 @@ import torch
 from hobble.database.reader import Database
 from hobble.measures.rollouts_run import RollOutInputs
 from hobble.training.augment import RollOut
-from hobble.training.batches import HostRows
-from hobble.training.optimiser import Update
-from hobble.training.train import train
 from tests.measures.whole_roll_outs import roll_out
 
 from .conftest import change
@@ -92,38 +88,3 @@ def test_each_place_restarts_after_its_frames(data: Database) -> None:
     counts = np.sum(zero[frames:], axis=1)
     assert set(counts) == {rows // frames}
     assert set(np.sum(zero[frames : 2 * frames], axis=0)) == {1}
-
-
-def test_training_uses_the_roll_outs(
-    data: Database,
-    network: Any,
-    training: Any,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """Each batch has the errors of the batches before it in the same section."""
-    settings = training | {"rollout": 4, "passes": 1, "sections": 2, "batch": 300}
-    given: list[torch.Tensor] = []
-    errors: list[torch.Tensor] = []
-
-    def noted(self: Update, x: torch.Tensor, *rest: Any) -> torch.Tensor:
-        given.append(x.clone())
-        loss = plain(self, x, *rest)
-        errors.append(self.step.error.clone())
-        return loss
-
-    plain = Update.__call__
-    monkeypatch.setattr(Update, "__call__", noted)
-    train(data, network=network, training=settings, checkpoints=tmp_path)
-    carried = RollOut(data, 4, range(300), CPU)
-    number = 0
-    for section in range(2):
-        carried.begin_section()
-        for batch in HostRows(data, CPU).batches(0, section, 2, settings.seed, 300):
-            x = batch.x.clone()
-            change(carried, x)
-            assert torch.equal(x, given[number])
-            assert torch.equal(x, batch.x) == (number % 4 == 0)
-            carried.after(errors[number])
-            number += 1
-    assert number == len(given) == 8

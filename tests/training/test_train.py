@@ -17,7 +17,7 @@ from hobble.database.reader import Block, Database
 from hobble.training import checkpoint, train
 from hobble.training.batches import HeldOutErrors, HostRows
 from hobble.training.checkpoint import State, columns, write_history
-from tests.models.definition import fresh
+from hobble.training.optimiser import Update
 
 Settings = dict[str, Any]
 Run = Callable[..., State]
@@ -58,15 +58,6 @@ def test_batches_are_the_sections_samples_in_order(data: Database, size: int) ->
     for mine, theirs in zip(columns, zip(*blocks, strict=True), strict=True):
         assert np.array_equal(np.concatenate(mine), np.concatenate(theirs))
     assert sum(len(batch.p) for batch in seen) == sum(whole) == data.section_sample_count("train", 2, 3)
-
-
-def test_training_twice_gives_the_same_bits(run: Run) -> None:
-    one, again = run("one"), run("two")
-    assert torch.equal(one.network.flat, again.network.flat)
-    assert torch.equal(one.adam.second_moment, again.adam.second_moment)
-    drop_seconds = [[v for i, v in enumerate(row) if i != 3] for row in one.history]
-    assert drop_seconds == [[v for i, v in enumerate(row) if i != 3] for row in again.history]
-    assert not torch.equal(one.network.flat, run("three", seed=2).network.flat)
 
 
 @pytest.mark.parametrize(("batch", "precision"), [(300, "auto"), (32, "bfloat16"), (5000, "float32")])
@@ -168,14 +159,6 @@ def test_bfloat16_is_chosen_where_a_device_has_it(
     assert rounds(training | {"batch": 32, "precision": "bfloat16"}, torch.device("cpu")) is True
 
 
-@pytest.mark.parametrize(("precision", "tf32"), [("auto", True), ("tf32", True), ("float32", False)])
-def test_products_on_cuda_sum_in_float32(training: Settings, precision: str, tf32: bool) -> None:
-    """By default PyTorch may add up parts of bfloat16 products in bfloat16."""
-    checkpoint.step_for(fresh((4, 3, 2)), training | {"precision": precision}, half=False)
-    assert torch.backends.cuda.matmul.allow_tf32 is tf32
-    assert torch.backends.cuda.matmul.allow_bf16_reduced_precision_reduction is False
-
-
 def test_a_resumed_training_keeps_the_precision_with_which_it_began(
     run: Run, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -189,3 +172,37 @@ def test_a_resumed_training_keeps_the_precision_with_which_it_began(
     assert resumed.half
     assert torch.equal(resumed.network.flat, whole.network.flat)
     assert not torch.equal(other.network.flat, whole.network.flat)
+
+
+@pytest.mark.parametrize(
+    "asked", [{"other_paces": 1.2, "keep_channels": True}, {"other_poses": 0.5}, {"rollout": 4}]
+)
+def test_training_changes_batches_only_if_asked_and_never_channels(
+    run: Run, data: Database, given: list[torch.Tensor], asked: Settings
+) -> None:
+    for number, options in enumerate(({}, asked)):
+        run(str(number), passes=1, sections=2, batch=90, **options)
+    half, injury = len(given) // 2, data.layout.x_channel("injury")
+    changed = 0
+    for without, other in zip(given[:half], given[half:], strict=True):
+        assert torch.equal(without[:, injury], other[:, injury])
+        changed += int((without != other).any(dim=1).sum())
+    assert 0 < changed <= sum(len(x) for x in given[:half])
+
+
+@pytest.mark.parametrize("keep", [True, False])
+def test_dropout_keeps_the_channels_only_if_asked(
+    run: Run, data: Database, monkeypatch: pytest.MonkeyPatch, keep: bool
+) -> None:
+    dropped: list[float] = []
+
+    def drawn(self: Update, *rest: Any) -> Any:
+        masks = of_update(self, *rest)
+        assert (masks[0] == 0).any(), "other inputs are dropped"
+        dropped.append(float((masks[0][:, data.layout.x_channel("injury")] != 1).float().mean()))
+        return masks
+
+    of_update = Update._masks
+    monkeypatch.setattr(Update, "_masks", drawn)
+    run(passes=1, sections=2, batch=90, dropout=0.2, keep_channels=keep)
+    assert (max(dropped) == 0) == keep

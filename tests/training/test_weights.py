@@ -8,15 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hobble.core import files
-from hobble.core.errors import HobbleError
 from hobble.core.files import load_npz
 from hobble.database.reader import Database
-from hobble.models.load import read_facts
 from hobble.models.network import TrainingFacts
 from hobble.models.pfnn import PfnnOptions
 from hobble.rows.layout import GAITS
-from hobble.training.run import write_weights
+from hobble.training.train import write_weights
 
 from .conftest import figure
 
@@ -44,22 +41,6 @@ def test_the_file_holds_the_network_bit_for_bit(data: Database, tmp_path: Path) 
         np.testing.assert_array_equal(found[name[0].upper() + name[2:]], getattr(data.statistics, name))
 
 
-def test_the_weights_file_has_the_ranges_of_the_training_rows_only(data: Database, tmp_path: Path) -> None:
-    write(tmp_path / "weights.npz", data)
-    arrays = load_npz(tmp_path / "weights.npz")
-    seen = read_facts("weights.npz", arrays, data.layout.x_size, data.layout.y_size)
-    assert seen is not None
-    blocks = list(data.blocks("train", 0, 0, 1, 0))
-    s = data.statistics
-    y = np.concatenate([block.y for block in blocks]) * s.y_std + s.y_mean
-    np.testing.assert_allclose(seen.y_low, y.min(axis=0), atol=1e-4)
-    np.testing.assert_allclose(seen.y_high, y.max(axis=0), atol=1e-4)
-    apart = np.concatenate([block.y for block in data.blocks("held_out", 0, 0, 1, 0)]) * s.y_std + s.y_mean
-    assert (apart.max(axis=0) > seen.y_high + 1e-3).any(), "else this test could not tell"
-    speed = np.linalg.norm(y[:, data.layout.y_joint_velocity].reshape(len(y), -1, 3), axis=-1)
-    assert seen.fastest == pytest.approx(float(speed.max()), rel=1e-5)
-
-
 @pytest.mark.parametrize("memory", [64, 0])
 def test_the_ranges_cover_every_row_with_every_fit(small_database: Path, memory: int) -> None:
     data = Database.open(small_database, memory)
@@ -77,32 +58,6 @@ def test_the_ranges_cover_every_row_with_every_fit(small_database: Path, memory:
     columns = np.r_[columns, data.layout.x_joint_position, data.layout.x_joint_velocity]
     far = np.square(block.x[:, columns]).mean(axis=1)
     assert (far < far[same[0]] - 1e-6).mean() < 0.01  # of many grounds, another may be nearer to the mean
-
-
-def test_equal_networks_give_equal_bytes_and_others_do_not(data: Database, tmp_path: Path) -> None:
-    for name, seed in (("a", 1), ("b", 1), ("c", 2)):
-        write(tmp_path / name, data, seed)
-    a, b, c = ((tmp_path / name).read_bytes() for name in "abc")
-    assert a == b
-    assert a != c
-
-
-def test_a_disk_that_fills_up_leaves_the_old_file(
-    data: Database, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    path = tmp_path / "weights.npz"
-    write(path, data)
-    before = path.read_bytes()
-
-    def full(file, *_: object, **__: object) -> None:
-        file.write(b"half of it")
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr(files.np.lib.format, "write_array", full)
-    with pytest.raises(HobbleError, match=r"weights\.npz: the disk is full"):
-        write(path, data, 2)
-    assert path.read_bytes() == before
-    assert list(tmp_path.iterdir()) == [path]
 
 
 def test_if_no_row_stands_a_character_starts_from_the_stillest(small_database: Path) -> None:

@@ -8,8 +8,7 @@ from pathlib import Path
 from hobble.core.clip import load_clip
 from hobble.core.files import read_json
 from hobble.database.options import Merging
-from hobble.database.split_check import refuse_split_pairs
-from hobble.database.write import write_database
+from hobble.database.write import refuse_split_pairs, write_database
 from hobble.motion.duplicates import clip_digest, duplicate_pairs
 from hobble.workflow.job import Inputs, job
 

@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from hobble.core.errors import InputError
-from hobble.core.files import DAMAGE_ERRORS, DELETE_IT, HEADER_READERS, check_archive, check_header
-from hobble.core.untrusted import check_regular, printable
+from hobble.core.files import DELETE_IT, HEADER_READERS, check_archive, check_header, reading
+from hobble.core.untrusted import printable
 
 # An npz file is a zip file with an npy file for each array. Before each npy file there is a zip header: 30
 # bytes, then the name of the npy file, then an extra field. The last four of the 30 bytes hold the lengths of
@@ -27,23 +27,13 @@ class ArrayParts:
 
     def __init__(self, path: str | Path) -> None:
         self.path = Path(path)
-        try:
-            check_regular(path)
-            with zipfile.ZipFile(path) as archive:
-                check_archive(path, archive)
-                # Name of an array -> where its numbers begin, its shape and its type.
-                self._places = {
-                    entry.filename.removesuffix(".npy"): self._find_array(archive, entry)
-                    for entry in archive.infolist()
-                }
-        except FileNotFoundError as error:
-            raise InputError(path, "no such file") from error
-        except OSError as error:
-            raise InputError(path, f"cannot be read: {error.strerror or error}") from error
-        except DAMAGE_ERRORS as error:
-            raise InputError(
-                path, f"damaged or not an npz file ({printable(error)})", fix=DELETE_IT
-            ) from error
+        with reading(path, "damaged or not an npz file", DELETE_IT), zipfile.ZipFile(path) as archive:
+            check_archive(path, archive)
+            # Name of an array -> where its numbers begin, its shape and its type.
+            self._places = {
+                entry.filename.removesuffix(".npy"): self._find_array(archive, entry)
+                for entry in archive.infolist()
+            }
 
     def __contains__(self, name: str) -> bool:
         return name in self._places

@@ -197,19 +197,28 @@ def load_npz(path: str | Path, names: Iterable[str] | None = None) -> Arrays:
     Raises InputError if the file or an array is missing or damaged, or if a header claims more data than the
     file holds.
     """
+    with reading(path, "damaged or not an npz file", DELETE_IT), zipfile.ZipFile(path) as archive:
+        check_archive(path, archive)
+        stored = [name.removesuffix(".npy") for name in archive.namelist()]
+        wanted = stored if names is None else list(names)
+        return Arrays(path, [(name, _read_array(archive, f"{name}.npy")) for name in wanted])
+    raise AssertionError("not reached")
+
+
+@contextlib.contextmanager
+def reading(path: str | Path, problem: str, fix: str | None = None) -> Iterator[os.stat_result]:
+    """Turn the errors of reading a file into InputError. Yields the stat result of the file.
+
+    problem, fix: for the message about a damaged file. Raises InputError if it is missing or not regular.
+    """
     try:
-        check_regular(path)
-        with zipfile.ZipFile(path) as archive:
-            check_archive(path, archive)
-            stored = [name.removesuffix(".npy") for name in archive.namelist()]
-            wanted = stored if names is None else list(names)
-            return Arrays(path, [(name, _read_array(archive, f"{name}.npy")) for name in wanted])
+        yield check_regular(path)
     except FileNotFoundError as error:
         raise InputError(path, "no such file") from error
     except OSError as error:
         raise InputError(path, f"cannot be read: {error.strerror or error}") from error
     except DAMAGE_ERRORS as error:
-        raise InputError(path, f"damaged or not an npz file ({printable(error)})", fix=DELETE_IT) from error
+        raise InputError(path, f"{problem} ({printable(error)})", fix=fix) from error
 
 
 def check_archive(path: str | Path, archive: zipfile.ZipFile) -> None:
@@ -264,18 +273,11 @@ def load_npy(path: str | Path) -> np.ndarray:
 
     Raises InputError if the file is missing or damaged, or if its size does not match its header.
     """
-    try:
-        size = check_regular(path).st_size
-        with open(path, "rb") as file:
-            check_header(file, size)
-            file.seek(0)
-            return np.lib.format.read_array(file, allow_pickle=False)
-    except FileNotFoundError as error:
-        raise InputError(path, "no such file") from error
-    except OSError as error:
-        raise InputError(path, f"cannot be read: {error.strerror or error}") from error
-    except DAMAGE_ERRORS as error:
-        raise InputError(path, f"not an array file ({printable(error)})") from error
+    with reading(path, "not an array file") as status, open(path, "rb") as file:
+        check_header(file, status.st_size)
+        file.seek(0)
+        return np.lib.format.read_array(file, allow_pickle=False)
+    raise AssertionError("not reached")
 
 
 def check_header(file: IO[bytes], size: int) -> None:

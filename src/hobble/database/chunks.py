@@ -67,7 +67,6 @@ def to_floats(values: np.ndarray) -> Array:
 
 INDEX_BYTES = 16  # in a chunk, for each row: its number of terrain fits, clip, frame and phase
 LENGTH = 8  # bytes of the number, at the start of the file, that says how long the header is
-MOST_PARTS = 16  # one call of `preadv` fills at most this many buffers; every POSIX system allows so many
 # NumPy's name of a type -> its name in safetensors. NumPy has no bfloat16, so uint16 numbers hold its bits.
 TYPES = {"<f2": "F16", "<u2": "BF16", "<f4": "F32", "<i4": "I32"}
 HINT = "Delete the folder of the database; the next run makes it again."
@@ -129,12 +128,14 @@ def read_chunk(folder: Path, chunk: Chunk, arrays: Mapping[str, np.ndarray], ver
     start = np.empty(max(start_bytes, LENGTH), np.uint8)  # the header and its length
     parts = [_bytes(array) for array in (start, *arrays.values())]
     try:
-        with open(path, "rb", buffering=0) as file:
+        with open(path, "rb") as file:
             size = os.fstat(file.fileno()).st_size
             if size != chunk.bytes:
                 problem = f"{size} bytes, but the manifest says {chunk.bytes}"
                 raise InputError(path, f"truncated or overwritten: {problem}", fix=HINT)
-            _fill(file.fileno(), parts)
+            for part in parts:
+                if file.readinto(part) != len(part):
+                    raise OSError(0, "the file ended early")
     except OSError as error:
         raise InputError(path, f"cannot be read ({error.strerror})", fix=HINT) from error
     if verify and _checksum(parts) != chunk.crc32:
@@ -146,20 +147,6 @@ def read_chunk(folder: Path, chunk: Chunk, arrays: Mapping[str, np.ndarray], ver
 def _bytes(array: np.ndarray) -> memoryview:
     """The bytes of a contiguous array, without a copy."""
     return array.reshape(-1).view(np.uint8).data
-
-
-def _fill(descriptor: int, parts: Sequence[memoryview]) -> None:
-    """Fill the buffers `parts`, one after another, from the start of an open file, with few system calls."""
-    unfilled, place = [part for part in parts if len(part)], 0
-    while unfilled:
-        count = os.preadv(descriptor, unfilled[:MOST_PARTS], place)
-        if count == 0:
-            raise OSError(0, "the file ended early")
-        place += count
-        while unfilled and count >= len(unfilled[0]):
-            count -= len(unfilled.pop(0))
-        if count:
-            unfilled[0] = unfilled[0][count:]
 
 
 def _checksum(parts: Sequence[memoryview]) -> int:

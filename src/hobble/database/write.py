@@ -12,7 +12,7 @@ import hashlib
 import os
 import shutil
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -23,12 +23,11 @@ from hobble.channels import channel
 from hobble.channels.channel import Channel
 from hobble.channels.speed_limits import LimitLearner
 from hobble.core.errors import HobbleError, InputError
-from hobble.core.files import failed_write_error, save_npz, sync_folder
+from hobble.core.files import failed_write_error, save_npz
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 from hobble.database.chunks import (
     FILE,
-    HINT,
     INDEX_BYTES,
     SPLITS,
     STATISTICS,
@@ -215,23 +214,9 @@ class Buckets:
         return self.folder / f"{bucket:05d}.{table}"
 
     def read(self, bucket: int) -> tuple[Array, Array, np.ndarray]:
-        """The tables frames, fits and index of a bucket, in the order in which rows were added.
-
-        They are empty if the bucket has no rows. Raises InputError if the lengths of the files do not match.
-        """
-        if not self._file(bucket, "index").exists():
-            return self._reshape(np.empty(0, "<f4"), np.empty(0, "<f4"), np.empty(0, ROW_INDEX))
+        """The tables frames, fits and index of a bucket, in the order in which rows were added."""
         frames, fits = (np.fromfile(self._file(bucket, table), "<f4") for table in ("frames", "fits"))
         index = np.fromfile(self._file(bucket, "index"), ROW_INDEX)
-        for table, values, size in (
-            ("frames", frames, len(index) * self.columns),
-            ("fits", fits, int(index["count"].sum()) * self.fit_columns),
-        ):
-            if len(values) != size:
-                raise InputError(self._file(bucket, table), "truncated or overwritten", fix=HINT)
-        return self._reshape(frames, fits, index)
-
-    def _reshape(self, frames: Array, fits: Array, index: np.ndarray) -> tuple[Array, Array, np.ndarray]:
         return frames.reshape(-1, self.columns), fits.reshape(-1, self.fit_columns), index
 
     def drain(self) -> Iterator[tuple[Array, Array, np.ndarray]]:
@@ -511,14 +496,37 @@ def _folder_name(build: Path, chunks: Mapping[str, list[Chunk]]) -> str:
 def _put_in_place(path: Path, build: Path, manifest: Manifest) -> None:
     """Move the folder `build` to its final name, write the manifest, then remove the previous build."""
     final = path / manifest.folder
-    if final.exists():  # the same rows were built before: replace every file, since some may be damaged
-        for file in sorted(p for p in build.rglob("*") if p.is_file()):
-            target = final / file.relative_to(build)
-            # A subfolder is missing if a process was killed while it removed this build.
-            target.parent.mkdir(parents=True, exist_ok=True)
-            os.replace(file, target)
-        sync_folder(final)
-    else:
-        os.rename(build, final)
+    if final.exists():  # the same rows were built before; some files may be damaged
+        shutil.rmtree(final)
+    os.rename(build, final)
     manifest.save(path)
     _remove_unused(path, keep=manifest.folder)
+
+
+# Refuses a split that trains on a motion and also holds it out: its error says nothing about new motion.
+
+
+MOST_NAMED = 10  # a message names at most this many pairs of clips
+
+
+def refuse_split_pairs(where: str, pairs: Iterable[tuple[str, str, str]], splits: Mapping[str, str]) -> None:
+    """Raise HobbleError if, of two clips with the same motion, one is trained on and the other held out.
+
+    where: the data set's name for messages. pairs: (clip, clip, in what they are alike, such as "the same
+    file"). splits: clip -> "train" or "held_out". Pairs with a clip that is not in `splits` are ignored.
+    """
+    split_pairs, trained_clips = [], []
+    for a, b, likeness in pairs:
+        if {splits.get(a), splits.get(b)} == {"train", "held_out"}:
+            held_out, trained = (a, b) if splits[a] == "held_out" else (b, a)
+            split_pairs.append(f"{held_out} and {trained} are {likeness}")
+            trained_clips.append(trained)
+    if not split_pairs:
+        return
+    more = f" and {len(split_pairs) - MOST_NAMED} more pairs" if len(split_pairs) > MOST_NAMED else ""
+    names = ", ".join(f'"{name}"' for name in dict.fromkeys(trained_clips))
+    raise HobbleError(
+        f"{where}: {'; '.join(split_pairs[:MOST_NAMED])}{more}. The first clip of each pair is held out and "
+        "the second is trained on, so the network would learn a motion that is held out. Add the second ones "
+        f"to held_out: [{names}], or take one clip of each pair out of the data set."
+    )

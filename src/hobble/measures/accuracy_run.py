@@ -252,7 +252,7 @@ def check_layout(where: str | Path, rows: ClipRows, network: Network) -> None:
     Rows may have more channels than the network. where: the file of the rows, for the message.
     """
     layout = network.layout
-    same_without_channels = rows.layout.with_channels(()) == replace(layout, channels=(), order=())
+    same_without_channels = rows.layout.with_channels(()) == replace(layout, channels=())
     if not same_without_channels or not set(layout.channels) <= set(rows.layout.channels):
         raise InputError(
             where,

@@ -48,9 +48,8 @@ class RowLayout:
     """The columns of X (inputs) and Y (outputs) of the network. Each block of columns is a slice.
 
     joints: number of joints. window: frames of the trajectory before and after the present frame. step:
-    frames between two samples of the trajectory. channels: (name, number of columns) of each channel. order:
-    names of all blocks of X in column order. If `order` is empty, the blocks of BODY come first, then the
-    channels. Raises ValueError if `order` is not empty and does not name each of these blocks once.
+    frames between two samples of the trajectory. channels: (name, number of columns) of each channel. In X,
+    the blocks of BODY come first, then the channels.
 
     With 31 joints, window 60 and step 10, X has 342 columns and Y has 311. With a channel of 30 columns, X
     has 372. Joint blocks hold x, y, z of joint 0, then of joint 1, and so on. Trajectory blocks hold x of
@@ -61,14 +60,6 @@ class RowLayout:
     window: int = 60
     step: int = 10
     channels: tuple[tuple[str, int], ...] = ()
-    order: tuple[str, ...] = ()
-
-    def __post_init__(self) -> None:
-        if self.order and sorted(self.order) != sorted((*BODY, *dict(self.channels))):
-            raise ValueError(
-                "the order of the blocks of X has to name each of these once: "
-                + ", ".join((*BODY, *dict(self.channels)))
-            )
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> RowLayout:
@@ -79,7 +70,7 @@ class RowLayout:
         """
         numbers = {key: data[key] for key in ("joints", "window", "step") if key in data}
         channels = dict(data.get("channels", {}))
-        for key in set(data) - {"joints", "window", "step", "channels", "order"}:
+        for key in set(data) - {"joints", "window", "step", "channels"}:
             if data[key]:
                 channels[channel_of_old_key(key)] = data[key]
         for least, values in ((1, numbers), (0, channels)):
@@ -90,13 +81,12 @@ class RowLayout:
                     )
         if numbers.get("window", 0) % numbers.get("step", 1):
             raise ValueError(f"window {numbers['window']} is not a multiple of step {numbers['step']}")
-        return cls(**numbers, channels=tuple(channels.items()), order=tuple(data.get("order", ())))
+        return cls(**numbers, channels=tuple(channels.items()))
 
     def to_dict(self) -> dict[str, Any]:
         """The layout as data that JSON can hold, for `from_dict`."""
-        order = {"order": list(self.order)} if self.order else {}
         sizes = {"joints": self.joints, "window": self.window, "step": self.step}
-        return {**sizes, "channels": [list(pair) for pair in self.channels], **order}
+        return {**sizes, "channels": [list(pair) for pair in self.channels]}
 
     def with_channels(self, names: Iterable[str]) -> RowLayout:
         """The layout with only the channels `names`, in the order of `names`.
@@ -104,9 +94,7 @@ class RowLayout:
         Raises KeyError if the layout does not have one of these channels.
         """
         size = dict(self.channels)
-        kept = tuple((name, size[name]) for name in names)
-        order = tuple(name for name in self.order if name in BODY or name in dict(kept))
-        return replace(self, channels=kept, order=order)
+        return replace(self, channels=tuple((name, size[name]) for name in names))
 
     @property
     def offsets(self) -> range:
@@ -134,8 +122,7 @@ class RowLayout:
                 strict=True,
             )
         )
-        sizes |= dict(self.channels)
-        return _side_by_side({name: sizes[name] for name in self.order or sizes})
+        return _side_by_side(sizes | dict(self.channels))
 
     # Trajectory positions, x then z, in the root coordinates of the row's frame, cm.
     x_position = _Block()
@@ -215,8 +202,8 @@ def body_column_count(layout: RowLayout) -> int:
 
 
 def body_layout(layout: RowLayout) -> RowLayout:
-    """`layout` without channels, and with the blocks of X in the order of `hobble.rows.layout.BODY`."""
-    return replace(layout, channels=(), order=())
+    """`layout` without channels."""
+    return replace(layout, channels=())
 
 
 def column_count_without_terrain(layout: RowLayout) -> int:
@@ -237,14 +224,9 @@ def joint_heights(joints: slice) -> slice:
 def frame_inputs(layout: RowLayout, body: Array, channels: Mapping[str, Array]) -> Array:
     """X without its terrain columns, (n, columns), in the order of the layout.
 
-    body: (n, columns) X without terrain and channels, in the order of `body_layout`. channels: channel ->
-    values (n, columns).
+    body: (n, columns) X without terrain and channels. channels: channel -> values (n, columns).
     """
-    if not layout.order:  # the blocks of the body come first, then the channels
-        return np.concatenate([body, *(channels[name] for name, _ in layout.channels)], axis=1)
-    body_blocks = blocks_without_terrain(body_layout(layout))
-    values = {name: body[:, block] for name, block in body_blocks.items()} | dict(channels)
-    return np.concatenate([values[name] for name in blocks_without_terrain(layout)], axis=1)
+    return np.concatenate([body, *(channels[name] for name, _ in layout.channels)], axis=1)
 
 
 def blocks_without_terrain(layout: RowLayout) -> dict[str, slice]:

@@ -16,8 +16,8 @@ from hobble.training.processes import ALONE, Processes
 
 TRAIN = "train"
 CHECK_EVERY = 2048  # samples between checks of the losses; each check waits for the GPU
-# A larger mean loss of a section means that training diverged. Predicting the mean of Y gives a loss of 1.
-DIVERGED = 100.0
+# A batch with a larger loss means that training diverged. Predicting the mean of Y gives a loss of 1.
+DIVERGED = 1e4
 MOST_NAMED = 8  # at most this many clips or rows are named in a message
 
 Piece = tuple[Tensor, Tensor, Tensor, np.ndarray, np.ndarray]  # x, y, p, clip and frame of a `SampleBatch`
@@ -118,7 +118,6 @@ class LossWatch:
         self.where, self.clips, self.processes = where, clips, processes
         self.samples, self._batches, self._total = 0, 0, 0.0
         self._waiting: list[tuple[Tensor, SampleBatch]] = []  # loss and batch, not yet checked
-        self._worst: tuple[float, int, SampleBatch] | None = None  # loss, number of the batch, and batch
 
     def add(self, loss: Tensor, batch: SampleBatch) -> None:
         """Add a batch and its loss over all processes, a scalar tensor on any device."""
@@ -130,20 +129,14 @@ class LossWatch:
     def mean(self) -> float:
         """The mean loss over the section's samples; raises HobbleError if training diverged."""
         self._check()
-        mean = self._total / max(self.samples, 1)
-        if mean > DIVERGED and self._worst is not None:
-            problem = f"the mean error of the section is {mean:.3g}, and this batch has the largest error"
-            raise self._diverged(problem, *self._worst[1:])
-        return mean
+        return self._total / max(self.samples, 1)
 
     def _check(self) -> None:
         losses = torch.stack([loss for loss, _ in self._waiting]).tolist() if self._waiting else []
         for loss, (_, batch) in zip(losses, self._waiting, strict=True):
             self._batches += 1
-            if not np.isfinite(loss):
-                raise self._diverged("its error is not a finite number", self._batches, batch)
-            if self._worst is None or loss > self._worst[0]:
-                self._worst = (loss, self._batches, batch)
+            if not loss <= DIVERGED:
+                raise self._diverged(f"its error is {loss:.3g}", self._batches, batch)
             self._total += loss * batch.total
         self._waiting.clear()
 

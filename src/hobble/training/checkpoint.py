@@ -6,7 +6,6 @@ import hashlib
 import json
 import logging
 from collections.abc import Iterable, Mapping, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -16,7 +15,7 @@ import torch
 
 from hobble.core.declared import ArrayOf, check_arrays
 from hobble.core.errors import HobbleError, InputError
-from hobble.core.files import DELETE_IT, Arrays, load_npz, save_npz, write_text
+from hobble.core.files import DELETE_IT, Arrays, load_npz, write_text
 from hobble.core.processors import count_cores, multiplies_bfloat16
 from hobble.core.skeleton import Skeleton
 from hobble.core.untrusted import printable
@@ -176,40 +175,6 @@ def unpack(data: Mapping[str, np.ndarray], state: State, path: Path) -> None:
 
 def _numpy_copy(flat: torch.Tensor) -> np.ndarray:
     return flat.detach().cpu().numpy().copy()
-
-
-class Saver:
-    """Writes checkpoints to `path` in a background thread, one at a time.
-
-    A file has a temporary name until it is complete, so `path` always holds a whole checkpoint.
-    """
-
-    def __init__(self, path: Path) -> None:
-        self.path = path
-        for incomplete in path.parent.glob(f".{path.name}.*.part"):  # left by a run that was killed
-            incomplete.unlink()
-        self._worker = ThreadPoolExecutor(max_workers=1, thread_name_prefix="checkpoint")
-        self._pending: Future[None] | None = None
-
-    def __enter__(self) -> Saver:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._worker.shutdown(wait=True)
-
-    def save(self, arrays: dict[str, np.ndarray]) -> None:
-        """Wait until the previous checkpoint is on disk, then start to write this one. arrays: from `pack`.
-
-        Raises the errors of writing the previous one.
-        """
-        self.wait()
-        self._pending = self._worker.submit(save_npz, self.path, **arrays)
-
-    def wait(self) -> None:
-        """Wait until the last checkpoint is on disk; raises the errors of writing it."""
-        if self._pending is not None:
-            self._pending.result()
-            self._pending = None
 
 
 # Prepares a training: sets threads and device, names the run, and reads the checkpoint to resume from.

@@ -15,7 +15,6 @@ from hobble.core.skeleton import Skeleton
 from hobble.models.load import network_from_arrays
 from hobble.models.matching.network import ROW, SINCE, Matching
 from hobble.models.network import standardise_inputs
-from hobble.runtime.animation import ProceduralAnimation
 
 from .example import FRAMES, built
 
@@ -142,13 +141,6 @@ def test_a_page_of_many_rows_has_the_first_part_of_each_run(made: Made) -> None:
     np.testing.assert_array_equal(short.frames[35:], network.frames[70:115])
     np.testing.assert_array_equal(short.features[:35], network.features[:35])
     assert short.start_rows.max() < 80 - 20
-
-
-def test_a_character_moves(made: Made) -> None:
-    animation = ProceduralAnimation(made[2], characters=2)
-    for _ in range(12):
-        pose = animation.next_pose([1.0, 0.0], injury={"LeftUpLeg-LeftLeg": 3.0})
-    assert np.isfinite(pose.positions).all()
 
 
 def test_there_are_no_export_formats(made: Made, tmp_path: Path) -> None:
