@@ -128,7 +128,7 @@ def read_chunk(folder: Path, chunk: Chunk, arrays: Mapping[str, np.ndarray], ver
     start = np.empty(max(start_bytes, LENGTH), np.uint8)  # the header and its length
     parts = [_bytes(array) for array in (start, *arrays.values())]
     try:
-        with open(path, "rb") as file:
+        with open(path, "rb", buffering=0) as file:
             size = os.fstat(file.fileno()).st_size
             if size != chunk.bytes:
                 problem = f"{size} bytes, but the manifest says {chunk.bytes}"
