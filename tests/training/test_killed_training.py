@@ -14,13 +14,14 @@ import numpy as np
 import pytest
 import torch
 
-from hobble.core.files import load_npz, save_npz
+from hobble.core.files import _HOST, load_npz, save_npz
 from hobble.database.reader import Database
 from hobble.training import train as module
 from hobble.training.checkpoint import State, pack
 from hobble.training.train import train
 
 Settings = dict[str, Any]
+LEFT = f".{_HOST}.{1 << 30}.part"  # the end of the name of a file that a process left which lives no more
 
 
 HURRIED = {"schedule": "cosine", "warm_up": 0.3, "rollout": 4, "batch": 256}
@@ -55,7 +56,7 @@ def test_a_training_killed_at_any_moment_ends_with_the_same_bits(
         process.send_signal(signal.SIGKILL)
         assert process.wait() == -signal.SIGKILL
         assert before < _sections(killed) < 45
-    (next(killed.iterdir()) / ".checkpoint.npz.1.part").write_bytes(b"what a kill leaves")
+    (next(killed.iterdir()) / f".checkpoint.npz{LEFT}").write_bytes(b"what a kill leaves")
     final = train(data, **settings, checkpoints=killed, threads=2)
     undisturbed = train(data, **settings, checkpoints=tmp_path / "undisturbed", threads=2)
     assert torch.equal(final.network.flat, undisturbed.network.flat)
@@ -97,7 +98,7 @@ def test_a_training_killed_at_any_write_ends_with_the_same_bits(
             save_npz(path, **arrays)
         else:
             path.parent.mkdir(parents=True, exist_ok=True)
-            path.with_name(f".{path.name}.1.part").write_bytes(b"half of it")
+            path.with_name(f".{path.name}{LEFT}").write_bytes(b"half of it")
         raise SystemExit
 
     with monkeypatch.context() as patch:

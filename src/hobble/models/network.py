@@ -179,6 +179,8 @@ class Network(ABC):
     # runtime shortens the predicted movement of the root where the character should stand or go another way.
     # With recorded frames it does not, because the feet would slide.
     plays_recorded_poses: ClassVar[bool] = False
+    # Whether the runtime in C, and with it the page, can run the network.
+    runs_in_c: ClassVar[bool] = True
     # Names of the ways to evaluate the network, such as constant, linear and cubic interpolation over the
     # phase. The last one is exact.
     modes: ClassVar[tuple[str, ...]] = ("exact",)

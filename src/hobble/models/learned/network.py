@@ -60,6 +60,7 @@ class Learned(OnnxNetwork):
     kind: ClassVar[str] = "learned"
     uses_phase: ClassVar[bool] = False
     plays_recorded_poses: ClassVar[bool] = True
+    runs_in_c: ClassVar[bool] = False
 
     columns: NDArray[np.int64] = field(repr=False)
     weights: Array = field(repr=False)
@@ -159,10 +160,6 @@ class Learned(OnnxNetwork):
     ) -> tuple[dict[str, int], dict[str, np.ndarray]]:
         """As in `Network`. Raises HobbleError: the runtime in C does not know this kind yet."""
         raise HobbleError("the runtime in C cannot run networks of kind learned yet: use matching")
-
-    def page_data(self, inputs: NDArray[np.int64], outputs: NDArray[np.int64]) -> dict[str, Any]:
-        """As in `Network`. Raises HobbleError, as `engine_data`."""
-        raise HobbleError("the page cannot run networks of kind learned yet: use matching")
 
     def onnx_outputs(self, g: Graph, z: Node, mode: str) -> Node:
         """As in `OnnxNetwork`: projector and decompressor, as in `predict`."""
