@@ -48,7 +48,7 @@ def train_together(machines: Machines, threads: int, log: Path, arguments: Mappi
 
     threads: number of threads of all processes of one machine together. log: file to which the output of the
     processes is appended. arguments: `database`, `network`, `training`, `checkpoints`, `start` and `code` of
-    `hobble.training.train.train`. All machines must be able to read and write these files. Raises HobbleError if
+    `hobble.training.train.train`. All machines must be able to read and write them. Raises HobbleError if
     a process fails, with its message or with the exit status.
     """
     job = {
