@@ -14,11 +14,21 @@ from hobble.core import quat
 from hobble.core.skeleton import Skeleton, forward_kinematics, rest_positions
 from hobble.figure.gltf import BodyMotion, write_glb
 from hobble.figure.mesh import body_mesh
+from hobble.figure.pack import packed_body
+from hobble.report.bundle import WEB
 
 VALIDATE = """
 const validator = require("gltf-validator");
 validator.validateBytes(new Uint8Array(require("fs").readFileSync(process.argv[1]))).then(
   (report) => process.stdout.write(JSON.stringify(report)), (error) => { throw error; });
+"""
+# Writes the file of the page.
+SAVE = """
+import { readFileSync, writeFileSync } from "fs";
+const { glbFile } = await import("GLB");
+const [, given, target] = process.argv, { body, frames } = JSON.parse(readFileSync(given));
+writeFileSync(target, glbFile(body, frames.map((frame) => Float64Array.from(frame))));
+process.stdout.write("{}");
 """
 # Where some corners are in the middle of the first animation, in metres.
 LOAD = """
@@ -76,6 +86,24 @@ def run(code: str, *arguments: str, module: bool, modules: Path) -> dict:
     return json.loads(done.stdout)
 
 
+def read_glb(path: Path) -> tuple[dict, bytes]:
+    """The JSON of a file, and its numbers."""
+    data = path.read_bytes()
+    length = int.from_bytes(data[12:16], "little")
+    return json.loads(data[20 : 20 + length]), data[28 + length :]
+
+
+def keys(file: tuple[dict, bytes], node: str, path: str) -> np.ndarray:
+    """What the first animation of a file gives a node: (keys, 3 or 4)."""
+    document, numbers = file
+    animation = document["animations"][0]
+    target = {"node": [each["name"] for each in document["nodes"]].index(node), "path": path}
+    sampler = next(channel["sampler"] for channel in animation["channels"] if channel["target"] == target)
+    accessor = document["accessors"][animation["samplers"][sampler]["output"]]
+    view, size = document["bufferViews"][accessor["bufferView"]], {"VEC3": 3, "VEC4": 4}[accessor["type"]]
+    return np.frombuffer(numbers, "<f4", accessor["count"] * size, view["byteOffset"]).reshape(-1, size)
+
+
 def test_the_gltf_validator_finds_nothing_to_say(file: Path, page_modules: Path) -> None:
     report = run(VALIDATE, str(file), module=False, modules=page_modules)
     issues = report["issues"]
@@ -104,8 +132,7 @@ def test_three_js_moves_the_loaded_body_as_python_does(
 
 
 def test_the_rest_pose_stands_with_bones_along_the_limbs(file: Path, holden31: Skeleton) -> None:
-    data = file.read_bytes()
-    document = json.loads(data[20 : 20 + int.from_bytes(data[12:16], "little")])
+    document, _ = read_glb(file)
     nodes = document["nodes"]
     corners = document["accessors"][document["meshes"][0]["primitives"][0]["attributes"]["POSITION"]]
     assert corners["min"][1] == pytest.approx(0, abs=1e-6)
@@ -128,3 +155,27 @@ def test_the_rest_pose_stands_with_bones_along_the_limbs(file: Path, holden31: S
     # A knee and an ankle of both sides bend about the same axis.
     for name in ("LeftLeg", "RightLeg", "LeftFoot", "RightFoot"):
         assert quat.rotate(axes[index[name]], [1.0, 0, 0]) == pytest.approx([-1, 0, 0], abs=1e-6)
+
+
+def test_the_page_saves_the_same_bones(
+    file: Path, walk: BodyMotion, holden31: Skeleton, page_modules: Path, tmp_path: Path
+) -> None:
+    """The page writes its file in JavaScript. Nodes and animation are those of the file from Python."""
+    world, _ = forward_kinematics(holden31, walk.local, walk.hips)
+    frames = np.concatenate([walk.hips, world.reshape(len(world), -1)], axis=1)
+    given = {"body": packed_body(holden31), "frames": frames.tolist()}
+    (tmp_path / "given.json").write_text(json.dumps(given))
+    code = SAVE.replace("GLB", (WEB / "glb.js").as_uri())
+    run(code, str(tmp_path / "given.json"), str(tmp_path / "saved.glb"), module=True, modules=page_modules)
+    report = run(VALIDATE, str(tmp_path / "saved.glb"), module=False, modules=page_modules)
+    found = [report["issues"][f"num{kind}"] for kind in ("Errors", "Warnings", "Infos")]
+    assert found == [0, 0, 0], report["issues"]["messages"][:5]
+    ours, saved = read_glb(file), read_glb(tmp_path / "saved.glb")
+    for our, its in zip(ours[0]["nodes"], saved[0]["nodes"], strict=True):
+        assert our["name"] == its["name"]
+        for key in ("translation", "rotation"):
+            assert our.get(key, []) == pytest.approx(its.get(key, []), abs=1e-5)
+    for name in ("LeftLeg", "Head", "RightForeArm"):
+        assert np.abs(keys(ours, name, "rotation") - keys(saved, name, "rotation")).max() < 1e-4
+    for name in ("root", "Hips"):
+        assert np.abs(keys(ours, name, "translation") - keys(saved, name, "translation")).max() < 1e-4

@@ -15,9 +15,9 @@ from scipy.spatial import cKDTree
 from hobble.core import quat
 from hobble.core.files import load_npz
 from hobble.core.skeleton import Skeleton, forward_kinematics, rest_positions
-from hobble.figure.gltf import fitted_rotations
 from hobble.figure.mesh import FIGURE, Mesh, body_mesh, mesh_key, modelled_pose
 from hobble.figure.pack import links_of_bones, part_spheres, whole_weights
+from hobble.figure.rig import fitted_rotations
 
 
 def rig(root: Path, name: str) -> Skeleton:

@@ -16,6 +16,7 @@ from hobble.core.files import to_base64
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 from hobble.figure.mesh import Mesh, body_mesh
+from hobble.figure.rig import rig_of
 
 UNIT = 0.01  # cm; positions of corners are stored as multiples of this
 TURN = 32767  # the integer that stands for 1 in packed rotations
@@ -28,9 +29,10 @@ def packed_body(skeleton: Skeleton) -> dict[str, Any]:
     1/255. `wide`: whether `faces` are 32-bit instead of 16-bit. `bone`, `share`: the `bones_of_corner` and
     `weights` of `Mesh`, weights in multiples of 1/255. `keep`: the joints that are bones of the mesh.
     `places`, `turns`: positions and rotations of these joints in the bind pose. `balls`: result of
-    `part_spheres`.
+    `part_spheres`. `rig`: the bones of `rig_of`, for files, the joints of the skeleton from number 1 on.
     """
     mesh = body_mesh(skeleton)
+    bones = rig_of(skeleton, mesh)
     index_type = np.uint16 if len(mesh.corners) < 1 << 16 else np.uint32
     return {
         "unit": UNIT,
@@ -45,6 +47,13 @@ def packed_body(skeleton: Skeleton) -> dict[str, Any]:
         "places": np.round(mesh.positions, 4).tolist(),
         "turns": np.round(mesh.rotations, 6).tolist(),
         "balls": np.round(part_spheres(mesh), 2).tolist(),
+        "rig": {
+            "names": bones.names,
+            "parents": bones.parents,
+            "joints": len(skeleton.joints),
+            "axes": np.round(bones.axes, 7).tolist(),
+            "places": np.round(bones.places, 5).tolist(),
+        },
     }
 
 

@@ -12,9 +12,9 @@ from hobble.core.array_parts import ArrayParts
 from hobble.core.files import load_npz, to_base64
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
-from hobble.figure.gltf import fitted_rotations
 from hobble.figure.mesh import body_mesh, mesh_key
 from hobble.figure.pack import packed_turns
+from hobble.figure.rig import fitted_rotations
 from hobble.models.network import Network
 from hobble.rows.clip_rows import ClipRows, load_clip_rows, unbroken_stretches
 from hobble.runtime.animation import ProceduralAnimation

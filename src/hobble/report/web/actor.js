@@ -7,12 +7,12 @@ import { createLab } from "./panel.js";
 
 const FPS = 60;
 
-// The angles [z, x, y] of a rotation, in degrees: it is first turned about Y, then about X, then about Z (Rz Rx Ry).
+// The angles [z, y, x] of a rotation, in degrees: it is first turned about X, then about Y, then about Z (Rz Ry Rx).
 const angles = ([w, x, y, z]) => {
-  const degrees = 180 / Math.PI, sine = Math.min(1, Math.max(-1, 2 * (y * z + w * x)));
+  const degrees = 180 / Math.PI, sine = Math.min(1, Math.max(-1, 2 * (w * y - x * z)));
   return [
-    Math.atan2(-2 * (x * y - w * z), 1 - 2 * (x * x + z * z)), Math.asin(sine),
-    Math.atan2(-2 * (x * z - w * y), 1 - 2 * (x * x + y * y)),
+    Math.atan2(2 * (x * y + w * z), 1 - 2 * (y * y + z * z)), Math.asin(sine),
+    Math.atan2(2 * (y * z + w * x), 1 - 2 * (x * x + y * y)),
   ].map((a) => a * degrees);
 };
 
@@ -24,7 +24,7 @@ export const bvhText = ({ names, parents, offsets }, frames) => {
     const pad = "\t".repeat(indent), root = parents[j] < 0;
     joints.push(j);
     header.push(`${pad}${root ? "ROOT" : "JOINT"} ${names[j]}`, `${pad}{`, `${pad}\tOFFSET ${(root ? [0, 0, 0] : offsets[j]).map((v) => v.toFixed(6)).join(" ")}`);
-    header.push(`${pad}\tCHANNELS ${root ? "6 Xposition Yposition Zposition" : "3"} Zrotation Xrotation Yrotation`);
+    header.push(`${pad}\tCHANNELS ${root ? "6 Xposition Yposition Zposition" : "3"} Zrotation Yrotation Xrotation`);
     children[j].forEach((k) => addJoint(k, indent + 1));
     if (!children[j].length) header.push(`${pad}\tEnd Site`, `${pad}\t{`, `${pad}\t\tOFFSET 0 0 0`, `${pad}\t}`);
     header.push(`${pad}}`);

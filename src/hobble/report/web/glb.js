@@ -1,5 +1,5 @@
 // Writes the played motion with the body as a binary glTF 2.0 file. Units are metres, Y is up.
-import { at3, at4, bytes, conjugate, multiply, rotate } from "./math.js";
+import { at3, at4, bytes, conjugate, minus, multiply, rotate } from "./math.js";
 
 const FPS = 60;
 const TYPES = { [5120]: Int8Array, [5121]: Uint8Array, [5123]: Uint16Array, [5125]: Uint32Array, [5126]: Float32Array };
@@ -32,47 +32,56 @@ const inverseBind = (place, turn) => {
   return [...columns.flatMap((column) => [...column, 0]), ...origin, 1];
 };
 
-// spec: the character. body: from `hobble.figure.pack.packed_body`. frames: as for `bvhText`. Returns the bytes of the file.
-export const glbFile = (spec, body, frames) => {
-  const { names, parents, offsets } = spec, buffer = createBuffer(), J = names.length, root = parents.findIndex((p) => p < 0);
-  const corners = Array.from(new Int16Array(bytes(body.corners)), (v) => v * body.unit / 100), axes = [0, 1, 2];
-  const ends = (choose) => axes.map((i) => corners.reduce((best, v, k) => (k % 3 === i ? choose(best, v) : best), corners[i]));
+// body: from `hobble.figure.pack.packed_body`. frames: as for `bvhText`. Returns the bytes of the file, with the bones of
+// `hobble.figure.rig.rig_of`.
+export const glbFile = (body, frames) => {
+  const { names, parents, axes, places } = body.rig, buffer = createBuffer(), N = names.length;
+  const corners = Array.from(new Int16Array(bytes(body.corners)), (v, k) => (v * body.unit + (k % 3 === 1 ? places[1][1] : 0)) / 100);
+  const ends = (choose) => [0, 1, 2].map((i) => corners.reduce((best, v, k) => (k % 3 === i ? choose(best, v) : best), corners[i]));
   // The bytes of the normals are padded to lengths that glTF allows only as floats.
   const normals = Array.from(new Int8Array(bytes(body.normals)), (v) => v / 127);
   for (let i = 0; i < normals.length; i += 3) {
     const n = Math.hypot(normals[i], normals[i + 1], normals[i + 2]) || 1;
     for (let k = 0; k < 3; k++) normals[i + k] /= n;
   }
-  const shares = new Uint8Array(bytes(body.share));
+  const shares = new Uint8Array(bytes(body.share)), bone = new Uint8Array(bytes(body.bone)).map((b, i) => (shares[i] ? body.keep[b] + 1 : 0));
   const attributes = {
     POSITION: buffer.add(corners, "VEC3", 5126, { min: ends(Math.min), max: ends(Math.max) }), NORMAL: buffer.add(normals, "VEC3"),
-    JOINTS_0: buffer.add(new Uint8Array(bytes(body.bone)).map((bone, i) => (shares[i] ? bone : 0)), "VEC4", 5121), WEIGHTS_0: buffer.add(shares, "VEC4", 5121, { normalized: true }),
+    JOINTS_0: buffer.add(bone, "VEC4", 5121), WEIGHTS_0: buffer.add(shares, "VEC4", 5121, { normalized: true }),
   };
   const faces = body.wide ? new Uint32Array(bytes(body.faces)) : new Uint16Array(bytes(body.faces));
   const indices = buffer.add(faces, "SCALAR", body.wide ? 5125 : 5123);
-  const inverseBindMatrices = buffer.add(body.places.flatMap((place, b) => inverseBind(place, body.turns[b])), "MAT4");
+  const inverseBindMatrices = buffer.add(places.flatMap((place, b) => inverseBind(place, axes[b])), "MAT4");
   const times = buffer.add(frames.map((_, f) => f / FPS), "SCALAR", 5126, { min: [0], max: [(frames.length - 1) / FPS] });
-  const localTurn = (frame, j) => {
-    const turns = frame.subarray(3);
-    return parents[j] < 0 ? at4(turns, j) : multiply(conjugate(at4(turns, parents[j])), at4(turns, j));
+  const still = [1, 0, 0, 0], ordered = ([w, x, y, z]) => [x, y, z, w].map((v) => Math.max(-1, Math.min(1, v)));
+  // The rotation of a bone relative to its parent. turn(b): that of the joint of bone b in the world.
+  const local = (b, turn) => {
+    const p = parents[b], q = p < 0 ? axes[b] : multiply(conjugate(multiply(turn(p), axes[p])), multiply(turn(b), axes[b])), n = Math.hypot(...q) || 1;
+    return ordered(q.map((v) => v / n));
   };
-  const unitTurn = (turn) => { const n = Math.hypot(...turn) || 1; return [turn[1], turn[2], turn[3], turn[0]].map((v) => v / n); };
-  const tracks = names.map((_, j) => ({ input: times, output: buffer.add(frames.flatMap((frame) => unitTurn(localTurn(frame, j))), "VEC4"), interpolation: "LINEAR" }));
-  tracks.push({ input: times, output: buffer.add(frames.flatMap((frame) => at3(frame, 0).map((v) => v / 100)), "VEC3"), interpolation: "LINEAR" });
-  const nodes = names.map((name, j) => {
-    const children = parents.flatMap((p, k) => (p === j ? [k] : []));
-    return { name, translation: (j === root ? [0, 0, 0] : offsets[j]).map((v) => v / 100), ...(children.length ? { children } : {}) };
+  const samplers = [], channels = [];
+  const animate = (node, path, type, values) => {
+    channels.push({ sampler: samplers.length, target: { node, path } });
+    samplers.push({ input: times, output: buffer.add(values, type), interpolation: "LINEAR" });
+  };
+  const hips = frames.map((frame) => at3(frame, 0).map((v) => v / 100));
+  animate(0, "translation", "VEC3", hips.flatMap(([x, , z]) => [x, 0, z]));
+  animate(1, "translation", "VEC3", hips.flatMap(([, y]) => rotate(conjugate(axes[0]), [0, y, 0])));
+  for (let b = 1; b <= body.rig.joints; b++) {
+    animate(b, "rotation", "VEC4", frames.flatMap((frame) => local(b, (k) => (k ? at4(frame.subarray(3), k - 1) : still))));
+  }
+  const nodes = names.map((name, b) => {
+    const p = parents[b], children = parents.flatMap((q, k) => (q === b ? [k] : []));
+    const translation = (p < 0 ? places[b] : rotate(conjugate(axes[p]), minus(places[b], places[p]))).map((v) => v / 100);
+    return { name, translation, rotation: local(b, () => still), ...(children.length ? { children } : {}) };
   });
   const gltf = {
-    asset: { version: "2.0", generator: "Hobble" }, scene: 0, scenes: [{ nodes: [root, J] }],
+    asset: { version: "2.0", generator: "Hobble" }, scene: 0, scenes: [{ nodes: [0, N] }],
     nodes: [...nodes, { name: "body", mesh: 0, skin: 0 }],
     meshes: [{ primitives: [{ attributes, indices, material: 0 }] }],
     materials: [{ pbrMetallicRoughness: { baseColorFactor: [.66, .66, .64, 1], metallicFactor: 0, roughnessFactor: .8 } }],
-    skins: [{ joints: body.keep, inverseBindMatrices }],
-    animations: [{
-      name: "played", samplers: tracks,
-      channels: tracks.map((_, k) => ({ sampler: k, target: k === J ? { node: root, path: "translation" } : { node: k, path: "rotation" } })),
-    }],
+    skins: [{ name: "character", skeleton: 0, joints: names.map((_, b) => b), inverseBindMatrices }],
+    animations: [{ name: "played", samplers, channels }],
     buffers: [{ byteLength: buffer.size }], bufferViews: buffer.views, accessors: buffer.accessors,
   };
   return joinChunks(new TextEncoder().encode(JSON.stringify(gltf)), buffer);

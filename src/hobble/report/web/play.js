@@ -340,7 +340,7 @@ const createPlay = (stage, playables) => {
   find("play-bvh").addEventListener("click", () => player.actors.forEach((_, i) => (
     save(new Blob([player.motion(i)], { type: "text/plain" }), `${fileName(i)}.bvh`))));
   find("play-glb").addEventListener("click", () => player.actors.forEach(({ spec, frames }, i) => (
-    save(new Blob([glbFile(spec, material.bodies[spec.body], frames)], { type: "model/gltf-binary" }), `${fileName(i)}.glb`))));
+    save(new Blob([glbFile(material.bodies[spec.body], frames)], { type: "model/gltf-binary" }), `${fileName(i)}.glb`))));
   find("play-picture").addEventListener("click", () => canvas.toBlob((blob) => save(blob, `${fileName(0)}.png`)));
   addRecorder(find("play-film"), canvas, () => fileName(0));
 
