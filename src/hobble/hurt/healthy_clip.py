@@ -95,7 +95,6 @@ def measure_healthy_clip(clip: Clip, labels: Labels) -> HealthyClip:
     phase, known = phase_of_footsteps(labels.footsteps, frames)
     change = np.diff(phase, prepend=phase[:1])
     phase = phase[0] + np.cumsum(np.where(change < -0.5, change + 1.0, change)) if frames else phase
-    legs = [_leg_length(clip, side) for side in SIDES]
     return HealthyClip(
         clip,
         labels,
@@ -108,7 +107,7 @@ def measure_healthy_clip(clip: Clip, labels: Labels) -> HealthyClip:
         _cycle_lengths((stances[LEFT], stances[RIGHT]), frames, clip.fps),
         gaussian(clip.positions[:, skeleton.role("hips")][:, [0, 2]], PATH_SECONDS * clip.fps),
         _heading(clip),
-        float(np.mean(legs)),
+        skeleton.leg_length,
     )
 
 
@@ -122,13 +121,6 @@ def _without_contacts(start: int, end: int, touches: np.ndarray) -> tuple[int, i
     while end - start > LEAST_SWING and touches[end - 1]:
         end -= 1
     return start, end
-
-
-def _leg_length(clip: Clip, side: str) -> float:
-    """Length of thigh and shank together, cm. The joint with the role heel is the ankle."""
-    offsets = clip.skeleton.offsets
-    joints = [clip.skeleton.role(f"{side}_{role}") for role in ("knee", "heel")]
-    return float(sum(np.linalg.norm(offsets[joint]) for joint in joints))
 
 
 def _cycle_lengths(stances: tuple[list[SourceStance], list[SourceStance]], frames: int, fps: float) -> Array:

@@ -234,8 +234,9 @@ def make_ground(kind: str, rng: np.random.Generator) -> Ground:
 
     Slopes and steps go up and down along Z, which the figure faces at the start of the clip.
     """
-    makers = {"flat": lambda _: flat, "slopes": _make_slopes, "steps": _make_steps, "uneven": _make_uneven}
-    return makers[kind](rng)
+    if kind in WAVES:
+        return _make_waves(rng, *WAVES[kind])
+    return _make_steps(rng) if kind == "steps" else flat
 
 
 def flat(x: Array, z: Array) -> Array:
@@ -243,19 +244,12 @@ def flat(x: Array, z: Array) -> Array:
     return np.zeros(np.broadcast_shapes(np.shape(x), np.shape(z)))
 
 
-def _make_slopes(rng: np.random.Generator) -> Ground:
-    """Long hills, up to about 12 degrees steep along Z and less steep along X."""
-    return _make_waves(rng, lengths=(480, 640, 900), steepness=(0.07, 0.07, 0.07), across=0.35)
-
-
-def _make_uneven(rng: np.random.Generator) -> Ground:
-    """Bumps and hollows of a few centimetres, in all directions."""
-    return _make_waves(
-        rng,
-        lengths=(110, 150, 190, 260, 340, 600),
-        steepness=(0.05, 0.06, 0.06, 0.06, 0.06, 0.05),
-        across=1.5,
-    )
+# Kind of ground -> lengths, steepness and across of `_make_waves`. slopes: long hills, up to about 12 degrees
+# steep along Z and less steep along X. uneven: bumps and hollows of a few centimetres, in all directions.
+WAVES: dict[str, tuple[tuple[float, ...], tuple[float, ...], float]] = {
+    "slopes": ((480, 640, 900), (0.07, 0.07, 0.07), 0.35),
+    "uneven": ((110, 150, 190, 260, 340, 600), (0.05, 0.06, 0.06, 0.06, 0.06, 0.05), 1.5),
+}
 
 
 def _make_waves(
