@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,11 +10,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hobble.core.errors import InputError
 from hobble.models.forward import catmull_rom, weights_at
 from hobble.models.load import load_network
-from hobble.models.network import STORAGES, Network
-from hobble.models.pfnn import OPTIONS
+from hobble.models.network import Network
 from hobble.models.pfnn.release import write_release
 
 ROWS = 7
@@ -36,31 +33,10 @@ def spline(points: np.ndarray, phase: float) -> np.ndarray:
     )
 
 
-def reference(network: Network, x: np.ndarray, phase: np.ndarray) -> np.ndarray:
-    """Y by blending the weights first, in float64, row by row."""
-    out = []
-    for row, p in zip(x, phase, strict=True):
-        h = (row - network.x_mean.astype(float)) / network.x_std
-        for i, (w, b) in enumerate(zip(network.weights, network.biases, strict=True)):
-            h = spline(w, p) @ h + spline(b, p)
-            if i < len(network.weights) - 1:
-                h = np.where(h > 0, h, np.expm1(h))
-        out.append(h * network.y_std + network.y_mean)
-    return np.array(out)
-
-
 def rows(network: Network, count: int = ROWS) -> tuple[np.ndarray, np.ndarray]:
     rng = np.random.default_rng(1)
     x = rng.normal(0, 20, (count, network.layout.x_size)).astype(np.float32)
     return x, rng.random(count)
-
-
-def arrays(network: Network) -> dict[str, np.ndarray]:
-    out = {f"W{i}": w for i, w in enumerate(network.weights)}
-    out |= {f"b{i}": b for i, b in enumerate(network.biases)}
-    return out | {
-        "Xmean": network.x_mean, "Xstd": network.x_std, "Ymean": network.y_mean, "Ystd": network.y_std
-    }  # fmt: skip
 
 
 @given(st.floats(0, 1, exclude_max=True), st.integers(4, 9))
@@ -69,24 +45,6 @@ def test_spline_weights_follow_the_definition(phase: float, points: int) -> None
     table = np.random.default_rng(points).normal(size=(points, 3))
     np.testing.assert_allclose(weights_at(table, phase)[0], spline(table, phase), atol=1e-12)
     assert sum(catmull_rom(phase)) == pytest.approx(1)
-
-
-@pytest.mark.parametrize("points", [4, 6])
-def test_cubic_mode_equals_blending_the_weights_first(make_network, points: int) -> None:
-    network = make_network(control_points=points, scale=20.0)
-    x, phase = rows(network)
-    np.testing.assert_allclose(network.predictor().predict(x, phase), reference(network, x, phase), atol=2e-4)
-
-
-@pytest.mark.parametrize("storage", STORAGES)
-@pytest.mark.parametrize("mode", OPTIONS.modes)
-@pytest.mark.parametrize("count", [2, 23])
-def test_a_crowd_equals_single_characters(make_network, mode: str, storage: str, count: int) -> None:
-    network = make_network(scale=20.0)
-    predictor = network.predictor(mode, storage)
-    x, phase = rows(network, count)
-    one_by_one = [predictor.predict(x[i : i + 1], phase[i : i + 1])[0] for i in range(count)]
-    np.testing.assert_array_equal(predictor.predict(x, phase), one_by_one)
 
 
 @given(st.floats(-2, 3))
@@ -113,47 +71,6 @@ def test_a_column_that_never_varied_is_ignored(network: Network) -> None:
     before = blind.predict(x, phase)
     x[:, 5] += 1e6
     np.testing.assert_array_equal(before, blind.predict(x, phase))
-
-
-def test_weights_file_round_trip(tmp_path: Path, hurtable: Network, holden31) -> None:
-    meta = {
-        "layout": hurtable.layout.to_dict(),
-        "skeleton": holden31.to_dict(),
-        "channels": {"injury": list(hurtable.channels["injury"])},
-        "gaits": list(hurtable.gaits),
-    }
-    np.savez(tmp_path / "weights.npz", **arrays(hurtable), meta=np.array(json.dumps(meta)))
-    for path in (tmp_path, tmp_path / "weights.npz"):
-        back = load_network(path)
-        assert back.layout == hurtable.layout
-        assert back.channels["injury"] == hurtable.channels["injury"] == holden31.link_names
-        assert back.skeleton is not None
-        assert back.skeleton.joints == holden31.joints
-        assert back.sizes == hurtable.sizes
-        for a, b in zip(back.weights, hurtable.weights, strict=True):
-            np.testing.assert_array_equal(a, b)
-
-
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        (lambda a: a.pop("b1"), "no b1"),
-        (lambda a: a.pop("Ystd"), "no Ystd"),
-        (lambda a: a.update(W1=a["W1"][:, :, :-1]), "W1"),
-        (lambda a: a.update(W0=np.full_like(a["W0"], np.nan)), "not finite"),
-        (lambda a: a.update(Ymean=a["Ymean"][:-1]), r"Ystd has shape \(311,\)"),
-        (lambda a: a.update({k: v[:3] for k, v in a.items() if k[0] in "Wb"}), "3 control points"),
-    ],
-)
-def test_a_malformed_file_is_refused_with_a_message(
-    tmp_path: Path, network: Network, change, message: str
-) -> None:
-    broken = arrays(network)
-    change(broken)
-    np.savez(tmp_path / "weights.npz", **broken)
-    with pytest.raises(InputError, match=message) as error:
-        load_network(tmp_path)
-    assert "weights.npz" in str(error.value)
 
 
 def test_release_folder_round_trip(tmp_path: Path, network: Network, holden31) -> None:
