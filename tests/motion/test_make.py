@@ -91,19 +91,6 @@ def test_a_joint_above_the_hips_is_merged_into_them_and_reported(walker, bvh, ma
     assert made.translations is None
 
 
-def test_joints_in_another_order_are_sorted(walk, bvh, make, holden31):
-    order = np.array([0, *range(11, 31), *range(6, 11), *range(1, 6)])
-    back = {int(old): new for new, old in enumerate(order)}
-    shuffled = replace(
-        holden31,
-        joints=tuple(holden31.joints[i] for i in order),
-        parents=tuple(-1 if holden31.parents[i] < 0 else back[holden31.parents[i]] for i in order),
-        offsets=holden31.offsets[order],
-    )
-    clip, _ = make(bvh(replace(walk, skeleton=shuffled, rotations=walk.rotations[:, order])))
-    np.testing.assert_allclose(clip.positions, walk.positions[::2], atol=1e-4)
-
-
 @pytest.mark.parametrize("declared", [240, 242])
 def test_a_wrong_frame_count_is_repaired_or_refused(walk, bvh, make, declared):
     path = bvh(walk, edit=lambda s: s.replace("Frames: 241", f"Frames: {declared}"))

@@ -142,18 +142,6 @@ def test_a_malformed_file_is_refused_with_its_line(written, what):
         assert raised.value.line == line
 
 
-def chain(joints: int) -> str:
-    opened = "".join(f"JOINT j{i}\n{{\nOFFSET 0 0 0\nCHANNELS 1 Xrotation\n" for i in range(joints))
-    return "HIERARCHY\n" + opened.replace("JOINT", "ROOT", 1)
-
-
-def test_a_deep_chain_is_read_and_a_million_joints_are_refused_before_they_are_built(written):
-    with pytest.raises(InputError, match="more than 4096 joints"):
-        read_bvh(written(chain(20_000) + "MOTION\n"))
-    motion = f"MOTION\nFrames: 1\nFrame Time: 0.01\n{'0 ' * 3000}\n"
-    assert read_bvh(written(chain(3000) + "}\n" * 3000 + motion)).parents[-1] == 2998
-
-
 def test_a_file_with_a_frame_too_few_is_read_with_both_counts(written):
     clip = read_bvh(written(SMALL.replace("Frames: 2", "Frames: 3")))
     assert (len(clip), clip.declared) == (2, 3)

@@ -102,14 +102,6 @@ def test_a_leg_of_length_0_is_refused_in_source_and_target(walk, rigs):
             plan(source, target, pairs)
 
 
-def test_retargeting_there_and_back_restores_the_walk(walk, rigs):
-    """Retargeting to the larger rig and back gives the same walk, except for the legs' proportions."""
-    back = onto(onto(walk, rigs["holden31"], rigs["mixamo55"]), rigs["mixamo55"], rigs["holden31"])
-    apart = np.linalg.norm(back.positions - walk.positions, axis=-1)
-    assert apart.mean() < 2.0
-    assert np.abs(back.root[:, [0, 2]] - walk.root[:, [0, 2]]).max() < 0.5
-
-
 def test_the_path_is_scaled_by_the_legs(walk, rigs):
     tall = replace(rigs["holden31"].skeleton, offsets=rigs["holden31"].skeleton.offsets * 1.5)
     how = plan(walk.skeleton, tall, {name: name for name in walk.skeleton.joints})

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -68,10 +68,9 @@ def label_clip(
     zero = options.phase_zero
     cycles, dropped = find_cycles(footsteps, len(clip), zero, options.margins)
     if not len(cycles):
-        margin = MARGINS[options.margins]
-        where = f" with {margin} frames of the clip before and {margin + 1} after it" * (
-            options.margins == "drop"
-        )
+        margin, where = MARGINS[options.margins], ""
+        if options.margins == "drop":
+            where = f" with {margin} frames of the clip before and {margin + 1} after it"
         warnings.append(f"no whole gait cycle{where}, so no frame of the clip is trained on")
     contacts = find_contacts(clip, options)
     left, right = contacts[:, 0].mean(), contacts[:, 2].mean()
@@ -80,14 +79,7 @@ def label_clip(
             f"the left heel is down in {left:.0%} of the frames, the right heel in {right:.0%}: look whether "
             "the person limps, or whether a foot of the rig is wrong"
         )
-    labels = Labels(
-        contacts=contacts,
-        phase=phase if zero == "right" else (phase + 0.5) % 1.0,
-        phase_known=known,
-        gait=shares,
-        footsteps=footsteps,
-        cycles=cycles,
-    )
+    phase = phase if zero == "right" else (phase + 0.5) % 1.0
     report = LabelReport(
         clip=clip.name,
         phase_source="file" if {"phase", "footsteps"} & label_files.keys() else "automatic",
@@ -97,7 +89,7 @@ def label_clip(
         cycles_dropped=dropped,
         warnings=tuple(warnings),
     )
-    return labels, report
+    return Labels(contacts, phase, known, shares, footsteps, cycles), report
 
 
 def mirror_labels(labels: Labels, report: LabelReport, clip: Clip) -> tuple[Labels, LabelReport]:
@@ -109,16 +101,9 @@ def mirror_labels(labels: Labels, report: LabelReport, clip: Clip) -> tuple[Labe
     """
     footsteps = mirrored_footsteps(labels.footsteps)
     cycles, dropped = find_cycles(footsteps, len(labels), report.phase_zero, report.margins)
-    mirrored = Labels(
-        contacts=labels.contacts[:, [2, 3, 0, 1]],
-        phase=(labels.phase + 0.5) % 1.0,
-        phase_known=labels.phase_known,
-        gait=labels.gait,
-        footsteps=footsteps,
-        cycles=cycles,
-    )
-    values = {**asdict(report), "clip": clip.name, "cycles_dropped": dropped}
-    return mirrored, LabelReport(**values)
+    contacts, phase = labels.contacts[:, [2, 3, 0, 1]], (labels.phase + 0.5) % 1.0
+    mirrored = replace(labels, contacts=contacts, phase=phase, footsteps=footsteps, cycles=cycles)
+    return mirrored, replace(report, clip=clip.name, cycles_dropped=dropped)
 
 
 def write_report(path: str | Path, report: LabelReport, labels: Labels, clip: Clip) -> None:
