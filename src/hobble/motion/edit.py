@@ -36,7 +36,6 @@ TELEPORT = 30.0  # cm: where the root jumps further than this, the clip is cut i
 HEAD, TAIL = 0.5, 1.0
 BRIDGE = 0.25  # seconds: if two jumps are at most this far apart, the frames between can be interpolated
 BLEND = 0.1  # seconds on each side of a jump over which the motion is smoothed
-BLOCK = 4096  # frames that are searched at a time, to keep intermediate arrays small
 NO_POSE = 0.75  # frames have no pose if more than this share of their joints' rotations are zero
 
 
@@ -272,22 +271,18 @@ def find_jumps(clip: Clip) -> list[Jump]:
     In a jump, the step of a joint differs by more than the limit from the median of seven steps: the three
     before it, itself, and the three after it.
     """
+    from scipy.ndimage import median_filter  # imported here because most jobs do not need it
+
     if len(clip) < 3:
         return []
-    limit = JUMP + JUMP_AT_30 * (30.0 / clip.fps) ** 2
-    jumps = []
-    for first in range(0, len(clip) - 1, BLOCK):
-        # Three more steps on each side, so that medians at the edge of a block are right.
-        start = max(0, first - 3)
-        steps = np.diff(clip.positions[start : first + BLOCK + 4], axis=0)
-        padded = np.pad(steps, ((3, 3), (0, 0), (0, 0)), mode="reflect")
-        usual = np.median(np.lib.stride_tricks.sliding_window_view(padded, 7, axis=0), axis=-1)
-        sizes = np.linalg.norm(steps - usual, axis=-1)
-        for i in np.flatnonzero(sizes.max(axis=1) > limit):
-            if first <= start + i < first + BLOCK:
-                joint = clip.skeleton.joints[int(sizes[i].argmax())]
-                jumps.append(Jump(int(start + i), float(sizes[i].max()), joint, float(sizes[i, 0])))
-    return jumps
+    steps = np.diff(clip.positions, axis=0)
+    sizes = np.linalg.norm(steps - median_filter(steps, size=(7, 1, 1), mode="mirror"), axis=-1)
+    found = np.flatnonzero(sizes.max(axis=1) > JUMP + JUMP_AT_30 * (30.0 / clip.fps) ** 2)
+    worst = sizes[found].argmax(axis=1)
+    return [
+        Jump(int(i), float(sizes[i, j]), clip.skeleton.joints[j], float(sizes[i, 0]))
+        for i, j in zip(found, worst, strict=True)
+    ]
 
 
 def _find_glitches(clip: Clip) -> list[tuple[int, float, str]]:
