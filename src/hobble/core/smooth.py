@@ -61,6 +61,15 @@ def _windows(values: Array, width: int) -> Array:
     return np.lib.stride_tricks.sliding_window_view(np.pad(values, padding, mode="edge"), width, axis=0)
 
 
+def true_runs(flags: np.ndarray) -> np.ndarray:
+    """(n, 2) the first frame of each run of true frames in `flags` (F,), and the frame after its last.
+
+    >>> true_runs(np.array([True, False, True, True])).tolist()
+    [[0, 1], [2, 4]]
+    """
+    return np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]))).reshape(-1, 2)
+
+
 def smoothstep(x: Array) -> Array:
     """A curve that rises from 0 at x = 0 to 1 at x = 1, with slope 0 at both ends and beyond them."""
     x = np.clip(x, 0.0, 1.0)

@@ -13,7 +13,7 @@ from hobble.core.declared import ArrayOf, load_declared
 from hobble.core.errors import InputError
 from hobble.core.files import DELETE_IT, save_npz
 from hobble.core.quat import Array
-from hobble.core.smooth import mean
+from hobble.core.smooth import mean, true_runs
 
 # "bump" is what the label files of Holden et al. (2017) call "unknown"; nobody has published what it means.
 GAITS = ("stand", "walk", "jog", "crouch", "jump", "bump")
@@ -116,8 +116,7 @@ def label_curves(labels: Labels, clip: Clip, points: int = POINTS) -> dict[str, 
 
 def _intervals(flags: Array, fps: float) -> list[list[float]]:
     """[from, to) in seconds of each stretch of frames in which `flags` is true."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]])))
-    return [_rounded(pair / fps) for pair in edges.reshape(-1, 2)]
+    return [_rounded(pair / fps) for pair in true_runs(flags)]
 
 
 def _rounded(values: Array) -> list[float]:

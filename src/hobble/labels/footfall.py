@@ -14,7 +14,7 @@ import numpy as np
 
 from hobble.core.clip import Clip
 from hobble.core.quat import Array
-from hobble.core.smooth import median_of_three
+from hobble.core.smooth import median_of_three, true_runs
 from hobble.labels.clip_labels import CONTACT_ROLES
 from hobble.labels.options import LabelOptions
 
@@ -133,7 +133,7 @@ def _swing_frames(relative: Array, valley_factor: float) -> np.ndarray:
     """
     peaks = swing_peaks(relative)
     up = relative >= _rest_limit(relative, peaks, valley_factor)
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], up, [False]]))).reshape(-1, 2)
+    edges = true_runs(up)
     holds_peak = np.searchsorted(peaks, edges[:, 0]) < np.searchsorted(peaks, edges[:, 1])
     return edges[holds_peak]
 

@@ -16,6 +16,7 @@ import itertools
 import numpy as np
 
 from hobble.core.quat import Array
+from hobble.core.smooth import true_runs
 from hobble.labels.label_files import whole_frame
 
 END_OF_BOUT_ROW = (np.nan, np.nan, 1.0)  # the row that ends a bout of walking
@@ -67,11 +68,9 @@ def footsteps_of_phase(phase: Array) -> tuple[Array, np.ndarray]:
     not known where it stands still or jumps.
     """
     step = np.diff(phase) % 1.0
-    moving = np.concatenate([[False], (step > 0) & (step < FASTEST_PHASE), [False]])
-    edges = np.flatnonzero(np.diff(moving))
     known = np.zeros(len(phase), bool)
     events: list[tuple[float, int]] = []
-    for first, last in zip(edges[::2], edges[1::2], strict=True):
+    for first, last in true_runs((step > 0) & (step < FASTEST_PHASE)):
         known[first : last + 1] = True
         unwrapped = phase[first] + np.concatenate([[0.0], np.cumsum(step[first:last])])
         halves = np.arange(np.ceil(2 * unwrapped[0] - 1e-6), np.floor(2 * unwrapped[-1] + 1e-6) + 1)

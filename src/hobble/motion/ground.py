@@ -13,6 +13,7 @@ import numpy as np
 from hobble.core import quat
 from hobble.core.clip import Clip
 from hobble.core.quat import Array
+from hobble.core.smooth import smoothstep, true_runs
 from hobble.motion.axes import UP, body_axes, unit
 from hobble.motion.body import SIDES
 from hobble.motion.options import Problem
@@ -265,10 +266,8 @@ def _standing_runs(point: Array, slow: float, shortest: int) -> list[tuple[int, 
     out.
     """
     speed = np.linalg.norm(np.diff(point, axis=0), axis=1)
-    still = np.concatenate([[False], speed < slow, [False]])
-    starts = np.flatnonzero(~still[:-1] & still[1:])
-    ends = np.flatnonzero(still[:-1] & ~still[1:]) + 1
-    return [(int(a), int(b)) for a, b in zip(starts, ends, strict=True) if b - a >= shortest]
+    # A slow step from one frame to the next belongs to both.
+    return [(int(a), int(b) + 1) for a, b in true_runs(speed < slow) if b + 1 - a >= shortest]
 
 
 def _bridged(values: Array, runs: list[tuple[int, int]], ramp: int) -> Array:
@@ -293,5 +292,5 @@ def _bridged(values: Array, runs: list[tuple[int, int]], ramp: int) -> Array:
     keys, key_value, frame = np.array(key_frames), np.concatenate(key_values), np.arange(len(values))
     after = np.searchsorted(keys, frame, side="right")
     share = (frame - keys[after - 1]) / (keys[after] - keys[after - 1])
-    share = (share * share * (3 - 2 * share))[:, None]
+    share = smoothstep(share)[:, None]
     return key_value[after - 1] * (1 - share) + key_value[after] * share

@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 from pathlib import Path
-from string import Formatter
 from typing import Annotated, Literal, NamedTuple
 
 from pydantic import AfterValidator, Field, model_validator
@@ -24,9 +23,8 @@ def _check_sixty(fps: float) -> float:
 SixtyHz = Annotated[float, AfterValidator(_check_sixty)]
 
 
-# Format that may follow a name in `url`, such as 0>3 in {subject:0>3}: a width, which may have an alignment
-# and a fill character before it. The width is at most 99, because no file name needs more.
-PADDING = re.compile(r"(?:.?[<>^])?\d{0,2}")
+# A name in braces in `url`, perhaps with a width of up to 99, as in {subject:0>3}: no file name needs more.
+PLACEHOLDER = re.compile(r"\{(clip|subject)(?::(?:[^{}]?[<>^])?\d{0,2})?\}")
 
 
 class Download(Section):
@@ -43,19 +41,10 @@ class Download(Section):
 
     @model_validator(mode="after")
     def _check_url(self) -> Download:
-        try:
-            # Each placeholder is (text before it, name, format, conversion).
-            placeholders = [found for found in Formatter().parse(self.url) if found[1] is not None]
-            names = {name for _, name, _, _ in placeholders}
-            if any(
-                conversion or not PADDING.fullmatch(spec or "") for _, _, spec, conversion in placeholders
-            ):
-                raise ValueError("only padding to a width of up to 99 may follow a name, as in {subject:0>3}")
-            if not names <= {"clip", "subject"} or "clip" not in names:
-                raise ValueError("must contain {clip}; only {clip} and {subject} may be in braces")
-            example = self.url.format(clip="02_01", subject="02")
-        except (ValueError, LookupError, AttributeError) as error:
-            raise ValueError(f"url: {error}") from None
+        example, names = PLACEHOLDER.sub("02", self.url), PLACEHOLDER.findall(self.url)
+        if "clip" not in names or set("{}") & set(example):
+            rule = "only {clip} and {subject} may be in braces, with padding to a width of up to 99"
+            raise ValueError(f"url: must contain {{clip}}; {rule}, as in {{subject:0>3}}")
         if not re.fullmatch(r"https?://[^/\s]+/\S+", example) or not example.isprintable():
             raise ValueError("url: must be an address like https://host/{subject}/{clip}.bvh")
         return self

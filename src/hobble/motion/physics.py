@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from hobble.core.clip import Clip
 from hobble.core.quat import Array
-from hobble.core.smooth import gaussian
+from hobble.core.smooth import gaussian, true_runs
 from hobble.motion.axes import UP, unit
 from hobble.motion.body import SIDES
 from hobble.motion.options import Problem
@@ -268,10 +268,8 @@ def standing_seconds(speed: Array, fps: float) -> float:
 
     speed: (F-1,) speed of the hips, cm a second.
     """
-    still = np.concatenate([[False], speed < STILL, [False]])
-    edges = np.flatnonzero(still[1:] != still[:-1])
-    runs = [b - a for a, b in zip(edges[::2], edges[1::2], strict=True)]
-    return float(sum(run for run in runs if run >= STANDING * fps) / fps)
+    lengths = np.diff(true_runs(speed < STILL), axis=1)
+    return float(lengths[lengths >= STANDING * fps].sum() / fps)
 
 
 def rate_problem(clip: Clip, source_fps: float, scale: float) -> Problem | None:
