@@ -14,10 +14,10 @@ from hobble.core import quat
 from hobble.core.clip import Clip
 from hobble.core.quat import Array
 from hobble.core.smooth import smoothstep, true_runs
-from hobble.motion.axes import UP, body_axes, unit
+from hobble.motion.axes import UP
 from hobble.motion.body import SIDES
 from hobble.motion.options import Problem
-from hobble.motion.physics import Balance, find_balance
+from hobble.motion.physics import find_balance
 from hobble.motion.rig import leg_length
 
 SOLE = 3.0  # cm: height of the toe joint of a standing foot above the floor
@@ -49,14 +49,9 @@ UNEVEN = 4.0
 # seconds. In the 172 clips the direction leans by at most 3.9 degrees if the time is at least LONG, and by at
 # most 6 degrees if it is shorter.
 BALANCED, BALANCED_SHORT, LONG = 5.0, 10.0, 0.2
-# Degrees. If a foot stands alone too briefly to judge the balance, the world counts as tilted if trunk, legs
-# and the line across the body all lean to the same side by more than this. In the 172 clips the least of the
-# three leans is at most 7.5, in a walk with a hurt leg.
-MOST_SIDEWAYS = 8.0
 # Two poses are the same if no component of a quaternion differs by more, which is 2 degrees. Steps of people
 # differ by more. A cycle has more frames than SHORTEST_CYCLE.
 SAME_POSE, SHORTEST_CYCLE = 0.02, 10
-FORWARD_LEAN = 4.0  # degrees by which a walking body usually leans forward
 # The spread of feet along an axis is the standard deviation of their positions, in leg lengths. First the
 # slope is measured only along axes with a spread above WIDE, then along all axes with a spread above NARROW.
 # With less spread, feet show no slope.
@@ -130,18 +125,18 @@ def _cycle_length(clip: Clip) -> int:
 
 def world_tilt(clip: Clip) -> tuple[float, str] | None:
     """Degrees by which the world is tilted, and what is tilted, in words. None if nothing shows a tilt."""
-    leg = leg_length(clip.skeleton)
-    body, directions = find_balance(clip), _body_directions(clip)
+    leg, body = leg_length(clip.skeleton), find_balance(clip)
+    if body is None:
+        return None
     feet = _standing_balls(clip, SLOW * leg)
     if len(feet) >= FEWEST:
         horizontal = feet[:, [0, 2]] - feet[:, [0, 2]].mean(axis=0)
         variances, axes = np.linalg.eigh(np.cov(horizontal.T))
         slope, distances = _fitted_plane(horizontal @ axes, feet[:, 1])
         # (2,) parts, along the two axes, of the ground's normal and of the direction up the body.
-        normal = -slope / np.sqrt(1 + slope @ slope)
-        lean = (_up_from_posture(*directions) if body is None else body.up) @ axes
+        normal, lean = -slope / np.sqrt(1 + slope @ slope), body.up @ axes
         spread = np.sqrt(np.maximum(variances, 0.0))
-        least = LEAST_TILT if body is not None and distances[1] < UNEVEN else LEAST_TILT_NARROW
+        least = LEAST_TILT if distances[1] < UNEVEN else LEAST_TILT_NARROW
         for used, smallest in ((spread > WIDE * leg, least), (spread > NARROW * leg, LEAST_TILT_NARROW)):
             sine = float(np.linalg.norm(normal[used]))
             same = np.linalg.norm((lean - normal)[used]) < MOST_APART * sine
@@ -156,19 +151,10 @@ def world_tilt(clip: Clip) -> tuple[float, str] | None:
     # its short stands would seem long enough to judge the balance strictly.
     if (cycle := _cycle_length(clip)) < len(clip):
         body = find_balance(clip.part(slice(cycle)))
-    return _sideways_tilt(body, _least_sideways_lean(*directions))
-
-
-def _sideways_tilt(body: Balance | None, least_lean: float) -> tuple[float, str] | None:
-    """How far a body balances or leans to one side, as `world_tilt` returns it; None if too little."""
-    if body is not None:
-        if abs(body.aside) > np.interp(body.seconds, [0.0, LONG], [BALANCED_SHORT, BALANCED]):
-            side = "left" if body.aside > 0 else "right"
-            return abs(body.aside), f"the body, on one foot, balances on a line that leans to its {side}"
-        if body.seconds >= LONG:
-            return None
-    words = "trunk, legs and hips all lean to one side"
-    return (least_lean, words) if least_lean > MOST_SIDEWAYS else None
+    if body is None or abs(body.aside) < np.interp(body.seconds, [0.0, LONG], [BALANCED_SHORT, BALANCED]):
+        return None
+    side = "left" if body.aside > 0 else "right"
+    return abs(body.aside), f"the body, on one foot, balances on a line that leans to its {side}"
 
 
 def _standing_balls(clip: Clip, slow: float) -> Array:
@@ -195,33 +181,6 @@ def _fitted_plane(horizontal: Array, height: Array) -> tuple[Array, Array]:
         distances = np.abs(height - points @ fit)
         weight = 1.0 / np.sqrt(np.maximum(distances, 0.3))  # at least 0.3 cm, so that no weight is infinite
     return fit[:2], np.percentile(distances, [50, 90])
-
-
-def _body_directions(clip: Clip) -> tuple[Array, Array, Array]:
-    """Three unit vectors (F, 3): up along the trunk, up along the legs, and from right to left."""
-    left, trunk, _ = body_axes(clip.skeleton, clip.positions)
-    hips, *heels = (clip.positions[:, clip.skeleton.role(r)] for r in ("hips", "left_heel", "right_heel"))
-    return trunk, unit(hips - 0.5 * (heels[0] + heels[1])), left
-
-
-def _up_from_posture(trunk: Array, legs: Array, across: Array) -> Array:
-    """(2,) x and z of the mean unit vector up the body, without the usual forward lean of a walk."""
-    ahead = unit(np.cross(across, UP))
-    up = unit(trunk + legs) - np.sin(np.radians(FORWARD_LEAN)) * ahead
-    return np.asarray(up[:, [0, 2]].mean(axis=0))
-
-
-def _least_sideways_lean(trunk: Array, legs: Array, across: Array) -> float:
-    """The least of three sideways leans: of the trunk, of the legs and of the line across the body, degrees.
-
-    0 if they do not all lean to the same side.
-    """
-    left = unit(across * [1.0, 0.0, 1.0])
-    # Sines of the leans, positive to the left.
-    leans = [float(np.mean(np.sum(part * left, axis=-1))) for part in (trunk, legs)]
-    leans.append(-float(np.mean(across[:, 1])))
-    one_side = min(leans) > 0 or max(leans) < 0
-    return float(np.degrees(np.arcsin(min(abs(lean) for lean in leans)))) if one_side else 0.0
 
 
 def steady_heels(foot: Array, heel: Array, toe: Array, fps: float) -> Array:
