@@ -62,7 +62,8 @@ static int run(const unsigned char *file, size_t bytes, size_t size) {
     void *memory = malloc(size);
     hobble *h = hobble_create(file, bytes, 2, memory, size, NULL);
     hobble_ground ground = {.function = hills};
-    int finite = h != NULL;
+    int finite = h != NULL, numbers = h ? 7 * hobble_joints(h) : 0;
+    double *bones = malloc((size_t)numbers * sizeof *bones + 1);
     for (int frame = 0; h && frame < 24; frame++) {
         hobble_target targets[2] = {{.velocity = {0, 2.5}, .gait = HOBBLE_BY_SPEED},
                                     {.velocity = {-7, 1}, .facing = {0, 1}, .gait = 1}};
@@ -73,10 +74,13 @@ static int run(const unsigned char *file, size_t bytes, size_t size) {
         for (int c = 0; c < 2; c++) {
             for (int i = 0; i < 3 * hobble_joints(h); i++) finite &= isfinite(hobble_positions(h, c)[i]) != 0;
             for (int i = 0; i < 4 * hobble_joints(h); i++) finite &= isfinite(hobble_rotations(h, c)[i]) != 0;
+            hobble_bones(h, c, bones, bones + 3 * hobble_joints(h));
+            for (int i = 0; i < numbers; i++) finite &= isfinite(bones[i]) != 0;
             for (int i = 0; i < 6; i++) finite &= isfinite(hobble_state(h, c)[i]) != 0;
             for (int i = 0; i < 3; i++) finite &= isfinite(hobble_root(h, c)[i]) != 0;
         }
     }
+    free(bones);
     free(memory);
     return finite;
 }

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import json
+import os
 import re
 import shutil
 import subprocess
@@ -25,6 +26,7 @@ from hobble.engine.export import EXAMPLES, SOURCES, export_engine
 from hobble.engine.hob import character_bytes
 from hobble.engine.traces import SITUATIONS, trace
 from hobble.runtime.animation import ProceduralAnimation
+from hobble.runtime.export import restore_bone_lengths
 from hobble.runtime.options import Runtime
 from tests.engine.networks import network_of
 
@@ -210,16 +212,23 @@ def test_damaged_files_are_refused_with_a_reason(
         character_bytes(replace(network, skeleton=None), Runtime())
 
 
-@pytest.mark.parametrize("count", [160, pytest.param(3000, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    ("compiler", "count"),
+    [
+        ("gcc", 160),
+        pytest.param("gcc", 3000, marks=pytest.mark.slow),
+        pytest.param("clang", 3000, marks=pytest.mark.slow),
+    ],
+)
 def test_mutated_files_are_refused_or_make_finite_poses(
-    count: int, holden31: Skeleton, tmp_path: Path
+    compiler: str, count: int, holden31: Skeleton, tmp_path: Path
 ) -> None:
-    """Under AddressSanitizer and UBSan, with gcc; with zig's clang and only UBSan where there is no gcc."""
+    """Under AddressSanitizer and UBSan; with zig's clang and only UBSan where there is no such compiler."""
     sources = [RUNTIME_C, Path(__file__).with_name("mutate.c")]
-    sanitizers = "-fsanitize=address,undefined" if shutil.which("gcc") else "-fsanitize=undefined"
+    sanitizers = "-fsanitize=address,undefined" if shutil.which(compiler) else "-fsanitize=undefined"
     options = ["-g", "-O1", *WARNINGS, f"-I{SOURCES}", sanitizers, "-fno-sanitize-recover=all"]
-    if shutil.which("gcc"):
-        subprocess.run(["gcc", *options, *sources, "-o", tmp_path / "mutate", "-lm"], check=True)
+    if shutil.which(compiler):
+        subprocess.run([compiler, *options, *sources, "-o", tmp_path / "mutate", "-lm"], check=True)
     else:
         compile_c(sources, tmp_path / "mutate", options)
     for kind in KINDS:
@@ -260,10 +269,32 @@ def test_webassembly_moves_a_character_as_python_does(holden31: Skeleton, tmp_pa
 @pytest.mark.slow
 @pytest.mark.parametrize("target", ["x86_64-windows-gnu", "aarch64-macos", "aarch64-linux-gnu"])
 def test_the_runtime_compiles_for_other_machines(target: str, tmp_path: Path) -> None:
-    compile_c([RUNTIME_C], tmp_path / "runtime.o", [*WARNINGS, "-O3", "-target", target, "-c"])
+    for source in (RUNTIME_C, SOURCES / "hobble_gait.c"):
+        compile_c([source], tmp_path / "runtime.o", [*WARNINGS, "-O3", "-target", target, "-c"])
     compile_c(
         [RUNTIME_C, EXAMPLES / "example.c"], tmp_path / "example", [*WARNINGS, "-O3", "-target", target]
     )
+
+
+@pytest.mark.skipif(not shutil.which("mcs"), reason="no C# compiler")
+def test_c_sharp_moves_a_character_as_python_does(
+    built_folder: Path, holden31: Skeleton, tmp_path: Path
+) -> None:
+    """The example in C#, under Mono: a walk on a slope, and the pose with bones of constant length."""
+    network = network_of("pfnn", holden31, tmp_path)
+    (tmp_path / "character.hob").write_bytes(character_bytes(network, Runtime()))
+    sources = [EXAMPLES / name for name in ("Hobble.cs", "Walk.cs")]
+    subprocess.run(["mcs", *sources, f"-out:{tmp_path / 'walk.exe'}"], check=True)
+    said = subprocess.run(
+        ["mono", tmp_path / "walk.exe", tmp_path / "character.hob"],
+        env={**os.environ, "LD_LIBRARY_PATH": str(built_folder)}, capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    animation = ProceduralAnimation(network)
+    for _ in range(120):
+        pose = animation.next_pose((0, 2.5), terrain=lambda x, z: 0.05 * z)
+    _, places = restore_bone_lengths(holden31, pose.positions[None], pose.rotations[None])
+    numbers = [float(number) for number in re.findall(r"-?\d+\.\d+", said.stdout.splitlines()[-1])]
+    np.testing.assert_allclose(numbers, places[0, -1], atol=2e-3)
 
 
 def test_the_exported_folder_is_complete(

@@ -26,4 +26,4 @@ def test_a_linear_network_goes_from_training_to_the_page(copied: Workflow) -> No
     assert 0 < accuracy["train"]["mean"] < 1
     page = (results / "report.html").read_text(encoding="utf-8")
     assert "A toy that is linear, with 372 inputs and 311 outputs, trained for 2 passes" in page
-    assert '"kind":"toy"' in page.replace(": ", ":")
+    assert '"file":"SE9CQkxF' in page.replace(": ", ":"), "HOBBLE, the beginning of a character file"
