@@ -38,6 +38,7 @@ def load_template(name: str) -> Template:
         lstrip_blocks=True,
     )
     environment.filters.update(duration=format_duration, size=format_bytes, number=format_number)
+    environment.filters["hash_source"] = hash_source
     return environment.get_template(name)
 
 
@@ -57,7 +58,7 @@ def render_page(template: str, for_scripts: Mapping[str, Any], bundle: str, **va
         compressed={name: compressed(part) for name, part in for_scripts.items() if name not in at_once},
         style=page_style(),
         bundle=mark_safe("the bundle", bundle),
-        policy=policy(bundle),
+        policy=policy(bundle, page_style()),
         provenance={"commit": git_commit(FOLDER), "machine": machine(), "versions": versions()},
         **values,
     )
@@ -97,16 +98,22 @@ def compressed(value: Any) -> str:
     return base64.b64encode(zlib.compress(embedded(value).encode(), 9)).decode()
 
 
-def policy(script: str) -> str:
-    """The page's Content-Security-Policy: it fetches nothing, and runs no other script than this one.
+def policy(script: str, style: str) -> str:
+    """The page's Content-Security-Policy: it fetches nothing, and has no other script and style than these.
 
-    blob: is for plotly.js, which this script unpacks; wasm-unsafe-eval lets it compile WebAssembly.
+    blob: is for plotly.js, which this script unpacks; wasm-unsafe-eval lets it compile WebAssembly. The empty
+    style is that of plotly.js, which adds its rules one by one.
     """
-    digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
     return (
-        f"default-src 'none'; script-src 'sha256-{digest}' blob: 'wasm-unsafe-eval'; "
-        "style-src 'unsafe-inline'; img-src data: blob:; media-src blob:; font-src data:"
+        f"default-src 'none'; script-src {hash_source(script)} blob: 'wasm-unsafe-eval'; "
+        f"style-src {hash_source(style)} {hash_source('')}; "
+        "img-src data: blob:; media-src blob:; font-src data:"
     )
+
+
+def hash_source(text: str) -> str:
+    """What allows a script or a style in a Content-Security-Policy."""
+    return f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'"
 
 
 def page_style() -> Markup:
