@@ -205,14 +205,6 @@ def test_equivalent_joints_leave_out_joints_of_larger_skeletons(weights, tmp_pat
     assert some["clips"][0]["mean"] == pytest.approx(direct["mean"])
 
 
-def test_a_network_without_severities_reads_the_same_rows(tmp_path):
-    np.savez(tmp_path / "w.npz", **make_network(layout=replace(LAYOUT, channels=())))
-    save_clip_rows(tmp_path / "a.npz", make_rows("a", 20, 1, 0))
-    result = measure_accuracy(tmp_path / "w.npz", {"a": tmp_path / "a.npz"}, {"a": "held_out"}, "holden")
-    assert result["held_out"]["frames"] == 20
-    assert result["train"]["mean"] is None
-
-
 def test_rows_of_another_layout_are_refused(weights, tmp_path):
     other = make_rows("a", 0, 1, 0)
     save_clip_rows(

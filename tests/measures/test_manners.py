@@ -99,20 +99,6 @@ def test_whole_people_are_left_out() -> None:
     assert by_clip["right"] > by_person["right"] + 0.2
 
 
-def test_a_manner_of_a_single_person_is_never_named_when_that_person_is_left_out() -> None:
-    rng = np.random.default_rng(3)
-    windows = [
-        window(f"{m}{n}", m, *(place + rng.normal(0, 0.1, 2)))
-        for m, place in ((NONE, (0, 0)), ("old", (4, 0)), ("sad", (5, 2)))
-        for n in range(1 if m == "sad" else 3)
-        for _ in range(10)
-    ]
-    found = recognise_left_out(windows, {w.clip: w.clip for w in windows}, [0.02])
-    assert found["by_manner"] == {NONE: 1.0, "old": 1.0, "sad": 0.0}
-    assert found["right"] == round(60 / 70, 5)
-    assert found["presence_right"] == 1.0, "but that it is not the neutral walk is seen"
-
-
 def test_each_manner_is_tried_with_each_column_of_another_channel(
     both: Network, motion: list[Captured], monkeypatch: pytest.MonkeyPatch
 ) -> None:

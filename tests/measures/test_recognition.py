@@ -100,18 +100,6 @@ def test_two_classes_are_separated_along_fishers_direction() -> None:
     assert found.likeliest_classes(np.array([[-1.0, 1.0], [2.0, -2.0]])) == ["a", "b"]
 
 
-def test_neither_the_unit_of_a_feature_nor_a_constant_one_changes_the_names() -> None:
-    rng = np.random.default_rng(4)
-    values = np.concatenate([rng.normal(0, 1, (40, 3)), rng.normal(1, 1, (40, 3))])
-    labels = ["a"] * 40 + ["b"] * 40
-    constant = np.full((80, 1), 7.0)
-    plain = learn(values, labels).likeliest_classes(values)
-    scaled = np.concatenate([values * [1, 1000, 0.01], constant], axis=1)
-    assert learn(scaled, labels).likeliest_classes(scaled) == plain
-    with pytest.raises(ValueError, match="two classes or more"):
-        learn(values, ["a"] * 80)
-
-
 def test_features_measure_knee_and_elbow_bend_on_each_side(holden31: Skeleton) -> None:
     contacts, root = np.ones((120, 4)), np.zeros((120, 3))
     well = gait_features(holden31, figure(holden31, 120, 0, 0, 1), contacts, root)

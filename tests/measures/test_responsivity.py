@@ -119,12 +119,6 @@ def test_the_way_to_the_waypoint_where_a_lap_begins_does_not_belong_to_it(steady
     assert path["z"][-1] == pytest.approx(1.0 - 0.5 * 0.015 * 285, abs=0.03)
 
 
-def test_there_are_as_many_laps_in_the_published_mode_as_in_the_own() -> None:
-    options = Options(laps=19, laps_other_modes=3)
-    laps = [module.laps_in_mode(options, mode, "cubic") for mode in ("constant", "linear", "cubic")]
-    assert laps == [19, 3, 19]
-
-
 def test_each_mode_runs_its_own_laps(network) -> None:
     result = run(network, AHEAD, laps=1, seconds=3.0)
     modes = {entry["mode"]: entry for entry in result["modes"]}

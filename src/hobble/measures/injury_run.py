@@ -14,7 +14,6 @@ the reference walk at the same phase. The spread of a walk is its distance from 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from itertools import product
 from typing import Any
 
@@ -22,7 +21,6 @@ import numpy as np
 
 from hobble.channels.injury.shown import link_by_part
 from hobble.core.quat import Array
-from hobble.core.skeleton import Skeleton
 from hobble.measures.measure import MeasureInputs, Outcome
 from hobble.measures.walks import (
     FPS,
@@ -32,9 +30,7 @@ from hobble.measures.walks import (
     channel_values,
     cycle_frames,
     distance_to_cycle,
-    gait_measures,
     generate_walks,
-    mean_cycle,
     mean_of_known,
     settling_seconds,
     spearman,
@@ -77,53 +73,19 @@ Injury = Mapping[str, float]  # link -> severity
 Stretch = tuple[float, Sequence[Injury]]  # length as a share of the time, and the injury of each figure
 
 
-@dataclass(frozen=True)
-class Crowd:
-    """The motion of a crowd. A stretch and a figure are numbers, from 0."""
-
-    skeleton: Skeleton
-    walks: Walks
-
-    def cycle(self, stretch: int, figure: int) -> Array:
-        """The mean pose of a figure in each phase bin of its gait cycle, measured in a stretch."""
-        span = self.walks.measured_frames(stretch, figure)
-        return mean_cycle(self.walks.local[span, figure], self.walks.phase[span, figure])
-
-    def distance(self, stretch: int, figure: int, cycle: Array) -> float:
-        """Mean distance of a figure's poses in a stretch from `cycle`, cm."""
-        span = self.walks.measured_frames(stretch, figure)
-        local, phase = self.walks.local[span, figure], self.walks.phase[span, figure]
-        return float(np.mean(distance_to_cycle(local, phase, cycle)))
-
-    def measures(self, stretch: int, figure: int) -> dict[str, float | None]:
-        """The `gait_measures` of a figure in a stretch."""
-        span = self.walks.measured_frames(stretch, figure)
-        motion = (a[span, figure] for a in (self.walks.local, self.walks.contacts, self.walks.root))
-        return gait_measures(self.skeleton, *motion)
-
-    def acceleration(self, stretch: int, figure: int) -> Array:
-        """The largest acceleration of any joint in each frame of a stretch, cm per frame squared."""
-        return self.walks.acceleration[self.walks.starts[stretch] : self.walks.starts[stretch + 1], figure]
-
-    def speed(self, stretch: int, figure: int) -> float:
-        """A figure's mean speed in a stretch, cm/s."""
-        return float(self.measures(stretch, figure)["speed"] or 0.0)
-
-
 def walk_crowd(
     network: Network,
     gaits: Sequence[str],
     stretches: Iterable[Stretch],
     seconds: float,
     runtime: Runtime,
-) -> Crowd:
+) -> Walks:
     """Let a crowd walk. gaits: of each figure. seconds: the time of a stretch of length 1."""
-    assert network.skeleton is not None
     script = [
         CrowdTarget(_frames(share, seconds), gaits, channel_values(network, INJURY, injuries))
         for share, injuries in stretches
     ]
-    return Crowd(network.skeleton, generate_walks(network, script, runtime))
+    return generate_walks(network, script, runtime)
 
 
 def injury_response(
@@ -173,7 +135,7 @@ def _sweep(
     """`rows` (rising severity), `falling`, `responses` and the first `strips` of `injury_response`."""
     figures = [(gait, link) for gait in GAITS for link in links]
 
-    def crowd(*severities: tuple[float, float]) -> Crowd:
+    def crowd(*severities: tuple[float, float]) -> Walks:
         """The crowd of all figures. severities: share of the time and severity of each stretch."""
         hurt = [(share, [{link: severity} for _, link in figures]) for share, severity in severities]
         return walk_crowd(network, [gait for gait, _ in figures], hurt, seconds, runtime)
@@ -188,7 +150,7 @@ def _sweep(
         rows = sweep_rows(gradual, figure, gait, link)
         rising += rows[: WORST + 1]
         falling += rows[WORST + 1 :]
-        largest = float(gradual.walks.acceleration[int(gradual.walks.starts[1]) :, figure].max())
+        largest = float(gradual.acceleration[int(gradual.starts[1]) :, figure].max())
         response = respond(rows, largest, _settling_times(at_once, figure))
         responses.append({"gait": gait, "link": link, "trained": link in trained, **response})
         if gait == "walk" and link in trained:
@@ -203,7 +165,7 @@ def strip_of(cycles: Sequence[Array]) -> dict[str, Any]:
     return {"phase": round(at / len(cycles[0]), 5), "poses": [np.round(c[at], 1).tolist() for c in cycles]}
 
 
-def sweep_rows(crowd: Crowd, figure: int, gait: str, link: str) -> Rows:
+def sweep_rows(crowd: Walks, figure: int, gait: str, link: str) -> Rows:
     """One row for each of STEPS: labels, `gait_measures` and distances.
 
     from_healthy, from_worst, from_rising: distance from the healthy walk, from the walk at severity 10, and
@@ -214,13 +176,13 @@ def sweep_rows(crowd: Crowd, figure: int, gait: str, link: str) -> Rows:
     for step, severity in enumerate(STEPS):
         labels = {"gait": gait, "link": link, "direction": "rising" if step <= WORST else "falling"}
         references = {"healthy": 0, "worst": WORST, "rising": min(step, 2 * WORST - step)}
-        span = crowd.walks.measured_frames(1 + step, figure)
+        span = crowd.measured_frames(1 + step, figure)
         row = {
             **labels,
             "severity": float(severity),
             **crowd.measures(1 + step, figure),
             **{f"from_{n}": crowd.distance(1 + step, figure, cycles[i]) for n, i in references.items()},
-            "largest_acceleration": float(crowd.walks.acceleration[span, figure].max()),
+            "largest_acceleration": float(crowd.acceleration[span, figure].max()),
         }
         rows.append(_rounded(row))
     return rows
@@ -256,14 +218,13 @@ def respond(rows: Rows, largest: float, times: Mapping[str, float | None]) -> di
     return _rounded(found)
 
 
-def _settling_times(crowd: Crowd, figure: int) -> dict[str, float | None]:
+def _settling_times(walks: Walks, figure: int) -> dict[str, float | None]:
     """Time until the walk no longer changes, after the severity has jumped to 10 and back to 0.
 
     None if the walk does not change.
     """
-    walks = crowd.walks
     local, phase = walks.local[:, figure], walks.phase[:, figure]
-    distance = distance_to_cycle(local, phase, crowd.cycle(1, figure))
+    distance = distance_to_cycle(local, phase, walks.cycle(1, figure))
     healthy_cm = float(np.mean(distance[walks.measured_frames(1, figure)]))
     # Stretch 2 is hurt, stretch 3 is healthy again. The second half of each shows the settled walk.
     hurt_start, heal_start, end = walks.starts[2:5]
@@ -375,16 +336,15 @@ def into_a_jog(
     # In stretch 0 the figures reach their speed.
     lengths = ((frames, "walk"), (frames, "walk"), (2 * frames, "jog"))
     script = [CrowdTarget(length, [gait] * len(figures), hurt) for length, gait in lengths]
-    walks = generate_walks(network, script, runtime)
-    crowd = Crowd(network.skeleton, walks)
+    crowd = generate_walks(network, script, runtime)
     healthy = {stretch: crowd.cycle(stretch, 0) for stretch in (1, 2)}
     spread = {stretch: crowd.distance(stretch, 0, healthy[stretch]) for stretch in (1, 2)}
-    start = int(walks.starts[2])  # the first frame of the jog
+    start = int(crowd.starts[2])  # the first frame of the jog
     out = []
     for i, (link, severity) in enumerate(figures):
         walking, jogging = (crowd.distance(s, i, healthy[s]) - spread[s] for s in (1, 2))
         jog_speed = crowd.speed(2, i)
-        speeds = np.linalg.norm(np.diff(walks.root[start:, i, ::2], axis=0), axis=1) * FPS
+        speeds = np.linalg.norm(np.diff(crowd.root[start:, i, ::2], axis=0), axis=1) * FPS
         fast = np.flatnonzero(speeds >= JOG_SPEED_SHARE * jog_speed)
         row = {
             "link": link,
@@ -395,7 +355,7 @@ def into_a_jog(
             "walk_from_healthy_cm": walking,
             "jog_from_healthy_cm": jogging,
             "kept": jogging / walking if walking > LEAST_EFFECT_CM else None,
-            "largest_acceleration": float(walks.acceleration[start : start + frames, i].max()),
+            "largest_acceleration": float(crowd.acceleration[start : start + frames, i].max()),
         }
         out.append(_rounded(row))
     return out
@@ -419,13 +379,14 @@ def divided_severities(network: Network, links: Sequence[str], seconds: float, r
             healthy = crowd.cycle(1, i)
             spread, speed = crowd.distance(1, i, healthy), crowd.speed(1, i)
             for stretch, severity in enumerate(SEVERITIES_TO_DIVIDE, 1):
+                frames = slice(*crowd.starts[stretch : stretch + 2])
                 row = {
                     "scale": divisor,
                     "link": link,
                     "severity": severity,
                     "from_healthy_cm": crowd.distance(stretch, i, healthy) - spread,
                     "speed_share": crowd.speed(stretch, i) / max(speed, 1e-9),
-                    "largest_acceleration": float(crowd.acceleration(stretch, i).max()),
+                    "largest_acceleration": float(crowd.acceleration[frames, i].max()),
                 }
                 out.append(_rounded(row))
     return out

@@ -490,17 +490,11 @@ def gallery(
     if not limps:
         return []
     injuries = [{}, *(clip.severity_by_link for clip in limps)]
-    target = CrowdTarget(
-        WARM_UP_FRAMES + max(FPS, round(seconds * FPS)),
-        ["walk"] * len(injuries),
-        channel_values(network, INJURY, injuries),
-        [SPEEDS["walk"]] * len(injuries),
-    )
-    walks = generate_walks(network, [target], runtime)
-    healthy, *hurt = (
-        mean_cycle(walks.local[WARM_UP_FRAMES:, i], walks.phase[WARM_UP_FRAMES:, i])
-        for i in range(len(injuries))
-    )
+    gait, speed = ["walk"] * len(injuries), [SPEEDS["walk"]] * len(injuries)
+    hurt_channel = channel_values(network, INJURY, injuries)
+    lengths = (WARM_UP_FRAMES, max(FPS, round(seconds * FPS)))
+    walks = generate_walks(network, [CrowdTarget(n, gait, hurt_channel, speed) for n in lengths], runtime)
+    healthy, *hurt = (walks.cycle(1, i) for i in range(len(injuries)))
     return [
         {
             "clip": clip.clip,

@@ -19,7 +19,7 @@ from hobble.channels.shown import shown_names
 from hobble.core.files import Json
 from hobble.measures.measure import Cost, Measure, SampleOptions, sample_sentence
 from hobble.measures.shown import chart
-from hobble.report.parts import Chart, PageSection, Paragraph, SectionPart, heatmap
+from hobble.report.parts import Chart, PageSection, Paragraph, SectionPart, bar_trace, heatmap
 from hobble.runtime.options import Runtime
 
 MEASURE = Measure(
@@ -115,15 +115,9 @@ def together_chart(result: Json, shown_name: Callable[[str], str] = str) -> Char
 def effect_chart(result: Json, effect: str) -> Chart:
     """How much each manner changes one of the quantities in UNITS, in captured and in generated walks."""
     rows = [row for row in result["effects"] if row["effect"] == effect]
+    manners, hover = [row["manner"] for row in rows], "%{x}: %{y:.2f}<extra>%{fullData.name}</extra>"
     traces = [
-        {
-            "type": "bar",
-            "name": label,
-            "x": [row["manner"] for row in rows],
-            "y": [row[key] for row in rows],
-            "marker": {"color": colour},
-        }
-        for key, label, colour in BARS
+        bar_trace(label, manners, [row[key] for row in rows], colour, hover) for key, label, colour in BARS
     ]
     words = f"Change of {effect} ({UNITS[effect]}) from the neutral walk."
     title = effect.capitalize()

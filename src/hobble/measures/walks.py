@@ -180,12 +180,13 @@ class CrowdTarget:
 class Walks:
     """The motion of C figures over F frames, which consist of S stretches, one for each `CrowdTarget`.
 
-    local: (F, C, J, 3) joint positions in root coordinates, cm, float32. contacts: (F, C, 4) predicted
-    contacts of left heel, left toe, right heel, right toe. phase: (F, C) from 0 to 1. root: (F, C, 3)
+    skeleton: of all figures. local: (F, C, J, 3) joint positions in root coordinates, cm, float32. contacts:
+    (F, C, 4) predicted contacts of left heel, left toe, right heel, right toe. phase: (F, C) from 0 to 1. root: (F, C, 3)
     positions of the root in the world, cm. acceleration: (F, C) the largest of any joint, cm per frame
     squared, 0 in the first and last frame. starts: (S + 1,) first frame of each stretch, then F.
     """
 
+    skeleton: Skeleton
     local: Array = field(repr=False)
     contacts: Array = field(repr=False)
     phase: Array = field(repr=False)
@@ -207,6 +208,27 @@ class Walks:
         if whole < 1:
             return slice(start, stop)
         return slice(start + int(np.searchsorted(cycles, cycles[-1] - whole)), stop)
+
+    def cycle(self, stretch: int, figure: int) -> Array:
+        """The mean pose of a figure in each phase bin of its gait cycle, measured in a stretch."""
+        span = self.measured_frames(stretch, figure)
+        return mean_cycle(self.local[span, figure], self.phase[span, figure])
+
+    def distance(self, stretch: int, figure: int, cycle: Array) -> float:
+        """Mean distance of a figure's poses in a stretch from `cycle`, cm."""
+        span = self.measured_frames(stretch, figure)
+        return float(np.mean(distance_to_cycle(self.local[span, figure], self.phase[span, figure], cycle)))
+
+    def measures(self, stretch: int, figure: int) -> dict[str, float | None]:
+        """The `gait_measures` of a figure in a stretch."""
+        span = self.measured_frames(stretch, figure)
+        return gait_measures(
+            self.skeleton, *(a[span, figure] for a in (self.local, self.contacts, self.root))
+        )
+
+    def speed(self, stretch: int, figure: int) -> float:
+        """A figure's mean speed in a stretch, cm/s."""
+        return float(self.measures(stretch, figure)["speed"] or 0.0)
 
 
 def generate_walks(network: Network, script: Sequence[CrowdTarget], runtime: Runtime) -> Walks:
@@ -249,7 +271,7 @@ def generate_walks(network: Network, script: Sequence[CrowdTarget], runtime: Run
                 acceleration[frame - 1] = np.sqrt(np.max(squared, axis=1))[walker]
             frame += 1
     starts = np.cumsum([0, *(s.frames for s in script)])
-    return Walks(local, contacts, phase, root, acceleration, starts)
+    return Walks(network.skeleton, local, contacts, phase, root, acceleration, starts)
 
 
 def _targets(network: Network, stretch: CrowdTarget) -> dict[str, Array]:
