@@ -181,9 +181,9 @@ class Walks:
     """The motion of C figures over F frames, which consist of S stretches, one for each `CrowdTarget`.
 
     skeleton: of all figures. local: (F, C, J, 3) joint positions in root coordinates, cm, float32. contacts:
-    (F, C, 4) predicted contacts of left heel, left toe, right heel, right toe. phase: (F, C) from 0 to 1. root: (F, C, 3)
-    positions of the root in the world, cm. acceleration: (F, C) the largest of any joint, cm per frame
-    squared, 0 in the first and last frame. starts: (S + 1,) first frame of each stretch, then F.
+    (F, C, 4) predicted contacts of left heel, left toe, right heel, right toe. phase: (F, C) from 0 to 1.
+    root: (F, C, 3) positions of the root in the world, cm. acceleration: (F, C) the largest of any joint, cm
+    per frame squared, 0 in the first and last frame. starts: (S + 1,) first frame of each stretch, then F.
     """
 
     skeleton: Skeleton
