@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import struct
+import zipfile
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,7 @@ import numpy as np
 import pytest
 
 from hobble.core.files import read_json
+from hobble.engine.compile import LIBRARIES
 from hobble.measures.measure import all_measures
 
 pytestmark = pytest.mark.workflow
@@ -125,7 +127,8 @@ def test_a_configuration_that_continues_another_starts_at_its_end(copied) -> Non
 
 
 EXPORTS = [
-    f"results/test/export/{name}" for name in ("character.glb", "web", "engine", "pfnn", "linear.onnx")
+    f"results/test/export/{name}"
+    for name in ("hobble_blender.zip", "character.glb", "web", "engine", "pfnn", "linear.onnx")
 ]
 
 
@@ -138,11 +141,17 @@ def test_every_export_is_made(copied) -> None:
     assert (magic, version, length) == (b"glTF", 2, (export / "character.glb").stat().st_size)
     scene = json.loads((export / "character.glb").read_bytes()[20 : 20 + size])
     walks = {path.stem for path in (copied.folder / "results/test/runtime/bvh").glob("*.bvh")}
-    assert {animation["name"] for animation in scene["animations"]} == walks
+    assert {animation["name"] for animation in scene["animations"]} > walks | {
+        "walk_loop",
+        "jog_loop_root_motion",
+    }
+    addon = zipfile.ZipFile(export / "hobble_blender.zip").namelist()
+    assert {f"hobble_blender/libraries/{name}" for name in LIBRARIES} < set(addon)
+    assert {"hobble_blender/character.hob", "hobble_blender/character.glb"} < set(addon)
     spec = json.loads((export / "web/character.json").read_text())["spec"]
     weights = np.load(copied.folder / "results/test/network/weights.npz")
     assert spec["names"] == list(json.loads(str(weights["meta"]))["skeleton"]["joints"])
-    names = ("hobble.js", "hobble.d.ts", "index.html", "three.module.js")
+    names = ("hobble.js", "hobble.d.ts", "index.html", "example.js")
     assert all((export / "web" / name).stat().st_size > 500 for name in names)
     assert (export / "engine/character.hob").read_bytes()[:6] == b"HOBBLE"
     assert len(list((export / "engine/traces").iterdir())) == 8
