@@ -161,7 +161,7 @@ rule blender_addon:
         libraries=rules.engine_libraries.output.folder,
         addon=keep_local(
             [
-                f"{package.base}/workflow/blender/hobble_blender/{name}"
+                str(package.base / "workflow" / "blender" / "hobble_blender" / name)
                 for name in ("__init__.py", "blender_manifest.toml")
             ]
         ),

@@ -47,8 +47,8 @@ def write_blender_addon(
     character: character.hob. body: character.glb.
     """
     files = {file.name: file for file in Path(addon).iterdir() if file.is_file()}
-    # For Windows, the compiler also leaves a file for linkers in the folder.
-    compiled = (file for file in Path(libraries).iterdir() if file.suffix != ".lib")
+    # Beside them may be files of the compiler and of the workflow.
+    compiled = (file for file in Path(libraries).iterdir() if file.suffix in (".dll", ".dylib", ".so"))
     files |= {f"libraries/{file.name}": file for file in compiled}
     files |= {"hobble_ctypes.py": EXAMPLES / "hobble_ctypes.py"}
     files |= {"character.hob": Path(character), "character.glb": Path(body)}
