@@ -136,17 +136,6 @@ def test_no_step_is_missed_in_limps_and_on_rough_ground(shared: Path, read, opti
 
 
 @pytest.mark.shared
-@pytest.mark.parametrize(
-    ("name", "gait"),
-    [("walk_happy_001", WALK), ("walk_happy_002", WALK), ("run_sad_001", JOG), ("run_tired_001", JOG)],
-)
-def test_expressive_walks_and_runs_get_the_right_gait(shared, read, options, name, gait):
-    clip, motion = read(shared / f"mocap/styles/dataset-1_{name}.bvh")
-    labels, _ = label_clip(clip, [], motion, None, "rocky", options)
-    assert (labels.gait.argmax(axis=1) == gait).mean() > 0.8
-
-
-@pytest.mark.shared
 def test_labels_equal_those_of_the_original_rows(shared: Path, read, options):
     """Cycles, phase, phase change, contacts and gaits of the original generator, exactly."""
     rows = np.load(shared / "reference/original_rows_LocomotionFlat09_000.npz")

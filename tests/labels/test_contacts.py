@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hobble.labels.contacts import find_contacts, find_stance_contacts, find_still_joints
+from hobble.labels.contacts import find_stance_contacts, find_still_joints
 from hobble.labels.options import LabelOptions
 
 
@@ -55,18 +55,6 @@ def test_a_foot_held_in_the_air_has_no_contact(walker):
     assert found[:90].all()
     assert not found[150:, 2:].any()
     assert found[150:, :2].all()
-
-
-@pytest.mark.parametrize("frames", [1, 2, 3])
-def test_contacts_of_very_short_clips_have_the_right_shape(walker, frames):
-    clip = walker(frames=600)
-    short = replace(
-        clip,
-        root=clip.root[:frames],
-        rotations=clip.rotations[:frames],
-        translations=clip.translations[:frames],
-    )
-    assert find_contacts(short, LabelOptions()).shape == (frames, 4)
 
 
 def test_a_dip_does_not_end_the_rest_of_a_stance(walker):

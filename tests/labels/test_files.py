@@ -113,11 +113,6 @@ def test_phase_between_rows_is_interpolated_the_short_way_round(write):
     assert phase == pytest.approx([0.8, 0.85, 0.9, 0.0, 0.1, 0.15, 0.2])
 
 
-def test_the_last_row_of_a_file_that_is_too_short_is_repeated(write):
-    path = write("a.phase", "0.1\n0.2\n0.3\n")
-    assert read_phase(path, SourceTime(4, 60.0), 4) == pytest.approx([0.1, 0.2, 0.3, 0.3])
-
-
 def test_the_eight_columns_of_a_gait_file_become_six(write):
     rows = np.eye(8)
     text = "\n".join(" ".join(f"{x:.5f}" for x in row) for row in rows)

@@ -163,7 +163,7 @@ def _relative_heights(clip: Clip) -> tuple[Array, Array]:
     floor = lowest(toes, 61).mean(axis=1)
     leg, trunk, joint = skeleton.leg_length, 0.0, skeleton.role("head")
     while joint != skeleton.role("hips") and skeleton.parents[joint] >= 0:
-        trunk += np.linalg.norm(skeleton.offsets[joint])
+        trunk += float(np.linalg.norm(skeleton.offsets[joint]))
         joint = skeleton.parents[joint]
     head = (y[:, skeleton.role("head")] - floor) / (leg + trunk)
     return head, (y[:, skeleton.role("hips")] - floor) / leg

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -33,9 +34,14 @@ def unit(vectors: Array) -> Array:
     return vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-9)
 
 
-def degrees_between(a: Array, b: Array) -> float:
-    """Angle in degrees between two vectors (3,) of any length."""
-    return float(np.degrees(np.arccos(np.clip(unit(a) @ unit(b), -1.0, 1.0))))
+def angles_between(a: Array, b: Array) -> Array:
+    """Angles (...) in radians between vectors (..., 3) of any length."""
+    return np.arccos(np.clip(np.sum(unit(a) * unit(b), axis=-1), -1.0, 1.0))
+
+
+def degrees_between(a: Array, b: Array) -> Any:
+    """The same in degrees."""
+    return np.degrees(angles_between(a, b))
 
 
 def aligned(first: Array, from_first: Array, second: Array, from_second: Array) -> Array:

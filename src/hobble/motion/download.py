@@ -114,8 +114,8 @@ def _fetch(url: str, timeout: float, most: int) -> bytes:
     except TimeoutError:
         raise _Failed(f"no answer for {timeout:g} seconds") from None
     except urllib.error.URLError as error:
-        reason = getattr(error.reason, "strerror", None) or error.reason
-        raise _Failed(f"the server cannot be reached ({printable(reason)})") from None
+        why = getattr(error.reason, "strerror", None) or error.reason
+        raise _Failed(f"the server cannot be reached ({printable(why)})") from None
     except (OSError, http.client.HTTPException) as error:
         raise _Failed(f"the connection broke off ({type(error).__name__})") from None
 

@@ -16,7 +16,7 @@ from itertools import pairwise
 import numpy as np
 
 from hobble.core.quat import Array
-from hobble.motion.axes import bend_direction, unit
+from hobble.motion.axes import bend_direction, degrees_between, unit
 from hobble.motion.body import SIDES, Body, lowest_common_ancestor, middle, path_between, path_to_root
 from hobble.motion.names import are_twins, is_end, kind_score, limb_parts, part_of, side_of, side_of_pair
 
@@ -130,8 +130,7 @@ class MovingRig:
 
     def bend_degrees(self, i: int, j: int, k: int) -> Array:
         """(S,) degrees by which a limb bends at joint j: 0 if joints i, j and k are in line."""
-        cosine = np.sum(unit(self.vectors(i, j)) * unit(self.vectors(j, k)), axis=-1)
-        return np.degrees(np.arccos(np.clip(cosine, -1, 1)))
+        return degrees_between(self.vectors(i, j), self.vectors(j, k))
 
     def are_counterparts(self, a: int, b: int) -> bool:
         """Whether the bones that end at joints `a` and `b` can be counterparts on the left and on the right.

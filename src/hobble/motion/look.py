@@ -204,8 +204,11 @@ SAMPLED = (
     "and all numbers. Duplicates were searched only among them."
 )
 GOLDEN = 0.6180339887498949  # golden ratio - 1; its multiples, modulo 1, are spread evenly over 0..1
-COLUMNS = ("clip", "", "rig", "gait, s", "largest difference")  # texts; the columns of numbers follow
-COLUMNS += ("fps", "s", "hips, cm", "steps/min", "cycles", "foot down")
+# The columns of texts, then those of numbers.
+COLUMNS = (
+    *("clip", "", "rig", "gait, s", "largest difference"),
+    *("fps", "s", "hips, cm", "steps/min", "cycles", "foot down"),
+)
 STYLE = """body{font:14px/1.4 system-ui,sans-serif;margin:1.5em;color:#222;background:#fff}
 table{border-collapse:collapse}th,td{padding:2px 9px;text-align:left;border-bottom:1px solid #e3e3e3}
 th{position:sticky;top:0;background:#fff}td.n{text-align:right;font-variant-numeric:tabular-nums}

@@ -333,7 +333,7 @@ def _explain(path: Path, body: bytes, width: int, first_line: int) -> NoReturn:
 
     body: the text of the table. first_line: the number of its first line in the file.
     """
-    counts = []  # (values in a line, number of the line), without empty lines
+    counts: list[tuple[int, int]] = []  # (values in a line, number of the line), without empty lines
     for line, raw in enumerate(io.BytesIO(body), first_line):
         if len(raw) > LONGEST_LINE:
             raise InputError(path, f"a line of more than {LONGEST_LINE >> 20} MB", line=line, fix=EXPORT)

@@ -213,12 +213,11 @@ def _upright_moments(sample: BodySample, stands_in_zero: bool) -> BodySample:
 def _leans(sample: BodySample) -> Array:
     """(S,) degrees between the trunk and the vertical; 180 in moments in which no leg is stretched."""
     body, p = sample.body, sample.positions
-    trunk = unit(middle(p, body.arms, 1) - middle(p, body.legs, 0))
+    leans = degrees_between(middle(p, body.arms, 1) - middle(p, body.legs, 0), UP)
     stretch = [
         np.linalg.norm(p[:, ankle] - p[:, hip], axis=-1) / max(sample.length(hip, knee, ankle), 1e-9)
         for hip, knee, ankle, _ in body.legs.values()
     ]
-    leans = np.degrees(np.arccos(np.clip(trunk[:, 1], -1.0, 1.0)))
     return np.where(np.max(stretch, axis=0) > STRETCHED, leans, 180.0)
 
 

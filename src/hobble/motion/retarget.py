@@ -24,7 +24,7 @@ from hobble.core.errors import HobbleError
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton, aim_bone, local_rotations, rest_positions, two_bone_knee
 from hobble.core.smooth import gaussian, lowest, smooth_above, smoothstep
-from hobble.motion.axes import UP, bend_direction, rest_frame, unit
+from hobble.motion.axes import UP, angles_between, bend_direction, degrees_between, rest_frame, unit
 from hobble.motion.body import SIDES, path_between
 from hobble.motion.ground import steady_heels
 from hobble.motion.options import Problem
@@ -293,8 +293,7 @@ class _Leg:
         hip_at, knee_at, heel_at = (source[..., how.source.role(role), :] for role in roles[:3])
         length = np.linalg.norm(knee_at - hip_at, axis=-1) + np.linalg.norm(heel_at - knee_at, axis=-1)
         self.stretch = np.linalg.norm(heel_at - hip_at, axis=-1) / length
-        along = np.sum(unit(knee_at - hip_at) * unit(heel_at - knee_at), axis=-1)
-        self.knee_bend = np.arccos(np.clip(along, -1.0, 1.0))
+        self.knee_bend = angles_between(knee_at - hip_at, heel_at - knee_at)
 
     def excess(self, spared: float = 0.0) -> tuple[Array, Array]:
         """(...) cm by which the hips are too high for the leg to bend as in the source, and a weight.
@@ -422,11 +421,12 @@ def compare_motions(source: Clip, result: Clip, scale: float) -> dict[str, Any]:
     angles, directions, feet = {}, {}, {}
     for side in SIDES:
         for name, parts in ANGLES.items():
-            bends = (_bend(at, side, parts) for at in (before, after))
-            angles[f"{side} {name}"] = _compare_angle(*bends, name in SHAPE_DEPENDENT)
+            old, new = (_bend(at, side, parts) for at in (before, after))
+            angles[f"{side} {name}"] = _compare_angle(old, new, name in SHAPE_DEPENDENT)
         for name, ends in BONES.items():
             start, end = (f"{side}_{part}" for part in ends)
-            directions[f"{side} {name}"] = _mean_angle(*(at[end] - at[start] for at in (before, after)))
+            apart = degrees_between(*(at[end] - at[start] for at in (before, after)))
+            directions[f"{side} {name}"] = round(float(apart.mean()), 2)
         feet[side] = _compare_foot(before[f"{side}_toe"] * scale, after[f"{side}_toe"], result.fps)
     knees = {side: _knee_cosine(after, side) for side in SIDES}
     return {"angles": angles, "directions": directions, "feet": feet, "knees": knees}
@@ -503,13 +503,7 @@ def _bend(at: dict[str, Array], side: str, parts: tuple[str, ...]) -> Array:
     at: role -> (F, 3) positions. parts: the joints' roles without the side.
     """
     a, b, c = (at[part] if part == "head" else at[f"{side}_{part}"] for part in parts)
-    return np.degrees(np.arccos(np.clip(np.sum(unit(b - a) * unit(c - b), axis=-1), -1.0, 1.0)))
-
-
-def _mean_angle(one: Array, other: Array) -> float:
-    """Mean angle, degrees, between vectors (F, 3) of any length."""
-    cosines = np.clip(np.sum(unit(one) * unit(other), axis=-1), -1.0, 1.0)
-    return round(float(np.degrees(np.arccos(cosines)).mean()), 2)
+    return degrees_between(b - a, c - b)
 
 
 def _compare_foot(source: Array, result: Array, fps: float) -> dict[str, float | None]:
