@@ -62,14 +62,14 @@ def render_comparison(
         "training": {"curves": training_curves(compared)},
         "stages": {"charts": stage_charts(stages, "compare", once, configuration_colours(compared))},
     }
-    playables = playables or {}
+    playables = {name: spec for name, spec in (playables or {}).items() if spec}
     measurements = join_sections(compared_by(measures, "compared_section", compared))
     names = configuration_names(compared)
     drawn = drawn_by_script([sections, measurements])
     # Configurations with the same skeleton share a body. Its key is in the entry `body` of a character.
     bodies = {spec["body"]: packed_body(skeleton_of(spec)) for spec in playables.values()}
     used = sum(map(len, (bundle.encode(), compressed(bodies), *map(compressed, drawn.values()))))
-    on_page, left_out = select_fitting(playables or {}, LARGEST_PAGE - RESERVED - used)
+    on_page, left_out = select_fitting(playables, LARGEST_PAGE - RESERVED - used)
     rounded = {name: coarse_weights(spec) for name, spec in playables.items()} if left_out else {}
     if left_out:
         on_page, left_out = select_fitting(rounded, LARGEST_PAGE - RESERVED - used)
