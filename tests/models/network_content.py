@@ -31,11 +31,11 @@ def content(skeleton: Skeleton, links: int = 30) -> Content:
         arrays[f"{name}std"] = rng.uniform(1, 5, size).astype(np.float32)
     arrays["meta"] = {
         "kind": "pfnn",
-        "layout": {"joints": layout.joints, "window": layout.window, "step": layout.step, "links": links},
+        "layout": layout.to_dict(),
+        "channels": {"injury": list(skeleton.link_names[:links])} if links else {},
         "skeleton": skeleton.to_dict(),
         "gaits": list(GAITS),
         "contacts": list(CONTACTS),
-        "links": list(skeleton.link_names[:links]),
         "terrain_side": 25.0,
     }
     return arrays

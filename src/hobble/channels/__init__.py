@@ -15,7 +15,6 @@ __all__ = [
     "ClipSource",
     "all_channels",
     "channel",
-    "channel_of_old_key",
     "channel_packages",
     "display_modules",
 ]
@@ -56,14 +55,3 @@ def display_modules() -> list[str]:
     """
     modules = (f"{__name__}.{name}.shown" for name in CHANNEL_NAMES)
     return [module for module in modules if importlib.util.find_spec(module) is not None]
-
-
-def channel_of_old_key(key: str) -> str:
-    """Name of the channel that `key` stands for in a network file from before there were channels.
-
-    Raises ValueError for an unknown key.
-    """
-    for definition in all_channels():
-        if key in definition.old_keys:
-            return definition.name
-    raise ValueError(f"there is no such key: {key}")

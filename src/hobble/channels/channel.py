@@ -55,9 +55,8 @@ class Channel(ABC):
     word for the channel. value_word: the page's word for one of its values.
     highest: the highest value. rate: how much a value may change in a second at run time, unless the
     configuration says otherwise. suffix: a file <clip><suffix> beside a clip holds the clip's values; None if
-    the channel has no such files. old_keys: keys that stand for this channel in old configurations and
-    network files. Options: pydantic model of the data set's section `channels.<name>`. If `Options` is None,
-    every data set has the channel, else only data sets with this section have it. slows: whether values above
+    the channel has no such files. Options: pydantic model of the data set's section `channels.<name>`. If
+    `Options` is None, every data set has the channel, else only data sets with this section have it. slows: whether values above
     0 make the body slower. If so, `hobble.channels.speed_limits` learns from the database how fast such a
     body goes. manner: whether each column is a way of walking that lasts for a whole clip, such as a mood. If
     so, `hobble.measures.manners` measures whether a recogniser finds it in generated walks. targets: folders
@@ -71,7 +70,6 @@ class Channel(ABC):
     default: float = 0.0
     rate: float = 1.0
     suffix: str | None = None
-    old_keys: Sequence[str] = ()
     Options: type[Section] | None = None
     slows: bool = False
     manner: bool = False

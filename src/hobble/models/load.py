@@ -204,11 +204,7 @@ def _read_labels(
 
     Raises InputError unless there is one label for each column.
     """
-    old = meta.model_extra or {}
-    # Older files have the labels under other keys.
-    found: Any = meta.channels.get(name) or next(
-        (old[key] for key in channel(name).old_keys if old.get(key)), None
-    )
+    found: Any = meta.channels.get(name)
     if found is None and skeleton is not None:
         found = channel(name).columns(skeleton)
     labels = read_declared(path, f"channel {name}", Names, found or ())  # type: ignore[arg-type]

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from hobble.channels import channel, channel_of_old_key
+from hobble.channels import channel
 from hobble.core.errors import HobbleError
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
@@ -65,14 +65,12 @@ class RowLayout:
     def from_dict(cls, data: Mapping[str, Any]) -> RowLayout:
         """The layout from the data of `to_dict`.
 
-        In old files, the number of a channel's columns is under one of its `old_keys` instead. Raises
-        KeyError, TypeError or ValueError if the data describe no layout.
+        Raises KeyError, TypeError or ValueError if the data describe no layout.
         """
+        if unknown := set(data) - {"joints", "window", "step", "channels"}:
+            raise ValueError(f"there is no such key: {min(unknown)}")
         numbers = {key: data[key] for key in ("joints", "window", "step") if key in data}
         channels = dict(data.get("channels", {}))
-        for key in set(data) - {"joints", "window", "step", "channels"}:
-            if data[key]:
-                channels[channel_of_old_key(key)] = data[key]
         for least, values in ((1, numbers), (0, channels)):
             for key, value in values.items():
                 if type(value) is not int or not least <= value <= MOST_COLUMNS:

@@ -43,7 +43,6 @@ class Injury(Channel):
     highest = 10.0
     rate = 10.0  # severity per second: from healthy to the highest severity in one second
     suffix = "_injuries.txt"
-    old_keys = ("links", "injury", "status", "severity")
     slows = True
     targets = ("questionnaire",)  # a page on which people watch films of the character and tick what hurts
 

@@ -52,7 +52,7 @@ class LearnedOptions(MatchingOptions):
         from hobble.models.learned.train import train
         from hobble.models.matching.build import read_tables
 
-        return train(self, read_tables(self, clips, layout, skeleton), layout)
+        return train(self, read_tables(self, clips, layout, skeleton), layout, skeleton)
 
 
 OPTIONS = LearnedOptions

@@ -20,6 +20,7 @@ import torch
 from torch import Tensor, nn
 
 from hobble.core.quat import Array
+from hobble.core.skeleton import Skeleton
 from hobble.models.matching.build import Tables, findable_rows
 from hobble.models.model import BuiltNetwork
 from hobble.rows.layout import RowLayout
@@ -35,18 +36,21 @@ LEAST_STD = 1e-4  # of a column; the standardised values of one that varies less
 # Factors in the loss of the decompressor: the change of the pose from frame to frame, the size of the latent
 # vectors, and their change, which makes them smooth enough for the stepper.
 CHANGE, LATENT_SIZE, LATENT_CHANGE = 10.0, 0.001, 0.01
+FOOT_WEIGHT = 3.0  # of the errors of heels and toes, whose sliding is seen first
+FOOT_JOINTS = ("left_heel", "left_toe", "right_heel", "right_toe")  # roles
 REPORTS = 5  # lines in the log for each training
 
 Options = Any  # `hobble.models.learned.LearnedOptions`, whose module imports this one
 
 
-def train(options: Options, tables: Tables, layout: RowLayout) -> BuiltNetwork:
+def train(options: Options, tables: Tables, layout: RowLayout, skeleton: Skeleton) -> BuiltNetwork:
     """Train on all frames of the tables. The same seed gives the same network on the same kind of machine."""
     torch.manual_seed(options.seed)
     mean, std = tables.features.mean(axis=0), tables.features.std(axis=0)
     std[std < LEAST_STD] = 0.0
     features = torch.from_numpy((tables.features - mean) / np.where(std > 0, std, np.inf))
-    decompressor, latent = _train_decompressor(options, tables, layout, features)
+    feet = [skeleton.role(role) for role in FOOT_JOINTS]
+    decompressor, latent = _train_decompressor(options, tables, layout, feet, features)
     state = torch.cat([features, latent], dim=1)
     stepper = _train_stepper(options, tables, state)
     projector = _train_projector(options, tables, layout, state, torch.from_numpy(std))
@@ -136,24 +140,26 @@ def _standard_poses(tables: Tables, layout: RowLayout) -> tuple[Tensor, Array, A
 
 
 def _train_decompressor(
-    options: Options, tables: Tables, layout: RowLayout, features: Tensor
+    options: Options, tables: Tables, layout: RowLayout, feet: list[int], features: Tensor
 ) -> tuple[nn.Sequential, Tensor]:
     """The decompressor, from states to Y in raw units and the phase; the latent vectors (R, L) of all frames.
 
-    The latent vectors are standardised.
+    The latent vectors are standardised. feet: indices of the joints that get FOOT_WEIGHT.
     """
     poses, mean, std = _standard_poses(tables, layout)
     columns, known = poses.shape[1], features.shape[1]
     compressor = layers(columns + known, options.decompressor_units, options.latent)
     decompressor = layers(known + options.latent, options.decompressor_units, columns)
-    rows = _starts(tables.remaining, 1)
+    rows, weights = _starts(tables.remaining, 1), torch.ones(columns)
+    for block in (layout.y_joint_position, layout.y_joint_velocity):
+        weights[block].view(-1, 3)[feet] = FOOT_WEIGHT
 
     def loss() -> Tensor:
         first = _draw(rows, PAIRS)
         pair = torch.cat([first, (first + 1).clamp(max=len(poses) - 1)])
         latent = compressor(torch.cat([poses[pair], features[pair]], dim=1))
         found = decompressor(torch.cat([features[pair], latent], dim=1))
-        error, (now, after) = found - poses[pair], latent.chunk(2)
+        error, (now, after) = (found - poses[pair]) * weights, latent.chunk(2)
         change = torch.diff(torch.stack(error.chunk(2)), dim=0)
         return (
             error.square().mean()
