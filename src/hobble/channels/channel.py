@@ -58,9 +58,9 @@ class Channel(ABC):
     the channel has no such files. Options: pydantic model of the data set's section `channels.<name>`. If
     `Options` is None, every data set has the channel, else only data sets with this section have it. slows:
     whether values above 0 make the body slower. If so, `hobble.channels.speed_limits` learns from the
-    database how fast such a body goes. manner: whether each column is a way of walking that lasts for a whole clip, such as a mood. If
-    so, `hobble.measures.manners` measures whether a recogniser finds it in generated walks. targets: folders
-    of results/<configuration>/ that only a configuration with this channel can have.
+    database how fast such a body goes. manner: whether each column is a way of walking that
+    lasts for a whole clip, such as a mood. If so, `hobble.measures.manners` measures whether a recogniser
+    finds it in generated walks. targets: folders of results/<configuration>/ that only a configuration with this channel can have.
     """
 
     name: str
