@@ -60,7 +60,8 @@ class Channel(ABC):
     whether values above 0 make the body slower. If so, `hobble.channels.speed_limits` learns from the
     database how fast such a body goes. manner: whether each column is a way of walking that
     lasts for a whole clip, such as a mood. If so, `hobble.measures.manners` measures whether a recogniser
-    finds it in generated walks. targets: folders of results/<configuration>/ that only a configuration with this channel can have.
+    finds it in generated walks. targets: folders of results/<configuration>/ that
+    only a configuration with this channel can have.
     """
 
     name: str
