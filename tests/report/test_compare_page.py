@@ -112,25 +112,6 @@ def test_boxes_are_at_the_quantiles_with_published_means(compared: dict[str, Any
     assert dict(zip(points["x"], points["y"], strict=True)) == pytest.approx({"holden": 4.39, "ava": 1.48})
 
 
-def test_training_is_drawn_over_passes_seconds_and_samples(
-    compared: dict[str, Any], material: ReportMaterial
-) -> None:
-    chart = compare_page.training_curves(compared)
-    assert chart is not None
-    assert list(chart.options) == ["passes", "seconds of training", "samples seen"]
-    assert chart.options["seconds of training"][0]["x"] == material.history["seconds"]
-    assert chart.options["passes"][0]["x"][-1] == max(material.history["pass"])
-
-
-def test_every_pair_is_in_the_map(compared: dict[str, Any]) -> None:
-    chart = of_accuracy.difference_map(compared)
-    held_out = chart.options["held-out clips, sd of single frames"]
-    of_means = chart.options["held-out clips, sd of the means of clips"][0]["z"][0][1]
-    (overall,) = [row for row in compared["difference"] if row["over"] == "held_out"]
-    assert held_out[0]["z"][0][1] == overall["difference"] == held_out[0]["z"][1][0]
-    assert of_means == overall["difference_of_means"] != overall["difference"]
-
-
 def test_published_clips_and_laps_are_drawn_beside_ours(compared: dict[str, Any]) -> None:
     """Figures 5.1, 5.2, 5.6, 5.7 and 5.11 of Segerstedt, and his tables of the appendix."""
     lines = of_accuracy.clip_lines(compared)

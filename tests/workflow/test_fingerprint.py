@@ -42,7 +42,6 @@ if TYPE_CHECKING:
     from pkg.typed import T
 
 log = logging.getLogger("far")
-FIX = "Mend it."
 KIND = "walk"
 
 
@@ -50,16 +49,10 @@ def f(x: int) -> int:
     '''Doc.'''
     # why
     if x > 9:
-        raise ValueError(f"{x} is too large", FIX)
-    if x < 0:
-        return refuse_Error(x, "too small")
+        raise ValueError(f"{x} is too large")
     log.info("%d comes", x)
     assert x != 7, "seven"
     return Options(kind=KIND).double() + 1
-
-
-def refuse_Error(x, text):
-    return x
 """
 
 OPTIONS = """
@@ -91,17 +84,12 @@ def test_a_fingerprint_follows_imports_but_not_infrastructure(source: Path) -> N
     ("file", "old", "new", "changes"),
     [
         ("script.py", "near.g()", "near.g() + 1", True),
-        ("src/pkg/near.py", "f(1)", "f(2)", True),
-        ("src/pkg/far.py", "() + 1", "() + 2", True),
         ("src/pkg/far.py", "x != 7", "x != 8", True),
-        ("src/pkg/far.py", "walk", "run", True),
         ("src/pkg/far.py", "raise ValueError(", "print(", True),
-        ("src/pkg/far.py", "return refuse_Error", "raise refuse_Error", True),
         ("src/pkg/options.py", "2 * self", "3 * self", True),
         ("src/pkg/far.py", "# why", "# because", False),
         ("src/pkg/far.py", "Doc.", "Other words.", False),
         ("src/pkg/far.py", "is too large", "is more than 9", False),
-        ("src/pkg/far.py", "too small", "below 0", False),
         ("src/pkg/far.py", '"seven"', '"not seven"', False),
         ("src/pkg/far.py", "%d comes", "here comes %d", False),
         ("src/pkg/far.py", "x: int", "x: float", False),

@@ -85,37 +85,27 @@ def test_a_job_ends_soon_after_its_run(tmp_path: Path, work: str, status: int) -
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_a_stopped_job_cleans_up_silently(tmp_path: Path, number: signal.Signals) -> None:
+def test_a_stopped_job_cleans_up_silently_even_if_it_is_told_twice(
+    tmp_path: Path, number: signal.Signals
+) -> None:
+    """Ctrl-C reaches a job twice: from the terminal, and from Snakemake, which ends its jobs."""
     path = str(tmp_path / "out.txt")
     work = f"""
     from hobble.core.files import atomic_path
     with atomic_path({path!r}) as part:
         part.write_text("half")
-        print("begun", flush=True)
-        time.sleep(60)"""
+        try:
+            print("begun", flush=True)
+            time.sleep(60)
+        finally:
+            print("cleaning", flush=True)
+            time.sleep(1)"""
     process = started(tmp_path, work, os.getpid())
     assert process.stdout.readline() == "begun\n"
     process.send_signal(number)
+    assert process.stdout.readline() == "cleaning\n"
+    for again in (signal.SIGTERM, signal.SIGINT):
+        process.send_signal(again)
     assert process.wait(timeout=10) == 128 + number
     assert process.stdout.read() == ""
     assert [file.name for file in tmp_path.iterdir()] == ["job.log"]
-
-
-def test_a_second_signal_does_not_end_the_clean_up(tmp_path: Path) -> None:
-    """Ctrl-C reaches a job twice: from the terminal, and from Snakemake, which ends its jobs."""
-    work = """
-    try:
-        print("begun", flush=True)
-        time.sleep(60)
-    finally:
-        print("cleaning", flush=True)
-        time.sleep(1)
-        print("cleaned", flush=True)"""
-    process = started(tmp_path, work, os.getpid())
-    assert process.stdout.readline() == "begun\n"
-    process.send_signal(signal.SIGINT)
-    assert process.stdout.readline() == "cleaning\n"
-    for number in (signal.SIGTERM, signal.SIGINT):
-        process.send_signal(number)
-    assert process.stdout.read() == "cleaned\n"
-    assert process.wait(timeout=10) == 128 + signal.SIGINT

@@ -68,16 +68,6 @@ def test_a_run_prints_its_plan_some_progress_and_a_summary() -> None:
     assert len(run.lines) <= 2 + 200 / PROGRESS_SECONDS
 
 
-def test_on_a_terminal_one_line_is_overwritten_and_cleared() -> None:
-    run = Run(live=True)
-    run.say("run_info", "", stats={"motion_clips": 2, "total": 2})
-    run.job(1, "motion_clips", clip="a")
-    run.finish(1, 1, 2)
-    assert run.out.getvalue().count("\n") == 1
-    run.say(None, "something odd", logging.WARNING)
-    assert run.out.getvalue().endswith("\r\x1b[Ksomething odd\n")
-
-
 def test_a_failure_is_printed_once_and_listed_in_the_summary(tmp_path: Path) -> None:
     said, silent = tmp_path / "said.log", tmp_path / "silent.log"
     said.write_text("2026-01-01 00:00:00,000 INFO x\n2026-01-01 00:00:00,000 ERROR a.bvh: is torn\n")
