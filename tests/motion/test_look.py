@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
-
 import pytest
 
+from hobble.cli.__main__ import main
 from hobble.motion.look import ClipSummary, format_table, shared_warnings, summarise_clips
 
 
@@ -53,8 +51,8 @@ def test_a_warning_of_many_clips_is_printed_once():
     assert shared_warnings(clips[:4]) == (clips[:4], [])
 
 
-def test_a_draft_of_a_skeleton_file_is_printed(root, folder):
-    run = [sys.executable, "-m", "hobble.motion", "rig", str(folder / "healthy.bvh")]
-    done = subprocess.run(run, cwd=root, capture_output=True, text=True, check=True)
-    assert "  left_knee: 'LeftLeg'\n" in done.stdout
-    assert "  'LeftLeg': {parent: 'LeftUpLeg', offset: [0, -41, 0]}\n" in done.stdout
+def test_a_draft_of_a_skeleton_file_is_printed(folder, capsys):
+    assert main(["rig", str(folder / "healthy.bvh")]) == 0
+    said = capsys.readouterr().out
+    assert "  left_knee: 'LeftLeg'\n" in said
+    assert "  'LeftLeg': {parent: 'LeftUpLeg', offset: [0, -41, 0]}\n" in said
