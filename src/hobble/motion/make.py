@@ -25,14 +25,7 @@ from hobble.motion.limbs import on_four_legs
 from hobble.motion.options import ACCEPT, ClipMotion, MotionOptions, Problem, accept
 from hobble.motion.other_formats import read_motion
 from hobble.motion.physics import pace_problem, rate_problem
-from hobble.motion.read import (
-    MOST_JOINT_POSES,
-    Bvh,
-    Decoded,
-    check_angles,
-    decode_channels,
-    frame_rate,
-)
+from hobble.motion.read import MOST_JOINT_POSES, Bvh, Decoded, check_angles, decode_channels, frame_rate
 from hobble.motion.rest_pose import why_not_standing, with_upright_rest
 from hobble.motion.retarget import compare_motions, difference_problems, knee_problem, plan, retarget_clip
 from hobble.motion.rig import (

@@ -22,25 +22,9 @@ from hobble.core import quat
 from hobble.core.clip import Clip
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton, local_rotations
-from hobble.motion.axes import (
-    AHEAD,
-    LEFT,
-    UP,
-    aligned,
-    degrees_between,
-    pointed_along,
-    snapped,
-    unit,
-)
+from hobble.motion.axes import AHEAD, LEFT, UP, aligned, degrees_between, pointed_along, snapped, unit
 from hobble.motion.body import SIDES, Body, across, middle, path_to_root
-from hobble.motion.body_sample import (
-    BRIEF,
-    RAISED,
-    SHORT,
-    BodySample,
-    outward,
-    spine_shares,
-)
+from hobble.motion.body_sample import BRIEF, RAISED, SHORT, BodySample, outward, spine_shares
 
 # Largest angles, in degrees, by which parts of a standing person differ from a direction. Legs are compared
 # with down, trunk and head with up, and feet with straight ahead. Up is the direction from the hips to the

@@ -4,8 +4,9 @@ The source is the figure whose motion is known; the target gets this motion. Wor
 relative to the rest poses. Limbs get the directions of the source's limbs. Trunk, head and feet turn from
 their rest pose by the same rotation as in the source, so that a flat foot stays flat even if its ankle is
 higher. The path is scaled by leg length of the target / leg length of the source.
-Two-bone inverse kinematics puts the balls of the feet where they are in the scaled source, so that feet that
-do not slide in the source do not slide in the result. Joints that follow no joint of the source (fingers,
+Two-bone inverse kinematics puts the balls of standing feet where they are in the scaled source, so that feet
+that do not slide in the source do not slide in the result. Knees of swinging legs bend as in the source. If the
+source's legs are not equally long, the pelvis is turned so that both feet stand on the same ground. Joints that follow no joint of the source (fingers,
 face, roll joints) keep their rest pose relative to the joint above.
 """
 
@@ -68,7 +69,8 @@ class Retarget:
     the middle between its two hip joints. scale: leg length of the target / leg length of the source. lifts:
     (2,) cm by which the hip joint is higher above the ball of the foot than in the scaled source, if the leg
     bends as it does there; left, then right. The hips rise by the mean. If the legs of a figure are not
-    equally long, the balls of the feet go down or up by the rest, so that no knee bends for it.
+    equally long, the balls of the feet go down or up by the rest, so that no knee bends for it. In clips,
+    `_with_level_pelvis` makes the rest small.
     """
 
     source: Skeleton = field(repr=False)

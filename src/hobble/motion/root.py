@@ -151,7 +151,4 @@ def _roots_to_broadcast(root: RootFrames, frames: Array | slice, values: Array) 
     """
     position, rotation = root.position[frames], root.rotation[frames]
     between = (1,) * (values.ndim - 2)
-    return (
-        position.reshape(len(position), *between, 2),
-        rotation.reshape(len(rotation), *between, 4),
-    )
+    return position.reshape(len(position), *between, 2), rotation.reshape(len(rotation), *between, 4)
