@@ -5,9 +5,10 @@ relative to the rest poses. Limbs get the directions of the source's limbs. Trun
 their rest pose by the same rotation as in the source, so that a flat foot stays flat even if its ankle is
 higher. The path is scaled by leg length of the target / leg length of the source.
 Two-bone inverse kinematics puts the balls of standing feet where they are in the scaled source, so that feet
-that do not slide in the source do not slide in the result. Knees of swinging legs bend as in the source. If the
-source's legs are not equally long, the pelvis is turned so that both feet stand on the same ground. Joints that follow no joint of the source (fingers,
-face, roll joints) keep their rest pose relative to the joint above.
+that do not slide in the source do not slide in the result. Knees of swinging legs bend as in the source. If
+the source's legs are not equally long, the pelvis is turned so that both feet stand on the same ground.
+Joints that follow no joint of the source (fingers, face, roll joints) keep their rest pose relative to the
+joint above.
 """
 
 from __future__ import annotations
