@@ -28,6 +28,7 @@ from hobble.measures.measure import JointOptions, MeasureInputs
 from hobble.models.load import NEEDED_ROLES, load_network
 from hobble.rows.clip_rows import ClipRows, pair_batches, save_clip_rows
 from hobble.rows.layout import RowLayout
+from tests.measures.made_up import random_rows
 
 LAYOUT = RowLayout(3, channels=(("injury", 1),))
 SKELETON = {
@@ -41,21 +42,7 @@ SKELETON = {
 
 
 def make_rows(clip: str, rows: int, fits: int, seed: int) -> ClipRows:
-    rng = np.random.default_rng(seed)
-    return ClipRows(
-        clip,
-        LAYOUT,
-        SKELETON,
-        rng.normal(size=(rows, LAYOUT.x_terrain.start)).astype(np.float32),
-        rng.normal(2, 5, (rows, LAYOUT.y_size)).astype(np.float32),
-        rng.random(rows).astype(np.float32),
-        {"injury": rng.random((rows, 1)).astype(np.float32) * 10},
-        np.arange(rows),
-        np.zeros(rows, int),
-        np.full(rows, fits),
-        rng.normal(size=(rows * fits, 36)).astype(np.float32),
-        rng.normal(size=rows * fits).astype(np.float32),
-    )
+    return random_rows(clip, LAYOUT, SKELETON, rows, fits, seed, spread=5.0)
 
 
 def make_network(

@@ -19,6 +19,7 @@ from hobble.models.network import Network
 from hobble.report.parts import Paragraph
 from hobble.rows.clip_rows import Captured
 from hobble.runtime.options import Runtime
+from tests.measures.made_up import captured_walk
 
 FRAMES = 300
 
@@ -44,15 +45,7 @@ def clip(
     channels["injury"][150:, 0] = hurt
     if mood:
         channels["mood"][:, network.channels["mood"].index(mood)] = value
-    gait = np.zeros((FRAMES, 6))
-    gait[:, 1] = 1
-    contacts = np.zeros((FRAMES, 4))
-    contacts[:, 0] = contacts[:, 3] = np.sin(2 * np.pi * np.arange(FRAMES) / 60) > 0
-    velocity = np.tile([0.0, 2.0], (FRAMES, 1))
-    root = np.zeros((FRAMES, 3))
-    root[:, 2] = 2.0 * np.arange(FRAMES)
-    still, rows = np.zeros(FRAMES), np.arange(FRAMES)
-    return Captured(name, local, contacts, still, channels, gait, velocity, root, still, rows)
+    return captured_walk(name, local, channels)
 
 
 @pytest.fixture

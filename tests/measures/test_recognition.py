@@ -23,6 +23,7 @@ from hobble.measures.walks import gait_features
 from hobble.measures.windows import Window, feature_table
 from hobble.rows.clip_rows import Captured
 from hobble.runtime.options import Runtime
+from tests.measures.made_up import captured_walk
 
 RUNTIME = Runtime(steering=1.0)
 KNEE, ARM = "LeftUpLeg-LeftLeg", "RightArm-RightForeArm"
@@ -51,16 +52,7 @@ def clip(network, name: str, link: str | None, severity: float, seed: int, frame
     severities = np.zeros((frames, len(network.channels["injury"])))
     if link:
         severities[:, network.channels["injury"].index(link)] = severity
-    gait = np.zeros((frames, 6))
-    gait[:, network.gaits.index("walk")] = 1
-    contacts = np.zeros((frames, 4))
-    contacts[:, 0] = contacts[:, 3] = np.sin(2 * np.pi * np.arange(frames) / 60) > 0
-    velocity = np.tile([0.0, 2.0], (frames, 1))
-    root = np.zeros((frames, 3))
-    root[:, 2] = 2.0 * np.arange(frames)
-    still = np.zeros(frames)
-    channels, rows = {"injury": severities}, np.arange(frames)
-    return Captured(name, local, contacts, still, channels, gait, velocity, root, still, rows)
+    return captured_walk(name, local, {"injury": severities})
 
 
 @pytest.fixture

@@ -16,6 +16,7 @@ from hobble.models.network import Network
 from hobble.rows.clip_rows import ClipRows, save_clip_rows
 from hobble.rows.layout import RowLayout
 from hobble.runtime.animation import ProceduralAnimation
+from tests.measures.made_up import random_rows
 from tests.measures.whole_roll_outs import clip_roll_outs, roll_out
 
 
@@ -85,25 +86,10 @@ LAYOUT = RowLayout(31, channels=(("injury", 30),))
 
 def clip_rows(network: Network, rows: int, seed: int, gap: int | None = None) -> ClipRows:
     """Random rows; with a `gap`, a new stretch begins there."""
-    rng = np.random.default_rng(seed)
     assert network.skeleton is not None
-    frame = np.arange(rows) + 7
-    if gap is not None:
-        frame[gap:] += 20
-    return ClipRows(
-        "a",
-        LAYOUT,
-        network.skeleton.to_dict(),
-        rng.normal(size=(rows, LAYOUT.x_terrain.start)).astype(np.float32),
-        rng.normal(0, 1, (rows, LAYOUT.y_size)).astype(np.float32),
-        rng.random(rows).astype(np.float32),
-        {"injury": rng.random((rows, 30)).astype(np.float32) * 10},
-        frame,
-        np.zeros(rows, int),
-        np.ones(rows, int),
-        rng.normal(size=(rows, 36)).astype(np.float32),
-        rng.normal(size=rows).astype(np.float32),
-    )
+    found = random_rows("a", LAYOUT, network.skeleton.to_dict(), rows, 1, seed)
+    found.frame[gap if gap is not None else rows :] += 20
+    return found
 
 
 def test_short_roll_outs_start_twice_and_long_ones_four_times_within_their_length(hurtable: Network) -> None:

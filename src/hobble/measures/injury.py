@@ -176,21 +176,22 @@ def injury_table(compared: Compared) -> Table | None:
     ]
     if not summaries:
         return None
+    columns = [f"{name}, {gait}" for name, gait, _ in summaries]
     found = {key for *_, summary in summaries for key in summary}
-    keys = [*(key for key in ROW_LABELS if key in found), *sorted(found - set(ROW_LABELS))]
-    columns = [Column("measure"), *(Column.number(f"{name}, {gait}") for name, gait, _ in summaries)]
-    rows: list[list[Any]] = [
-        [ROW_LABELS.get(key, key.replace("_", " ")), *(summary.get(key) for *_, summary in summaries)]
-        for key in keys
+    rows = [
+        {"measure": ROW_LABELS.get(key, key.replace("_", " "))}
+        | {column: summary.get(key) for column, (*_, summary) in zip(columns, summaries, strict=True)}
+        for key in [*(key for key in ROW_LABELS if key in found), *sorted(found - set(ROW_LABELS))]
     ]
     # The measurement `recognition` gives one share for each configuration. It is from walks, not from jogs.
-    recognised = {
-        e["configuration"]: e["generated"]["right"] for e in compared["recognition"] if e.get("applies")
+    shares = {
+        f"{e['configuration']}, walk": e["generated"]["right"]
+        for e in compared["recognition"]
+        if e.get("applies")
     }
-    if recognised:
-        shares = [recognised.get(name) if gait == "walk" else None for name, gait, _ in summaries]
-        rows.append(["share of walks of 1 s in which a classifier recognises what hurts", *shares])
-    return Table("compare-injury", columns, rows, "Means over the links that were hurt in training")
+    if shares:
+        rows.append({"measure": words("injury.recognised")} | {c: shares.get(c) for c in columns})
+    return table("compare-injury", rows, title=words("injury.means"))
 
 
 def with_spoken_links(found: Json, material: ReportMaterial) -> dict[str, Any]:

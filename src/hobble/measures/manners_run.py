@@ -15,7 +15,7 @@ import numpy as np
 from hobble.channels import channel
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
-from hobble.gait.recognise import Discriminant, learn
+from hobble.gait.recognise import Discriminant
 from hobble.measures.measure import MeasureInputs, Outcome, Row, SampleOptions
 from hobble.measures.sample import captured_motion, sample_to_measure, with_sample
 from hobble.measures.walks import FPS, gait_features, share_of_true
@@ -25,6 +25,8 @@ from hobble.measures.windows import (
     captured_values,
     feature_table,
     generated_values,
+    learn_windows,
+    named_left_out,
     straight_windows,
 )
 from hobble.models.load import load_network
@@ -92,24 +94,16 @@ def recognise_left_out(
     manner that only one person has is never recognised, because it cannot be learnt while this person is left
     out.
     """
-    values = feature_table([w.values for w in windows])
-    manner, person = np.array([w.label for w in windows]), np.array([people[w.clip] for w in windows])
-    results = [_recognise_with_shrinkage(values, manner, person, shrinkage) for shrinkage in shrinkages]
+    results = [_recognise_with_shrinkage(windows, people, shrinkage) for shrinkage in shrinkages]
     return max(results, key=lambda result: (result["right"] or 0.0, result["shrinkage"]))
 
 
 def _recognise_with_shrinkage(
-    values: Array, manner: np.ndarray, person: np.ndarray, shrinkage: float
+    windows: Sequence[Window], people: Mapping[str, str], shrinkage: float
 ) -> dict[str, Any]:
-    """The result for one shrinkage.
-
-    values: (n, D) features of n windows. manner, person: (n,) names of each window's manner and person.
-    """
-    named = np.full(len(manner), "", object)  # "": the other people have fewer than two manners
-    for left_out_person in np.unique(person):
-        out = person == left_out_person
-        if len(set(manner[~out])) > 1:
-            named[out] = learn(values[~out], manner[~out].tolist(), shrinkage).likeliest_classes(values[out])
+    """The result for one shrinkage."""
+    manner, person = np.array([w.label for w in windows]), np.array([people[w.clip] for w in windows])
+    named = named_left_out(windows, person.tolist(), shrinkage)
     tried = named != ""
     right, presence_right = named == manner, (named == NONE) == (manner == NONE)
     pairs = sorted(set(zip(manner.tolist(), person.tolist(), strict=True)))
@@ -178,8 +172,7 @@ def measure_channel(
         return None
     captured = recognise_left_out(windows, people)
     of_manner = {m: [w.values for w in training if w.label == m] for m in (NONE, *learnt)}
-    table = feature_table([w.values for w in training])
-    recogniser = learn(table, [w.label for w in training], captured["shrinkage"])
+    recogniser = learn_windows(training, captured["shrinkage"])
     # The target speed at pace 1, cm a frame.
     speed = float(np.median([values["speed"] for values in of_manner[NONE]] or [USUAL_SPEED])) / FPS
     # What is generated, as manners and their value: none, each at HALF, each at FULL, each pair at FULL.

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from hobble.core.skeleton import Skeleton
-from hobble.gait.recognise import Discriminant, learn
+from hobble.gait.recognise import Discriminant
 from hobble.hurt.effects import part_of_link
 from hobble.measures.measure import MeasureInputs, Outcome, Row, SampleOptions
 from hobble.measures.sample import HURT_VERSION, captured_motion, sample_to_measure, with_sample
@@ -26,6 +26,8 @@ from hobble.measures.windows import (
     captured_values,
     feature_table,
     generated_values,
+    learn_windows,
+    named_left_out,
     straight_windows,
 )
 from hobble.models.load import load_network
@@ -70,12 +72,13 @@ def measure_recognition(
     classes = sorted({w.label for w in training})
     if len(classes) < 2:
         return {**head, "applies": False, "reason": TOO_FEW}
-    classifier = _learn(training)
+    classifier = learn_windows(training)
     parts = parts_of_classes(network.skeleton)
     generated = generated_windows(network, [c for c in classes if c != HEALTHY], HEALTHY in classes, runtime)
 
     def judge(judged: Sequence[Window]) -> dict[str, Any]:
-        return count_answers(classes, judged, _answers(classifier, judged) if judged else [], parts)
+        table = feature_table([w.values for w in judged])
+        return count_answers(classes, judged, classifier.likeliest_classes(table) if judged else [], parts)
 
     return {
         **head,
@@ -139,24 +142,13 @@ def parts_of_classes(skeleton: Skeleton) -> PartsOfClass:
     return parts
 
 
-def _learn(windows: Sequence[Window]) -> Discriminant:
-    return learn(feature_table([w.values for w in windows]), [w.label for w in windows])
-
-
-def _answers(classifier: Discriminant, windows: Sequence[Window]) -> list[str]:
-    return classifier.likeliest_classes(feature_table([w.values for w in windows]))
-
-
 def _cross_validate(windows: Sequence[Window], parts: PartsOfClass) -> dict[str, Any]:
     """How windows are recognised if the classifier for each quarter learns from the other three quarters."""
-    judged: list[Window] = []
-    named: list[str] = []
-    for quarter in range(FOLDS):
-        others, of_quarter = ([w for w in windows if (w.part == quarter) is own] for own in (False, True))
-        if of_quarter and len({w.label for w in others}) > 1:
-            named += _answers(_learn(others), of_quarter)
-            judged += of_quarter
-    return count_answers(sorted({w.label for w in windows}), judged, named, parts)
+    named = named_left_out(windows, [w.part for w in windows])
+    judged = [(w, name) for w, name in zip(windows, named, strict=True) if name]
+    return count_answers(
+        sorted({w.label for w in windows}), [w for w, _ in judged], [n for _, n in judged], parts
+    )
 
 
 def _judge_walks(classifier: Discriminant, windows: Sequence[Window], parts: PartsOfClass) -> dict[str, Any]:

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
 from hobble.core.quat import Array
+from hobble.gait.recognise import SHRINKAGE, Discriminant, learn
 from hobble.measures.walks import FPS, CrowdTarget, channel_values, gait_features, generate_walks
 from hobble.models.network import Network
 from hobble.rows.clip_rows import Captured
@@ -78,3 +80,25 @@ def generated_values(
 def feature_table(values: Sequence[Values]) -> Array:
     """(n, D) values of the D features in n windows."""
     return np.array([list(of_window.values()) for of_window in values])
+
+
+def learn_windows(windows: Sequence[Window], shrinkage: float = SHRINKAGE) -> Discriminant:
+    """A recogniser of the labels of windows."""
+    return learn(feature_table([w.values for w in windows]), [w.label for w in windows], shrinkage)
+
+
+def named_left_out(
+    windows: Sequence[Window], groups: Sequence[Any], shrinkage: float = SHRINKAGE
+) -> np.ndarray:
+    """(n,) the label that a recogniser gives to each of n windows, which learnt from all other groups.
+
+    groups: of each window. "" if the other groups have fewer than two labels.
+    """
+    named, group = np.full(len(windows), "", object), np.array(groups)
+    for left_out in np.unique(group):
+        others = [w for w, own in zip(windows, group == left_out, strict=True) if not own]
+        if len({w.label for w in others}) > 1:
+            own = np.flatnonzero(group == left_out)
+            table = feature_table([windows[i].values for i in own])
+            named[own] = learn_windows(others, shrinkage).likeliest_classes(table)
+    return named
