@@ -94,7 +94,7 @@ def test_each_triangle_has_its_own_place_in_the_texture(mesh: Mesh) -> None:
     # The middle of a triangle is in no other triangle, but for some at the edges of charts.
     flat = np.abs(twice) > 1e-9
     inverse = np.linalg.inv(np.stack([b - a, c - a], axis=2)[flat])
-    away = mesh.uv.mean(axis=1)[::7, None] - a[flat]
+    away = mesh.uv.mean(axis=1)[::60, None] - a[flat]
     u, v = np.einsum("tij,ptj->ipt", inverse, away)
     assert (((u > 0) & (v > 0) & (u + v < 1)).sum(axis=1) > 1).mean() < 0.01
 
