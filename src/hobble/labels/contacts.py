@@ -9,7 +9,7 @@ import numpy as np
 from hobble.core.clip import Clip
 from hobble.core.quat import Array
 from hobble.labels.clip_labels import CONTACT_ROLES
-from hobble.labels.footfall import foot_positions, relative_speeds, swing_peaks
+from hobble.labels.footfall import foot_positions, foot_speeds, relative_speeds, swing_peaks
 from hobble.labels.options import LabelOptions
 
 FEET = ((0, 1), (2, 3))  # heel and toe of the left and of the right foot, in the order of CONTACT_ROLES
@@ -133,8 +133,5 @@ def _centred_speeds(clip: Clip) -> Array:
     It is the mean of the speeds before and after a frame. A speed from one side only would shift all stances
     by half a frame.
     """
-    feet = foot_positions(clip)
-    if len(feet) < 2:
-        return np.zeros(feet.shape[:2])
-    steps = np.linalg.norm(np.diff(feet, axis=0), axis=-1)
-    return 0.5 * (np.concatenate([steps[:1], steps]) + np.concatenate([steps, steps[-1:]]))
+    after = foot_speeds(clip)
+    return 0.5 * (np.concatenate([after[:1], after[:-1]]) + after)
