@@ -230,6 +230,29 @@ def test_the_released_network_keeps_its_feet_on_the_ground_of_hills(shared: Path
     assert foot_slide(np.array(toes), np.array(contacts)).mean() < 2
 
 
+@pytest.mark.shared
+@pytest.mark.parametrize(("rise", "tread"), [(15.0, 40.0), (10.0, 30.0)])
+def test_the_released_network_keeps_its_feet_out_of_steps(
+    shared: Path, holden31, rise: float, tread: float
+) -> None:
+    """Eight steps up, a landing, eight down: no heel or toe is more than 1 cm inside a step."""
+    network = load_network(shared / "reference" / "pfnn_release_network.npz", holden31)
+    character = ProceduralAnimation(network)
+    legs, _, soles, *_ = character._controller._legs
+
+    def stairs(x: np.ndarray, z: np.ndarray) -> np.ndarray:
+        up, down = (np.clip(np.floor((z - start) / tread) + 1, 0, 8) for start in (300, 600 + 8 * tread))
+        return rise * (up - down)
+
+    depths = []
+    for _ in range(900):
+        pose = character.next_pose((0, 2.2), gait="walk", terrain=stairs)
+        feet = pose.positions[legs[:, 2:]].reshape(4, 3)
+        depths.append(stairs(feet[:, 0], feet[:, 2]) + np.tile(soles, 2) - feet[:, 1])
+    assert pose.root[2] > 600 + 16 * tread
+    assert np.mean(np.max(depths, axis=1) > 1) < 0.01
+
+
 def test_a_character_starts_on_the_ground_at_any_height(steady) -> None:
     low, high = ProceduralAnimation(steady), ProceduralAnimation(steady)
     for _ in range(3):

@@ -353,7 +353,12 @@ class Controller:
             self.bounds.fastest, self.drawn,
         )  # fmt: skip
         if ground is not None:
-            at = np.ascontiguousarray(self.pose_position[:, self._ground_joints]).reshape(-1, 3)
+            at = self.pose_position[:, self._ground_joints]
+            # A held foot is not where the network predicts it, but where it is held.
+            toes = at[:, [1, 3]][..., ::2]
+            away = c.foot_lock[..., None] * (c.foot_hold - toes)
+            at[:, :4, ::2] += np.repeat(away, 2, axis=1)
+            at = at.reshape(-1, 3)
             self._ground_heights[:] = _heights(ground, at[:, 0], at[:, 2]).reshape(self._ground_heights.shape)
         else:
             self._ground_heights[:] = 0.0

@@ -131,7 +131,7 @@ def note_missed(c: int, f: int, x: float, z: float, state: Hold) -> None:
 # placement raises one foot. The body lift is how far it raises the whole body.
 
 
-HEIGHT_MIX = 0.5  # each frame changes the foot lift by this share of the change that is still missing
+HEIGHT_MIX = 0.5  # a foot comes down by this share of the way that is left, each frame; up it goes at once
 # Largest change of the foot lift, cm a frame. It is needed because a network may predict contact while the
 # foot is at knee height.
 FASTEST_LIFT = 8.0
@@ -143,7 +143,7 @@ STRETCH = 0.99
 # The rule of STRETCH applies in full if the toe is at least this many cm behind the hip. A foot ahead of the
 # hip stays flat.
 BEHIND = 10.0
-BODY_MIX = 0.15  # the same share as HEIGHT_MIX, for the body lift
+BODY_MIX = 0.15  # a share of the way that is left, each frame, for the body lift, up and down
 BODY_FREE = 3.0  # cm that standing feet may be off the ground before the body is raised or lowered
 BODY_MIN_CONTACT = 0.3  # if the contacts of both feet sum to less, the feet do not decide the body's height
 SOLE = (5.0, 4.0)  # height of heel and toe joint above the ground in a standing foot, cm
@@ -367,7 +367,9 @@ def place_feet(
             rise = max(depth, 0.0)
             if step[c, f] == 0.0:
                 rise += lock[c, f] * min(depth + FLOATING, 0.0)
-            change = HEIGHT_MIX * (rise - lift[c, f])
+            change = rise - lift[c, f]
+            if change < 0.0:
+                change *= HEIGHT_MIX
             lift[c, f] += min(max(change, -FASTEST_LIFT), FASTEST_LIFT)
             shift[1] = lift[c, f]
             if step[c, f] > 0.0:

@@ -1712,7 +1712,9 @@ static void place_foot(const model *m, character *c, int f, float *contacts, con
     hold_foot(m, c, f, contacts[2 * f + 1], horizontal);
     double depth = sole_depth(m, c, f, ground + 2 * f), rise = larger(depth, 0), done = c->foot_step[f];
     if (done == 0) rise += c->foot_lock[f] * smaller(depth + FLOATING, 0);
-    c->foot_lift[f] += clamp(HEIGHT_MIX * (rise - c->foot_lift[f]), -FASTEST_LIFT, FASTEST_LIFT);
+    double change = rise - c->foot_lift[f];
+    if (change < 0) change *= HEIGHT_MIX;
+    c->foot_lift[f] += clamp(change, -FASTEST_LIFT, FASTEST_LIFT);
     shift[0] = horizontal[0];
     shift[1] = c->foot_lift[f];
     shift[2] = horizontal[1];
@@ -1874,6 +1876,11 @@ static int place(hobble *h, const hobble_ground *ground) {
         for (int k = 0; k < 5; k++) {
             h->points[10 * i + 2 * k] = c->pose_position[under[k]][0];
             h->points[10 * i + 2 * k + 1] = c->pose_position[under[k]][2];
+        }
+        for (int k = 0; k < 4; k++) { /* a held foot is where it is held, not where the network predicts it */
+            const double *toe = c->pose_position[under[k | 1]];
+            h->points[10 * i + 2 * k] += c->foot_lock[k / 2] * (c->foot_hold[k / 2][0] - toe[0]);
+            h->points[10 * i + 2 * k + 1] += c->foot_lock[k / 2] * (c->foot_hold[k / 2][1] - toe[2]);
         }
     }
     int error = look_up(h, ground, 5 * h->characters);
