@@ -37,7 +37,7 @@ class LearnedOptions(MatchingOptions):
     )
     decompressor_units: Units = Field(512, description="units of the decompressor's hidden layer")
     units: Units = Field(256, description="units of the hidden layers of stepper and projector")
-    steps: Positive = Field(2000, description="optimiser steps of each of the three trainings")
+    steps: Positive = Field(1500, description="optimiser steps of each of the three trainings")
     seed: int = Field(1, description="seed of the first weights and of the order of the frames")
 
     @classmethod
