@@ -85,7 +85,7 @@ def test_every_command_of_hobble_runs(
             asked = [*program(words).split()[1:], *words[3 if words[0] == "python" else 1 :]]
             assert main(asked) == 0, words
             ran += 1
-    assert ran >= 5
+    assert ran >= 4
 
 
 @pytest.mark.workflow
