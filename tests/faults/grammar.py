@@ -187,7 +187,7 @@ BVH: dict[str, Mutation] = _numbers(
         "braces on the joints' lines": (_all(lambda t: re.sub(r"\n\s*\{", " {", t)), "same"),
         "rows over two lines": (_rows(lambda rows: "\n".join(r.replace(" ", "\n", 1) for r in rows)), "same"),
         "an empty row": (_row(lambda s: "\n" + s), "same"),
-        "all rows in one line": (_rows(" ".join), "refused"),
+        "all rows in one line": (_rows(" ".join), "same"),
         "most rows lost": (_rows(lambda rows: "\n".join(rows[:9])), "refused"),
         "the last line cut": (_all(lambda t: t.rstrip("\n").rsplit(" ", 3)[0]), "refused"),
         "cut anywhere": (lambda r, t: t[: r.randrange(len(t) * 9 // 10)], "refused"),
