@@ -176,8 +176,8 @@ def test_two_figures_get_the_same_targets(tab: Any) -> None:
     tab.send("Input.dispatchKeyEvent", type="keyDown", key="w", code="KeyW", text="w")
     where = "Hobble.player.actors.map(({ character: { root: [x, , z] } }) => [x, z])"
     before = np.array(tab.run(where))
-    assert tab.until("Math.hypot(...Hobble.player.target.velocity) > 2")
-    tab.run("new Promise((done) => setTimeout(done, 1500))")
+    assert tab.until("Math.hypot(...(Hobble.player.target?.velocity ?? [0])) > 2")
+    assert tab.until("Hobble.player.actors.every(({ frames }) => frames.length > 60)", 60)
     first, second = np.array(tab.run(where)) - before
     tab.send("Input.dispatchKeyEvent", type="keyUp", key="w", code="KeyW")
     assert first[0] * second[0] + first[1] * second[1] > 0
