@@ -22,6 +22,7 @@ STEP_SECONDS, SAMPLE_SECONDS = 1.07e-9, 7.6e-12
 SLOWEST = 11.0
 FAST = "fast"  # the configuration with the recipe that is named if it is much faster
 LONG_SECONDS = 300.0  # for a training that takes longer than this
+SHORT_SECONDS = 10.0  # a shorter training is mostly start, checks and saving: it tells nothing of the machine
 
 
 def sentences_about_plan(project: Project, jobs: Sequence[tuple[str, Mapping[str, str]]]) -> list[str]:
@@ -66,6 +67,8 @@ def slowness(demands: Demands) -> float | None:
             training = demands.project.catalogue.configuration(name).training.model_dump()
             expected = expected_seconds(demands, name, training)
             samples = demands.training_samples(name, training["passes"])
+            if expected < SHORT_SECONDS:
+                continue
             ratios.append(float(last["seconds"]) / float(last["samples"]) * samples / expected)
     return median(ratios) if ratios else None
 
