@@ -16,6 +16,7 @@ from hypothesis import HealthCheck, settings
 from hobble.core.skeleton import Skeleton
 
 ROOT = Path(__file__).resolve().parents[1]
+collect_ignore = ["engine/bake_in_blender.py"]  # it runs in Blender
 
 # A busy machine is no fault of the code: in a fresh clone the first text drawn takes seconds.
 settings.register_profile("hobble", deadline=None, suppress_health_check=[HealthCheck.too_slow])

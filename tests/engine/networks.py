@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -76,6 +76,13 @@ def network_of(kind: str, skeleton: Skeleton, folder: Path) -> Network:
         _, _, tables = built(skeleton, folder)
         named = {field.name: getattr(tables, field.name) for field in fields(Matching)}
         return Matching(**named | {"skeleton": skeleton})
+    if kind == "learned":
+        sizes_of = {"steps": 60, "units": 48, "decompressor_units": 64, "latent": 6}
+        made = built(skeleton, folder, kind, **sizes_of)[2]
+        # The made-up motion has nothing to do with the wishes, so a rounding error would grow from search to
+        # search. A projector with a tenth of the weights lets it fade.
+        weights, biases = made.projector
+        return replace(made, skeleton=skeleton, projector=(tuple(0.1 * w for w in weights), biases))
     if kind == "plain":
         weights, biases = layers(rng, 1, (sizes[0] + 2, *sizes[1:]))
         return Plain(weights=weights, biases=biases, **given)

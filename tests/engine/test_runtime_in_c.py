@@ -32,7 +32,7 @@ from tests.engine.networks import network_of
 
 WARNINGS = ("-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic")
 RUNTIME_C = SOURCES / "hobble.c"
-KINDS = ("pfnn", "plain", "mann", "matching")
+KINDS = ("pfnn", "plain", "mann", "matching", "learned")
 
 
 @pytest.fixture(scope="module")
@@ -74,6 +74,8 @@ def start(
         ("mann", "cubic", "int16", {}),
         ("matching", "cubic", "float32", {}),
         ("matching", "cubic", "int16", {"steering": 0.0}),
+        ("learned", "cubic", "float32", {}),
+        ("learned", "cubic", "int16", {"steering": 0.0}),
     ],
 )
 def test_c_moves_a_character_as_python_does(
@@ -200,7 +202,7 @@ def test_damaged_files_are_refused_with_a_reason(
 
     assert "shorter" in reason(whole[:63])
     assert "does not begin" in reason(b"HOBBLE\n\n" + whole[8:])
-    assert "another version" in reason(whole[:8] + b"\2" + whole[9:])
+    assert "another version" in reason(whole[:8] + bytes([whole[8] + 1]) + whole[9:])
     assert "another size" in reason(whole[:-1])
     assert "damaged" in reason(whole[:5000] + bytes([whole[5000] ^ 1]) + whole[5001:])
     changed = bytearray(whole)

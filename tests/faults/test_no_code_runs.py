@@ -71,7 +71,6 @@ CALLS = {
     "yaml.unsafe_load",
     "yaml.full_load",
     "torch.load",
-    "np.fromstring",
 }
 
 

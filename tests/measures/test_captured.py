@@ -12,6 +12,10 @@ from hobble.rows.layout import GAITS, RowLayout
 
 LAYOUT = RowLayout(3, channels=(("injury", 2),))
 FRAMES = 50
+JOINTS = {
+    name: {"parent": parent, "offset": [0, 9, 0]} for name, parent in zip("abc", (None, *"ab"), strict=True)
+}
+SKELETON = {"name": "rods", "joints": JOINTS, "roles": {}}
 
 
 @pytest.fixture
@@ -51,7 +55,9 @@ def rows(world) -> ClipRows:
     heights, mean = np.zeros((2 * FRAMES, 36)), np.tile([-3.0, 99.0], FRAMES)
     fits = np.full(FRAMES, 2)
     phase = np.linspace(0, 0.9, FRAMES)
-    return ClipRows("a", LAYOUT, {}, x, y, phase, {"injury": severity}, frame, 0 * frame, fits, heights, mean)
+    return ClipRows(
+        "a", LAYOUT, SKELETON, x, y, phase, {"injury": severity}, frame, 0 * frame, fits, heights, mean
+    )
 
 
 def test_captured_motion_is_recovered_from_its_rows(rows, world) -> None:

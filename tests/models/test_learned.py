@@ -9,12 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from hobble.core.errors import HobbleError
 from hobble.core.skeleton import Skeleton
 from hobble.models.learned.network import SINCE, Learned
 from hobble.models.matching.network import Matching
 from hobble.models.network import standardise_inputs
-from hobble.runtime.options import Runtime
 
 from .matching.example import built
 
@@ -95,10 +93,3 @@ def test_the_same_seed_gives_the_same_bits(holden31: Skeleton, tmp_path: Path) -
     )
     assert all(np.array_equal(one[name], again[name]) for name in one)
     assert not np.array_equal(one["D0"], other["D0"])
-
-
-def test_the_runtime_in_c_refuses_it(made: Made) -> None:
-    from hobble.engine.hob import character_bytes
-
-    with pytest.raises(HobbleError, match="matching"):
-        character_bytes(made[1], Runtime())

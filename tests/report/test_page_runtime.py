@@ -80,12 +80,13 @@ def test_the_figures_at_the_top_walk_in_step_as_the_python_runtime_does(
     """They have walked before they are seen. One is hurt, and the other has walked on until it is in step."""
     (one,) = [c for c in character["channels"] if c["name"] == "injury"]
     column = one["columns"][one["sliders"][hero["part"]]]
+    walked = "[Hobble.hero.main, Hobble.hero.beside].every(({ frames }) => frames.length >= %d)"
+    assert tab.until(walked % OPENING_FRAMES)
     frames, phases, seen = tab.run("""(() => {
       const actors = [Hobble.hero.main, Hobble.hero.beside], of = (read) => actors.map(read);
       return [of(({ frames }) => frames.length), of(({ character }) => character.phase),
         of(({ character }) => Array.from(character.positions))];
     })()""")
-    assert min(frames) >= OPENING_FRAMES
     assert abs((phases[1] - phases[0] + 0.5) % 1 - 0.5) < 0.15
     for places, values, count in zip(seen, ({column: 7.0}, {}), frames, strict=True):
         animation = ProceduralAnimation(network, storage="int16", **dict(examples.RUNTIME))

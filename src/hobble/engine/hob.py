@@ -30,7 +30,7 @@ from hobble.runtime.controller import FPS
 from hobble.runtime.feet import foot_parts, leg_joints, rest_facing, sole_heights
 from hobble.runtime.options import Runtime
 
-MAGIC, VERSION, ORDER_MARK = b"HOBBLE\r\n", 1, 0x01020304
+MAGIC, VERSION, ORDER_MARK = b"HOBBLE\r\n", 2, 0x01020304
 HEADER, ENTRY, ALIGNMENT = 64, 40, 64
 TYPES = {"int32": 1, "float32": 2, "float64": 3, "int16": 4, "uint8": 5}
 # Standardised inputs are multiplied by 1 / standard deviation. With a smaller factor an input has no effect,
@@ -100,7 +100,7 @@ def coarsened(file: bytes) -> bytes:
 SIZES = (
     *("joints", "window", "step", "columns", "channels", "x_size", "y_size", "inputs", "hips"),
     *("form", "storage", "extra", "layers", "sets", "blended", "gate_layers", "gate_inputs"),
-    *("rows", "features", "every"),
+    *("rows", "features", "every", "latent", "stepper_layers", "projector_layers"),
 )
 
 

@@ -27,7 +27,7 @@ STORAGES = ("float32", "int16")  # types in which a predictor can keep its weigh
 
 # Where the runtime in C gets a prediction from: sets of weights blended around the phase, one set of weights,
 # sets that a gate blends, or recorded frames.
-PHASED, FIXED, GATED, RECORDED = range(4)
+PHASED, FIXED, GATED, RECORDED, LEARNED = range(5)
 
 Export = Callable[[Path, str], str]  # see `Network.exports`
 
@@ -179,8 +179,6 @@ class Network(ABC):
     # runtime shortens the predicted movement of the root where the character should stand or go another way.
     # With recorded frames it does not, because the feet would slide.
     plays_recorded_poses: ClassVar[bool] = False
-    # Whether the runtime in C, and with it the page, can run the network.
-    runs_in_c: ClassVar[bool] = True
     # Names of the ways to evaluate the network, such as constant, linear and cubic interpolation over the
     # phase. The last one is exact.
     modes: ClassVar[tuple[str, ...]] = ("exact",)
@@ -282,9 +280,10 @@ class Network(ABC):
         mode: one of `modes`. storage: one of STORAGES. inputs: the columns of X to read; others have no
         effect.
 
-        The entries are form (PHASED, FIXED, GATED or RECORDED), layers, sets, and extra, which is 2 if the
-        first layer gets sine and cosine of the phase after X; for PHASED blended, how many sets are blended;
-        for GATED gate_layers and gate_inputs; for RECORDED only form, rows, features and every.
+        The entries are form (PHASED, FIXED, GATED, RECORDED or LEARNED), layers, sets, and extra, which is 2
+        if the first layer gets sine and cosine of the phase after X; for PHASED blended, how many sets blend;
+        for GATED gate_layers and gate_inputs; for RECORDED only form, rows, features and every; for LEARNED
+        features, every, latent, stepper_layers and projector_layers.
         `Stack.sections` makes the sections of layers.
         """
 

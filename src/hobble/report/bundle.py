@@ -117,9 +117,8 @@ def export_web(
     folder, modules = Path(folder), Path(modules).resolve()
     folder.mkdir(parents=True, exist_ok=True)
     write_json(folder / "package.json", PACKAGE)
-    if not (spec := playable_data(network, runtime)):
-        raise HobbleError(f"a page cannot run networks of kind {network.kind} yet")
-    write_json(folder / "character.json", {"spec": spec, "body": packed_body(network.skeleton)})
+    content = {"spec": playable_data(network, runtime), "body": packed_body(network.skeleton)}
+    write_json(folder / "character.json", content)
     _bundle(modules, folder / "hobble.js", WEB / "module.js", "esm", engine=wasm)
     for name in ("hobble.d.ts", "example.js"):
         with atomic_path(folder / name) as temporary:

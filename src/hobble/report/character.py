@@ -40,14 +40,14 @@ def walk_straight(
 
 
 def playable_data(network: Network, runtime: Runtime) -> dict[str, Any]:
-    """The data of a character in the page; {} if the network has no skeleton or the page cannot run it.
+    """The data of a character in the page; {} if the network has no skeleton.
 
     file: the character file that the runtime in C reads (`hobble.engine.hob`), in base64. Its weights are
     int16, and in each frame they are computed exactly from the phase, whatever mode `runtime` has. Other
     entries say what the page draws and shows. side: cm from the path to the ground heights beside it.
     """
     skeleton = network.skeleton
-    if skeleton is None or not network.runs_in_c:
+    if skeleton is None:
         return {}
     exact = runtime.model_copy(update={"mode": None})
     file = character_bytes(network.copy_for_page(), exact, "int16")

@@ -123,13 +123,17 @@ enum {
     ROWS,
     FEATURES,
     EVERY,
+    LATENT,
+    STEPPER_LAYERS,
+    PROJECTOR_LAYERS,
     SIZES
 };
 /* The values of the section "numbers". */
 enum { SIDE, STEERING, LOCKING, FASTEST, HIPS_LOW, HIPS_HIGH, START_PHASE, HALFLIFE, NUMBERS };
 /* Where a prediction comes from. PHASED: sets of weights, of which those around the phase are blended. FIXED:
-   one set. GATED: sets that a second network, the gate, blends. RECORDED: frames of clips, see part 4. */
-enum { PHASED, FIXED, GATED, RECORDED, FORMS };
+   one set. GATED: sets that a second network, the gate, blends. RECORDED: frames of clips. LEARNED: three
+   networks that stand for such frames. See part 4. */
+enum { PHASED, FIXED, GATED, RECORDED, LEARNED, FORMS };
 enum { FLOAT32, INT16 }; /* how weights and frames are stored */
 /* Blocks of X whose first columns are in the section "x_first". */
 enum { X_POSITION, X_DIRECTION, X_GAIT, X_JOINTS, X_VELOCITIES, X_TERRAIN, X_BLOCKS };
@@ -175,6 +179,10 @@ typedef struct { /* a character file, read only */
     const float *frame_scale, *features, *feature_weights, *phases;
     const int32_t *feature_columns, *remaining;
     const uint8_t *findable; /* whether a search may find a frame */
+    /* Learned motion matching; `network` is the decompressor. Mean, standard deviation, its inverse and range
+       of the weighted features. */
+    stack stepper, projector;
+    const float *feature_mean, *feature_std, *feature_inverse, *feature_low, *feature_high;
 } model;
 
 typedef struct {
@@ -342,7 +350,8 @@ static void read_sizes(reader *r, model *m) {
     static const int high[SIZES] = {MOST_JOINTS, MOST_WINDOW, MOST_WINDOW, MOST_COLUMNS,    MOST_CHANNELS,
                                     MOST_UNITS,  MOST_UNITS,  MOST_UNITS,  MOST_JOINTS - 1, FORMS - 1,
                                     INT16,       2,           MOST_LAYERS, MOST_SETS,       4,
-                                    MOST_LAYERS, MOST_UNITS,  MOST_ROWS,   MOST_UNITS,      1000000};
+                                    MOST_LAYERS, MOST_UNITS,  MOST_ROWS,   MOST_UNITS,      1000000,
+                                    MOST_UNITS,  MOST_LAYERS, MOST_LAYERS};
     const int32_t *sizes = section(r, "sizes", I32, SIZES);
     const double *numbers = section(r, "numbers", F64, NUMBERS);
     if (!sizes || !numbers) return;
@@ -370,6 +379,11 @@ static void read_sizes(reader *r, model *m) {
     require(r, form == RECORDED || m->size[SETS] >= (form == PHASED ? m->size[BLENDED] : 1), "sizes");
     require(r, (form != FIXED || m->size[SETS] == 1) && m->size[EXTRA] != 1, "sizes");
     require(r, form != GATED || (m->size[GATE_LAYERS] > 0 && m->size[GATE_INPUTS] > 0), "sizes");
+    require(r,
+            form != LEARNED
+                || (m->size[SETS] == 1 && m->size[EXTRA] == 0 && m->size[EVERY] > 0 && m->size[FEATURES] > 0
+                    && m->size[STEPPER_LAYERS] > 0 && m->size[PROJECTOR_LAYERS] > 0),
+            "sizes");
     const double *n = m->number;
     require(r, n[SIDE] >= 0 && n[SIDE] <= 1e4 && n[STEERING] >= 0 && n[STEERING] <= 1e6, "numbers");
     require(r, (n[LOCKING] == 0 || n[LOCKING] == 1) && n[FASTEST] > 0 && n[FASTEST] <= LARGEST_SOUND,
@@ -473,6 +487,32 @@ static void read_matching(reader *r, model *m) {
     require(r, findable, "findable");
 }
 
+static void read_learned(reader *r, model *m) {
+    static const char *const names[3][3] = {{"plan", "weights", "layers"},
+                                            {"step_plan", "step_weights", "step_layers"},
+                                            {"search_plan", "search_weights", "search_layers"}};
+    int features = m->size[FEATURES], state = features + m->size[LATENT];
+    stack *const stacks[3] = {&m->network, &m->stepper, &m->projector};
+    const int layers[3] = {m->size[LAYERS], m->size[STEPPER_LAYERS], m->size[PROJECTOR_LAYERS]};
+    const int inputs[3] = {state, state, features};
+    /* The decompressor also gives sine and cosine of the frame's phase. */
+    const int outputs[3] = {m->size[Y_SIZE] + 2, state, state};
+    uint64_t count = (uint64_t)features;
+    for (int i = 0; i < 3; i++) {
+        stacks[i]->layers = layers[i];
+        stacks[i]->sets = 1;
+        stacks[i]->storage = m->size[STORAGE];
+        read_stack(r, stacks[i], names[i], inputs[i], outputs[i]);
+    }
+    m->feature_columns = indices(r, "feature_columns", count, 0, m->size[X_SIZE] - 1);
+    m->feature_weights = floats(r, "feature_weights", count, 1e9f);
+    m->feature_mean = floats(r, "feature_mean", count, 1e15f);
+    m->feature_std = floats(r, "feature_std", count, 1e15f);
+    m->feature_inverse = floats(r, "feature_inverse", count, 1e31f);
+    m->feature_low = floats(r, "feature_low", count, 1e15f);
+    m->feature_high = floats(r, "feature_high", count, 1e15f);
+}
+
 static int name_count(const model *m) {
     return m->size[JOINTS] + GAITS + m->size[CHANNELS] + 2 * m->size[COLUMNS];
 }
@@ -514,6 +554,10 @@ static int read_model(const void *file, size_t bytes, model *m, char *why) {
     if (r.failed) return 0;
     if (m->size[FORM] == RECORDED) {
         read_matching(&r, m);
+        return !r.failed;
+    }
+    if (m->size[FORM] == LEARNED) {
+        read_learned(&r, m);
         return !r.failed;
     }
     m->network.layers = m->size[LAYERS];
@@ -564,6 +608,7 @@ struct hobble {
     double *powers, powers_strafe;         /* see blend_future */
     float *query, *block_low, *block_high; /* motion matching: see nearest_row */
     double *rows_old;                      /* four unpacked rows */
+    float *states;                         /* learned motion matching: see predict_learned */
 };
 
 /* ---- 3. Networks -----------------------------------------------------------------------------------------
@@ -848,7 +893,7 @@ static void predict_blend(hobble *h) {
 
    Plays recorded frames; a search every few frames chooses where to go on. At a transition, the differences
    in pose and velocity become offsets, which decay like a critically damped spring.
-   models/matching/network.py explains it. */
+   models/matching/network.py explains it. Learned motion matching has networks in the place of frames. */
 
 /* Unpacks a recorded frame into y. */
 static void read_frame(const model *m, int64_t row, double *y) {
@@ -955,18 +1000,9 @@ static void vector_between(const double *earlier, const double *now, double *v) 
     vector_of_product(q, p, v);
 }
 
-/* Adds to the offsets the difference between two poses: the one that would have come next, minus that of
-   `row`. If the run has ended, the last pose shown takes the place of the next one. */
-static void start_transition(hobble *h, double *offsets, int64_t before, int64_t following, int64_t row) {
-    const model *m = &h->model;
+/* Adds the pose `old` minus the pose `now`, rows of Y, to the offsets of positions, velocities, rotations. */
+static void add_difference(const model *m, double *offsets, const double *old, const double *now) {
     int joints = m->size[JOINTS];
-    size_t width = (size_t)m->size[Y_SIZE];
-    double *old = h->rows_old, *now = old + width, *before_old = now + width,
-           *before_now = before_old + width;
-    read_frame(m, following >= 0 ? following : before, old);
-    read_frame(m, row, now);
-    read_frame(m, before, before_old);
-    read_frame(m, row > 0 ? row - 1 : 0, before_now);
     for (int j = 0; j < joints; j++) {
         double *offset = offsets + OFFSETS_PER_JOINT * j, turn[3], q[4], p[4];
         int position = m->y_joints + 3 * j, velocity = position + 3 * joints,
@@ -979,12 +1015,38 @@ static void start_transition(hobble *h, double *offsets, int64_t before, int64_t
         quaternion_of(offset + 6, p);
         quaternion_of(turn, q);
         vector_of_product(p, q, offset + 6);
-        if (following < 0) continue;
-        vector_between(before_old + rotation, old + rotation, turn);
-        for (int i = 0; i < 3; i++) offset[9 + i] += turn[i];
-        vector_between(before_now + rotation, now + rotation, turn);
-        for (int i = 0; i < 3; i++) offset[9 + i] -= turn[i];
     }
+}
+
+/* Adds to the offsets the difference between two poses: the one that would have come next, minus that of
+   `row`. If the run has ended, the last pose shown takes the place of the next one. */
+static void start_transition(hobble *h, double *offsets, int64_t before, int64_t following, int64_t row) {
+    const model *m = &h->model;
+    int joints = m->size[JOINTS];
+    size_t width = (size_t)m->size[Y_SIZE];
+    double *old = h->rows_old, *now = old + width, *before_old = now + width,
+           *before_now = before_old + width;
+    read_frame(m, following >= 0 ? following : before, old);
+    read_frame(m, row, now);
+    add_difference(m, offsets, old, now);
+    if (following < 0) return;
+    read_frame(m, before, before_old);
+    read_frame(m, row > 0 ? row - 1 : 0, before_now);
+    for (int j = 0; j < joints; j++) {
+        double *speed = offsets + OFFSETS_PER_JOINT * j + 9, turn[3];
+        int rotation = m->y_joints + 6 * joints + 3 * j;
+        vector_between(before_old + rotation, old + rotation, turn);
+        for (int i = 0; i < 3; i++) speed[i] += turn[i];
+        vector_between(before_now + rotation, now + rotation, turn);
+        for (int i = 0; i < 3; i++) speed[i] -= turn[i];
+    }
+}
+
+/* What to add to the change of a phase so that it approaches the phase `wanted`. */
+static float pull(double wanted, double phase) {
+    double lag = wanted - phase;
+    lag -= floor(lag + 0.5); /* at most half a cycle, forwards or backwards */
+    return (float)clamp(lag, -FASTEST_PULL, FASTEST_PULL);
 }
 
 /* Advances the offsets by a frame and adds them to the pose in y (Y). */
@@ -1030,13 +1092,98 @@ static void predict_matching(hobble *h) {
         read_frame(m, row, unpacked);
         for (int i = 0; i < m->size[Y_SIZE]; i++) y[i] = (float)unpacked[i];
         if (before >= 0) {
-            double lag = m->phases[row] - h->state[c].phase;
             add_offsets(m, memory + OFFSETS, y);
-            lag -= floor(lag + 0.5); /* at most half a cycle, forwards or backwards */
-            y[3] += (float)clamp(lag, -FASTEST_PULL, FASTEST_PULL);
+            y[3] += pull(m->phases[row], h->state[c].phase);
         }
         memory[ROW] = (double)(row + 1);
         memory[SINCE] = due ? 0 : memory[SINCE] + 1;
+    }
+}
+
+/* Writes the features (FEATURES) that the input row x wishes for, standardised. */
+static void write_wish(const model *m, const float *x, float *wish) {
+    for (int i = 0; i < m->size[FEATURES]; i++) {
+        float value = x[m->feature_columns[i]] * m->feature_weights[i];
+        value = value > m->feature_low[i] ? value : m->feature_low[i];
+        value = value < m->feature_high[i] ? value : m->feature_high[i];
+        wish[i] = (value - m->feature_mean[i]) * m->feature_inverse[i];
+    }
+}
+
+/* The squared distance of a state's features from the wish. */
+static float wish_distance(const model *m, const float *wish, const float *state) {
+    float sum = 0;
+    for (int i = 0; i < m->size[FEATURES]; i++) {
+        float difference = (wish[i] - state[i]) * m->feature_std[i];
+        sum += difference * difference;
+    }
+    return sum;
+}
+
+/* Where a search is due, finds the state for the wish and goes on from there if it is nearer. h->states has
+   the states of all characters, the states found, and the wishes. Marks a jump with JUMPING. Returns whether
+   any character jumps. */
+enum { NEW, SHOWN, JUMPING }; /* values of memory[ROW] in learned motion matching */
+static int search_states(hobble *h, float *states, float *found, float *wishes) {
+    const model *m = &h->model;
+    size_t n = (size_t)m->size[FEATURES], size = n + (size_t)m->size[LATENT], x_size = (size_t)m->size[X_SIZE];
+    int jumps = 0, due = 0;
+    for (int c = 0; c < h->characters; c++) due |= h->state[c].memory[SINCE] == 0;
+    if (!due) return 0;
+    for (size_t c = 0; c < (size_t)h->characters; c++) write_wish(m, h->x + c * x_size, wishes + c * n);
+    run_stack(h, &m->projector, h->shares, wishes, found);
+    for (size_t c = 0; c < (size_t)h->characters; c++) {
+        double *memory = h->state[c].memory;
+        const float *wish = wishes + c * n;
+        float *state = states + c * size;
+        if (memory[SINCE] != 0) continue;
+        if (memory[ROW] == SHOWN) {
+            if (!(wish_distance(m, wish, found + c * size) < wish_distance(m, wish, state))) continue;
+            memory[ROW] = JUMPING;
+            jumps = 1;
+        }
+        memcpy(state, found + c * size, size * sizeof *state);
+    }
+    return jumps;
+}
+
+/* Writes Y of all characters by learned motion matching, and updates their memories: ROW, SINCE, the state,
+   which is features and latent numbers, and the offsets. models/learned/network.py explains it. */
+static void predict_learned(hobble *h) {
+    const model *m = &h->model;
+    size_t count = (size_t)h->characters, n = (size_t)m->size[FEATURES], size = n + (size_t)m->size[LATENT],
+           width = (size_t)m->size[Y_SIZE], shown_width = width + 2;
+    float *states = h->states, *following = states + count * size, *found = following + count * size,
+          *wishes = found + count * size, *shown = wishes + count * n, *expected = shown + count * shown_width;
+    for (size_t c = 0; c < count; c++) {
+        double *memory = h->state[c].memory;
+        int due = memory[ROW] != SHOWN || !(memory[SINCE] + 1 < m->size[EVERY]);
+        if (memory[ROW] != SHOWN) memset(memory, 0, (size_t)h->memory_size * sizeof *memory);
+        memory[SINCE] = due ? 0 : memory[SINCE] + 1;
+        h->shares[c] = 1;
+        for (size_t i = 0; i < size; i++) states[c * size + i] = (float)memory[OFFSETS + i];
+    }
+    run_stack(h, &m->stepper, h->shares, states, found);
+    for (size_t i = 0; i < count * size; i++) following[i] = states[i] += found[i];
+    int jumps = search_states(h, states, found, wishes);
+    run_stack(h, &m->network, h->shares, states, shown);
+    if (jumps) run_stack(h, &m->network, h->shares, following, expected);
+    for (size_t c = 0; c < count; c++) {
+        double *memory = h->state[c].memory, *offsets = memory + OFFSETS + size, *old = h->rows_old,
+               *now = old + width;
+        const float *pose = shown + c * shown_width;
+        float *y = h->y + c * width;
+        for (size_t i = 0; i < width; i++) {
+            y[i] = pose[i];
+            now[i] = pose[i];
+            old[i] = expected[c * shown_width + i];
+        }
+        if (memory[ROW] == JUMPING) add_difference(m, offsets, old, now);
+        add_offsets(m, offsets, y);
+        if (memory[ROW] != NEW)
+            y[3] += pull(atan2(pose[width], pose[width + 1]) / (2 * PI), h->state[c].phase);
+        for (size_t i = 0; i < size; i++) memory[OFFSETS + i] = states[c * size + i];
+        memory[ROW] = SHOWN;
     }
 }
 
@@ -1379,7 +1526,7 @@ static void pull_to_target(double share, const double *target, double *move) {
 
 /* Advances trajectory and phase by a frame, as the prediction y says. */
 static void advance(const model *m, character *c, const float *y, const double *target) {
-    int middle = m->length / 2, future = m->future, recorded = m->size[FORM] == RECORDED,
+    int middle = m->length / 2, future = m->future, recorded = m->size[FORM] >= RECORDED,
         steered = m->number[STEERING] > 0;
     memmove(c->position, c->position + 1, (size_t)middle * sizeof *c->position);
     memmove(c->direction, c->direction + 1, (size_t)middle * sizeof *c->direction);
@@ -1905,6 +2052,7 @@ static int run_frame(hobble *h, const hobble_ground *ground) {
         limit_row(x, m->x_low, m->x_high, m->size[X_SIZE]);
     }
     if (m->size[FORM] == RECORDED) predict_matching(h);
+    else if (m->size[FORM] == LEARNED) predict_learned(h);
     else predict_blend(h);
     for (int i = 0; i < h->characters; i++)
         limit_row(h->y + (size_t)i * (size_t)m->size[Y_SIZE], m->y_low, m->y_high, m->size[Y_SIZE]);
@@ -2004,11 +2152,17 @@ static void distribute(hobble *h, arena *a) {
     uint64_t count = (uint64_t)h->characters,
              look_ups = (uint64_t)m->samples * 3 > 5 ? (uint64_t)m->samples * 3 : 5;
     uint64_t blocks = ((uint64_t)m->size[ROWS] + BLOCK - 1) / BLOCK * (uint64_t)m->size[FEATURES];
-    size_t gate = widest_layer(&m->gate);
+    const stack *const stacks[4] = {&m->network, &m->gate, &m->stepper, &m->projector};
+    int plays = m->size[FORM] >= RECORDED, learned = m->size[FORM] == LEARNED;
+    uint64_t state = learned ? (uint64_t)m->size[FEATURES] + (uint64_t)m->size[LATENT] : 0;
+    uint64_t of_states = 3 * state + (uint64_t)m->size[FEATURES] + 2 * ((uint64_t)m->size[Y_SIZE] + 2);
     character one;
-    h->widest = widest_layer(&m->network);
-    h->widest = gate > h->widest ? gate : h->widest;
-    h->memory_size = m->size[FORM] == RECORDED ? OFFSETS + OFFSETS_PER_JOINT * m->size[JOINTS] : 0;
+    h->widest = 0;
+    for (int i = 0; i < 4; i++) {
+        size_t widest = widest_layer(stacks[i]);
+        h->widest = widest > h->widest ? widest : h->widest;
+    }
+    h->memory_size = plays ? OFFSETS + (int)state + OFFSETS_PER_JOINT * m->size[JOINTS] : 0;
     h->number_count = lay_out(h, &one, NULL);
     h->names = take(a, (uint64_t)name_count(m), sizeof *h->names);
     h->state = take(a, count, sizeof *h->state);
@@ -2019,7 +2173,8 @@ static void distribute(hobble *h, arena *a) {
     h->points = take(a, count * look_ups * 2, sizeof(double));
     h->heights = take(a, count * look_ups, sizeof(double));
     h->powers = take(a, 2 * (uint64_t)m->length, sizeof(double));
-    h->rows_old = take(a, m->size[FORM] == RECORDED ? 4 * (uint64_t)m->size[Y_SIZE] : 0, sizeof(double));
+    h->rows_old = take(a, plays ? 4 * (uint64_t)m->size[Y_SIZE] : 0, sizeof(double));
+    h->states = take(a, learned ? count * of_states : 0, sizeof(float));
     h->slots = take(a, count, sizeof *h->slots);
     h->members = take(a, count, sizeof *h->members);
     h->x = take(a, count * (uint64_t)m->size[X_SIZE], sizeof(float));

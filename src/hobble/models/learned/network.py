@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from hobble.core.declared import ArrayOf, read_declared
-from hobble.core.errors import HobbleError, InputError
+from hobble.core.errors import InputError
 from hobble.core.quat import Array
 from hobble.models.forward import forward
 from hobble.models.load import LARGEST_MEAN, read_arrays, read_layers
@@ -30,7 +30,7 @@ from hobble.models.matching.network import (
     pull_phase,
     smooth_jumps,
 )
-from hobble.models.network import Export, inverse_or_0, standardise_inputs
+from hobble.models.network import LEARNED, Export, inverse_or_0, standardise_inputs
 from hobble.models.onnx_file import Graph, Node, OnnxNetwork, add_layers, write_checked
 from hobble.models.predict import Stack, StandardisingPredictor
 
@@ -60,7 +60,6 @@ class Learned(OnnxNetwork):
     kind: ClassVar[str] = "learned"
     uses_phase: ClassVar[bool] = False
     plays_recorded_poses: ClassVar[bool] = True
-    runs_in_c: ClassVar[bool] = False
 
     columns: NDArray[np.int64] = field(repr=False)
     weights: Array = field(repr=False)
@@ -158,8 +157,21 @@ class Learned(OnnxNetwork):
     def engine_data(
         self, mode: str, storage: str, inputs: NDArray[np.int64]
     ) -> tuple[dict[str, int], dict[str, np.ndarray]]:
-        """As in `Network`. Raises HobbleError: the runtime in C does not know this kind yet."""
-        raise HobbleError("the runtime in C cannot run networks of kind learned yet: use matching")
+        """As in `Network`. The decompressor takes the place of other kinds' layers."""
+        predictor = LearnedPredictor(self, storage)
+        sizes = {
+            "form": LEARNED, "layers": len(self.decompressor[0]), "sets": 1, "features": len(self.columns),
+            "every": self.every, "latent": self.latent, "stepper_layers": len(self.stepper[0]),
+            "projector_layers": len(self.projector[0]),
+        }  # fmt: skip
+        values = {
+            "weights": self.weights, "mean": self.mean, "std": self.std, "inverse": inverse_or_0(self.std),
+            "low": self.low, "high": self.high,
+        }  # fmt: skip
+        stacks = predictor.decompressor.sections(), predictor.stepper.sections("step_")
+        sections = {f"feature_{name}": array.astype(np.float32) for name, array in values.items()}
+        sections["feature_columns"] = self.columns.astype(np.int32)
+        return sizes, stacks[0] | stacks[1] | predictor.projector.sections("search_") | sections
 
     def onnx_outputs(self, g: Graph, z: Node, mode: str) -> Node:
         """As in `OnnxNetwork`: projector and decompressor, as in `predict`."""
@@ -189,7 +201,7 @@ class LearnedPredictor(StandardisingPredictor):
 
     def __init__(self, network: Learned, storage: str = "float32") -> None:
         super().__init__(network)
-        self._decompressor, self._stepper, self._projector = (
+        self.decompressor, self.stepper, self.projector = (
             Stack(*layers, storage) for layers in (network.decompressor, network.stepper, network.projector)
         )
         self._at = first_columns(network.layout)
@@ -205,14 +217,14 @@ class LearnedPredictor(StandardisingPredictor):
         new = ~((memory[:, SHOWN] == 1) & np.isfinite(memory).all(axis=1))
         memory[new] = 0.0
         state = np.ascontiguousarray(states, np.float32)
-        state += _run(self._stepper, state, state.shape[1])
+        state += _run(self.stepper, state, state.shape[1])
         due = np.flatnonzero(new | ~(memory[:, SINCE] + 1 < network.every))
         memory[:, SINCE] += 1
         jumps = np.zeros(len(z), bool)
         if len(due):
             memory[due, SINCE] = 0
             wish = network.wish(z[due])
-            found = _run(self._projector, wish, state.shape[1])
+            found = _run(self.projector, wish, state.shape[1])
             here, there = (
                 np.square((wish - s[:, :features]) * network.std).sum(axis=1) for s in (state[due], found)
             )
@@ -220,10 +232,10 @@ class LearnedPredictor(StandardisingPredictor):
         following = state.copy() if jumps.any() else state
         if len(due):
             state[due] = np.where(jumps[due, None], found, state[due])
-        shown = _run(self._decompressor, state, out.shape[1] + PHASE_OUTPUTS)
+        shown = _run(self.decompressor, state, out.shape[1] + PHASE_OUTPUTS)
         before = shown
         if (jumps & ~new).any():
-            before = _run(self._decompressor, following, shown.shape[1])
+            before = _run(self.decompressor, following, shown.shape[1])
         jumps &= ~new
         out[:] = shown[:, :-PHASE_OUTPUTS]
         smooth_jumps(memory[:, self._states.stop :], before, jumps, self._at, network.halflife, out)
