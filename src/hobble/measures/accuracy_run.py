@@ -216,7 +216,7 @@ def measure_accuracy(
                 key: drawn.confidence_half_width({e: excerpts[e][key] for e in drawn.drawn})
                 for key in WITH_INTERVAL
             }
-    return with_sample(result, sample) | ({"excerpts": list(excerpts.values())} if sample else {})
+    return {**with_sample(result, sample), **({"excerpts": list(excerpts.values())} if sample else {})}
 
 
 def joints_to_measure(inputs: MeasureInputs, options: JointOptions) -> list[str] | None:

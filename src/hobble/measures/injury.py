@@ -307,8 +307,7 @@ def sweep_chart(rows: Rows, published: Json) -> Chart | None:
     if not options:
         return None
     layout = {"xaxis": axis("severity of the second injury", dtick=1), "yaxis": axis("cm")}
-    menu = {"choose": "Injuries", "options": options, "option_layouts": layouts}
-    return chart("second-sweep", layout=layout, **menu)
+    return chart("second-sweep", layout=layout, choose="Injuries", options=options, option_layouts=layouts)
 
 
 def _threshold(severity: float) -> dict[str, Any]:
@@ -396,7 +395,7 @@ def effect_charts(responses: Rows) -> list[Chart]:
 
 def response_table(name: str, responses: Rows) -> Table:
     """A row for each gait and link. name: of the configuration."""
-    records = [r | {f"spearman_{key}": rho for key, rho in r["spearman"].items()} for r in responses]
+    records = [{**r, **{f"spearman_{key}": rho for key, rho in r["spearman"].items()}} for r in responses]
     heads = {"gait": "gait", "link": "link", "trained": "in training", **RESPONSE_COLUMNS}
     show = {"trained": lambda hurt: "hurt" if hurt else "never hurt"}
     return table(f"{name}-injury-responses", records, heads, words("injury.responses"), show)

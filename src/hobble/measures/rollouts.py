@@ -67,8 +67,9 @@ def section(found: Json, material: ReportMaterial) -> PageSection:
         for split, name in NAMES.items()
         for trace in _error_line(name, found.get("lengths", ()), split, COLOURS[split], "sample" in found)
     ]
-    sample = {"more": ["sample"], "sample": sample_in_words(found)} if "sample" in found else {}
-    return PageSection("accuracy", [SectionPart(50, chart("rollouts", traces, _layout(traces), **sample))])
+    more, sample = (("sample",), sample_in_words(found)) if "sample" in found else ((), "")
+    shown = chart("rollouts", traces, _layout(traces), more=more, sample=sample)
+    return PageSection("accuracy", [SectionPart(50, shown)])
 
 
 def compared(all_measured: Sequence[ConfigurationResults], published: Json) -> ComparisonAddition:
@@ -112,12 +113,11 @@ def compared_verdicts(compared: Compared) -> Iterator[Verdict]:
         errors = {row["configuration"]: (row[split] or {}).get("position_error_cm") for row in rows}
         if any(value is not None for value in errors.values()):
             ending = f"cm from the captured joints on average, in roll-outs of {length} frames on {label}"
-            yield from verdict_on_lowest(
-                10,
-                "Closest to captured motion",
-                errors,
-                lambda name, cm, ending=ending: f"the joints of {name} are {format_number(cm, 3)} {ending}",
-            )
+
+            def words(name: str, cm: float, ending: str = ending) -> str:
+                return f"the joints of {name} are {format_number(cm, 3)} {ending}"
+
+            yield from verdict_on_lowest(10, "Closest to captured motion", errors, words)
             return
 
 

@@ -45,7 +45,7 @@ def words(name: str, *more: str, **values: Any) -> str:
 
 def chart(
     name: str,
-    traces: Sequence[Mapping[str, Any]] = (),
+    traces: Sequence[Trace] = (),
     layout: Mapping[str, Any] | None = None,
     height: int = 340,
     *,
@@ -64,8 +64,8 @@ def chart(
     entry = entry or name
     title = words(f"{entry}.title")
     caption = words(*(f"{entry}.{key}" for key in ("caption", *more)), **values)
-    shown = (list(traces), layout or {}, height, choose, options or {}, option_layouts or {})
-    return Chart(name, title, caption, *shown)
+    menu = choose, options or {}, option_layouts or {}
+    return Chart(name, title, caption, list(traces), layout or {}, height, *menu)
 
 
 def table(
@@ -115,13 +115,12 @@ def stick_figures(skeleton: Json, poses: Array, colour: str, view: str = "side",
     bones = [(joints.index(j["parent"]), i) for i, j in enumerate(skeleton["joints"].values()) if j["parent"]]
     across = {"side": poses[..., 2], "front": poses[..., 0], "behind": -poses[..., 0]}[view]
     x, y = across + STRIP_WIDTH * np.arange(len(poses))[:, None], poses[..., 1] + up
-    lines = [[v for pose in axis for a, b in bones for v in (pose[a], pose[b], None)] for axis in (x, y)]
-    return line_trace("", *lines, colour, width=3, showlegend=False, hoverinfo="skip")
+    xs, ys = ([v for pose in axis for a, b in bones for v in (pose[a], pose[b], None)] for axis in (x, y))
+    return line_trace("", xs, ys, colour, width=3, showlegend=False, hoverinfo="skip")
 
 
 def strip_texts(texts: Sequence[str], places: Sequence[tuple[float, float]]) -> Trace:
     """The trace of texts at some places of a strip."""
-    trace = marker_trace(
-        "", *map(list, zip(*places, strict=True)), {"size": 1}, mode="text", text=list(texts)
-    )
+    x, y = [x for x, _ in places], [y for _, y in places]
+    trace = marker_trace("", x, y, {"size": 1}, mode="text", text=list(texts))
     return {**trace, "showlegend": False, "hoverinfo": "skip"}

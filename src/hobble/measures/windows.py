@@ -99,6 +99,6 @@ def named_left_out(
         others = [w for w, own in zip(windows, group == left_out, strict=True) if not own]
         if len({w.label for w in others}) > 1:
             own = np.flatnonzero(group == left_out)
-            table = feature_table([windows[i].values for i in own])
+            table = feature_table([windows[int(i)].values for i in own])
             named[own] = learn_windows(others, shrinkage).likeliest_classes(table)
     return named

@@ -256,7 +256,7 @@ def packed_statistics(statistics: Grader | None = None) -> dict[str, Any]:
     """
     statistics = statistics or grader_of_all_people()
     labels = list(dict.fromkeys(label for label, _ in statistics.kinds))
-    numbers = [[len(statistics.kinds), len(STRENGTHS)], STRENGTHS, statistics.healthy]
+    numbers: list[Any] = [[len(statistics.kinds), len(STRENGTHS)], STRENGTHS, statistics.healthy]
     for (label, _), (mean, spread) in statistics.kinds.items():
         numbers += [[labels.index(label)], mean, spread]
     return {

@@ -244,7 +244,8 @@ class _Maker:
 
 def _names(patterns: Mapping[str, str], params: Mapping[str, Any]) -> dict[str, Any]:
     """Name -> name of a file, or list of names, from patterns as in `make_each`."""
-    clip, out = params["clip"], {}
+    clip = params["clip"]
+    out: dict[str, Any] = {}
     words = {"clip": clip, "original": original(clip), "mirror": clip + MIRROR_SUFFIX}
     for name, pattern in patterns.items():
         if "{channels}" in pattern:

@@ -51,7 +51,7 @@ def train_together(machines: Machines, threads: int, log: Path, arguments: Mappi
     `hobble.training.train.train`. All machines must be able to read and write them. Raises HobbleError if
     a process fails, with its message or with the exit status.
     """
-    job = {
+    job: dict[str, Any] = {
         name: value.model_dump(mode="json") if isinstance(value, Section) else value and str(value)
         for name, value in arguments.items()
     }

@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 import torch
+from numpy.typing import NDArray
 from torch import Tensor, nn
 
 from hobble.core.quat import Array
@@ -115,10 +116,17 @@ def _optimise(name: str, options: Options, networks: list[nn.Module], loss: Call
             total = 0.0
 
 
-def _starts(remaining: Array, frames: int) -> Tensor:
+def _starts(remaining: NDArray[Any], frames: int) -> Tensor:
     """The rows from which at least `frames` frames follow in the run; all with one, if no run is so long."""
     rows = np.flatnonzero(remaining >= frames)
     return torch.from_numpy(rows if len(rows) else np.flatnonzero(remaining >= min(1, remaining.max())))
+
+
+def _first_and_last(network: nn.Sequential) -> tuple[nn.Linear, nn.Linear]:
+    first, last = network[0], network[-1]
+    assert isinstance(first, nn.Linear)
+    assert isinstance(last, nn.Linear)
+    return first, last
 
 
 def _draw(rows: Tensor, count: int) -> Tensor:
@@ -172,11 +180,11 @@ def _train_decompressor(
     with torch.no_grad():
         latent = compressor(torch.cat([poses, features], dim=1))
         centre, spread = latent.mean(dim=0), latent.std(dim=0, correction=0).clamp(min=LEAST_STD)
-        first, last = decompressor[0], decompressor[-1]
-        first.bias += first.weight[:, known:] @ centre
+        first, last = _first_and_last(decompressor)
+        first.bias.add_(first.weight[:, known:] @ centre)
         first.weight[:, known:] *= spread
         scale = torch.from_numpy(std.astype(np.float32))
-        last.weight *= scale[:, None]
+        last.weight.mul_(scale[:, None])
         last.bias.copy_(last.bias * scale + torch.from_numpy(mean.astype(np.float32)))
         return decompressor, (latent - centre) / spread
 
@@ -203,8 +211,9 @@ def _train_stepper(options: Options, tables: Tables, state: Tensor) -> nn.Sequen
 
     _optimise("stepper", options, [stepper], loss)
     with torch.no_grad():
-        stepper[-1].weight *= spread[:, None]
-        stepper[-1].bias *= spread
+        _, last = _first_and_last(stepper)
+        last.weight.mul_(spread[:, None])
+        last.bias.mul_(spread)
     return stepper
 
 
