@@ -10,6 +10,10 @@ from pathlib import Path
 import pytest
 
 from hobble.core.errors import HobbleError
+from hobble.motion.make import load_source
+from hobble.motion.options import ClipMotion
+from hobble.motion.read import read_bvh
+from hobble.motion.skeleton_file import load_skeleton
 from hobble.workflow.project import Project
 from tests.workflow.small_project import DATASET
 
@@ -120,3 +124,15 @@ def test_a_pipe_is_refused_as_a_clip(base: Path, name: str) -> None:
     if name == "a.bvh":
         with pytest.raises(HobbleError, match=f"mine/{name}: a device or a pipe"):
             Project(base, {}).clips.source("mine", "a")
+
+
+@pytest.mark.shared
+def test_plan_and_job_use_the_same_skeleton_file(root: Path, shared: Path) -> None:
+    project = Project(root, {"mocap": str(shared / "mocap")})
+    target = load_skeleton(root / "config/skeletons/holden31.yaml")
+    options = ClipMotion()
+    for clip in ("Injured_Ilde", "Injured_Walk_LLL", "Injured_Run_LLL_extended_converted"):
+        file = read_bvh(project.clips.source("ferre", clip))
+        rig = load_source(file, target, root / "config/skeletons", options).match.rig
+        files = project.clips.clip_skeleton_files("ferre", clip)
+        assert [Path(f).stem for f in files] == [rig] * (rig != "holden31")

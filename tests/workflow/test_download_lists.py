@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import hashlib
 from pathlib import Path
 
 import pytest
 
 from hobble.core.errors import HobbleError
 from hobble.workflow.project import Project
+from hobble.workflow.targets import check_targets
 
 FAR = """
 skeleton: s
@@ -67,3 +69,23 @@ def test_a_bad_checksum_list_is_reported_with_its_line(base: Path) -> None:
     (base / "config/datasets/far.sha256").write_text(f"{'a' * 64}  2_1.bvh\n{'a' * 63}  2_2.bvh\n")
     with pytest.raises(HobbleError, match=r"far\.sha256, line 2: expected a SHA-256"):
         Project(base, {}).clips.source("far", "2_1")
+
+
+def test_every_clip_of_the_cmu_set_has_a_checksum_and_an_address(root: Path) -> None:
+    project = Project(root, {"mocap": "nowhere"})
+    check_targets(project, ["results/datasets/cmu/motion/02_01.npz"])
+    assert len(project.clips.listed_entries("cmu")) == 68
+    assert project.clips.download("cmu", "02_01")["url"].endswith("/cmu-mocap/master/data/002/02_01.bvh")
+    assert project.clips.download("cmu", "105_16")["url"].endswith("/105/105_16.bvh")
+    assert all(
+        len(project.clips.download("cmu", clip)["sha256"]) == 64
+        for clip in project.clips.listed_entries("cmu")
+    )
+
+
+@pytest.mark.shared
+def test_the_checksums_are_those_of_the_files(root: Path, shared: Path) -> None:
+    project = Project(root, {})
+    for clip in project.clips.listed_entries("cmu"):
+        data = (shared / f"mocap/cmu/{clip}.bvh").read_bytes()
+        assert project.clips.download("cmu", clip)["sha256"] == hashlib.sha256(data).hexdigest()
