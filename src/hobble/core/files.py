@@ -139,17 +139,17 @@ def _json_checksum(value: Any) -> str:
 def read_json(path: str | Path, fix: str = DELETE_IT) -> Any:
     """Read a JSON file.
 
-    Raises InputError with the line if it is not valid JSON, and with the advice `fix` if it was changed since
-    `write_json` wrote it.
+    Raises InputError with the advice `fix` if it is not valid JSON, then also with the line, or if it was
+    changed since `write_json` wrote it.
     """
     try:
         value = json.loads(
             read_text(path, MAX_JSON_BYTES), parse_constant=_refuse_constant, parse_float=_finite
         )
     except json.JSONDecodeError as error:
-        raise InputError(path, f"not valid JSON: {error.msg}", line=error.lineno) from error
+        raise InputError(path, f"not valid JSON: {error.msg}", line=error.lineno, fix=fix) from error
     except (RecursionError, ValueError) as error:
-        raise InputError(path, f"not valid JSON: {error}") from error
+        raise InputError(path, f"not valid JSON: {error}", fix=fix) from error
     checksum = value.pop(CHECKSUMS, None) if isinstance(value, dict) else None
     if checksum is not None and checksum != _json_checksum(value):
         raise InputError(path, "was changed after it was written", fix=fix)

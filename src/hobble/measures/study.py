@@ -161,7 +161,7 @@ def read_study(path: str | Path) -> Study:
 
     Raises InputError if the file is damaged, or was made for the two questions of older versions.
     """
-    return read_declared(path, "the questionnaire", Study, read_json(path), USE_FILMS_JSON)
+    return read_declared(path, "the questionnaire", Study, read_json(path, USE_FILMS_JSON), USE_FILMS_JSON)
 
 
 def read_answers(path: str | Path, study: Study) -> list[FilmAnswer]:
@@ -170,7 +170,7 @@ def read_answers(path: str | Path, study: Study) -> list[FilmAnswer]:
     Raises InputError for answers to another questionnaire, a film with no answer or with two, and an unknown
     film, choice or part.
     """
-    data = read_json(path)
+    data = read_json(path, USE_SAVED_FILE)
     if not isinstance(data, dict) or data.get("study") != study.name:
         found = printable(data.get("study") if isinstance(data, dict) else data, 40)
         raise InputError(

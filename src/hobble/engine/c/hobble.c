@@ -1120,10 +1120,11 @@ static float wish_distance(const model *m, const float *wish, const float *state
     return sum;
 }
 
-/* Where a search is due, finds the state for the wish and goes on from there if it is nearer. h->states has
-   the states of all characters, the states found, and the wishes. Marks a jump with JUMPING. Returns whether
-   any character jumps. */
 enum { NEW, SHOWN, JUMPING }; /* values of memory[ROW] in learned motion matching */
+
+/* Where a search is due, finds the state for the wish and goes on from there if it is nearer. states, found:
+   (C, FEATURES + LATENT), wishes: (C, FEATURES) of all characters; the last two are written. Marks a jump
+   with JUMPING. Returns whether any character jumps. */
 static int search_states(hobble *h, float *states, float *found, float *wishes) {
     const model *m = &h->model;
     size_t n = (size_t)m->size[FEATURES], size = n + (size_t)m->size[LATENT], x_size = (size_t)m->size[X_SIZE];

@@ -4,7 +4,7 @@
 // In a page: const bytes = async (url) => new Uint8Array(await (await fetch(url)).arrayBuffer());
 //            const { Engine } = await import("./hobble.mjs");
 
-const WHY = 160, TARGET = 88; // sizes of the reason for a refusal, and of a target, in bytes
+const TARGET = 88; // bytes of a target
 const PAGE = 65536;
 const BY_SPEED = -1;
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, NamedTuple
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,8 +41,9 @@ SHOWN, SINCE, STATE = 0, 1, 2  # 1 once a frame was shown; frames since the last
 Layers = tuple[tuple[Array, ...], tuple[Array, ...]]  # weights (1, out, in) and biases (1, out) of each layer
 
 
-class Latent(NamedTuple):
-    """The entry of `meta` that `matching` does not have: how many numbers a latent vector has."""
+@dataclass(frozen=True)
+class LearnedPlaying(Playing):
+    """The entries of `meta`: those of `matching`, and how many numbers a latent vector has."""
 
     latent: Annotated[int, Field(strict=True, ge=1, le=1024)]
 
@@ -90,16 +91,14 @@ class Learned(OnnxNetwork):
         found, lengths = read_arrays(path, arrays, declared)
         if shared_fields["skeleton"] is None:
             raise InputError(path, "needs a skeleton, but its meta has none")
-        playing = read_declared(path, "meta", Playing, shared_fields["meta"])
-        meta = {"latent": shared_fields["meta"].get("latent")}
-        latent = read_declared(path, "meta", Latent, meta).latent
+        playing = read_declared(path, "meta", LearnedPlaying, shared_fields["meta"])
         features = lengths["features"]
-        state = features + latent
+        state = features + playing.latent
         return cls(
             columns=found["columns"],
             weights=found["feature_weights"],
             **{name: found[f"feature_{name}"] for name in ("mean", "std", "low", "high")},
-            latent=latent,
+            latent=playing.latent,
             decompressor=read_layers(path, arrays, "Dd", state, outputs + PHASE_OUTPUTS),
             stepper=read_layers(path, arrays, "Ss", state, state),
             projector=read_layers(path, arrays, "Pp", features, state),
