@@ -69,6 +69,23 @@ def test_rotation_channels_in_a_wrong_order_are_refused(bvh, walk, make, order, 
     make(path, defects="leave")
 
 
+def test_who_sits_with_the_knees_apart_is_not_refused(bvh, walk, make):
+    rotations, name = walk.rotations.copy(), walk.skeleton.joints.index
+    rotations[:, 0] = [1, 0, 0, 0]
+    for side, aside in (("Left", 1), ("Right", -1)):
+        thigh, shank = name(f"{side}UpLeg"), name(f"{side}Leg")
+        lift, spread = np.radians(-85), np.radians(75 * aside)
+        rotations[:, thigh] = quat.mul(quat.yaw(spread), [np.cos(lift / 2), np.sin(lift / 2), 0, 0])
+        rotations[:, shank] = [np.cos(lift / 2), -np.sin(lift / 2), 0, 0]
+    sitting = replace(walk, rotations=rotations, root=walk.root * [0, 0, 0] + [0, 48, 0])
+    assert not any("knee" in doubt for doubt in make(bvh(sitting))[1]["unsure"])
+
+
+def test_feet_that_slide_a_little_are_noted(bvh, walk, make):
+    unsure = make(bvh(walk, edit=root(0.82)))[1]["unsure"]
+    assert any("slide" in doubt for doubt in unsure)
+
+
 def shaking(walk: Clip) -> Clip:
     rng = np.random.default_rng(1)
     noise = gaussian_filter1d(rng.normal(size=walk.rotations.shape), 3, axis=0) * 0.03

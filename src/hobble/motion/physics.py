@@ -336,8 +336,9 @@ STANDS, SPAN = 0.12, 2 / 15
 # wrong order it is .12 or less in 40 of 42 tries, but .25 in a walk straight along an axis.
 SELDOM, NEVER = 0.27, 0.12
 # Allowed range of the factor by which the hips' path must be scaled so that feet stand most often. The factor
-# is .85 to 1 in the reference clips. It is below 1 because feet roll.
-SHORTEST_FACTOR, LONGEST_FACTOR = 0.79, 1.12
+# is .85 to 1 in the reference clips. It is below 1 because feet roll. Above NOTED_FACTOR the clip gets a
+# warning, since motion that a program has made slides so far.
+SHORTEST_FACTOR, NOTED_FACTOR, LONGEST_FACTOR = 0.79, 1.12, 1.25
 FACTORS = np.exp(np.linspace(np.log(0.4), np.log(2.5), 47))  # the factors that are tried
 FEWEST_FRAMES = 40  # frames in which the hips move; with fewer, the standing share is not computed
 
@@ -418,7 +419,10 @@ def _standing_problem(clip: Clip) -> Problem | None:
             "order than they were written"
         )
         return Problem(text, "Export the clip again." if share < NEVER else "")
-    return None if SHORTEST_FACTOR <= factor <= LONGEST_FACTOR else _unit_problem(1 / factor)
+    if not SHORTEST_FACTOR <= factor <= LONGEST_FACTOR:
+        return _unit_problem(1 / factor)
+    slides = f"the feet slide: the hips go {1 / factor:.2f} times as fast as the feet step"
+    return Problem(slides) if factor > NOTED_FACTOR else None
 
 
 def _unit_problem(quotient: float) -> Problem:

@@ -397,6 +397,9 @@ STANCE_SPEED = 0.6  # cm a frame at 60 Hz: the ball of a standing foot is slower
 KNEE_AHEAD = 0.25
 KNEE_BACKWARD = -0.3  # a knee bends backward if the same cosine is less than this
 BENT_KNEE = 20.0  # degrees: a knee that bends less does not show where it points
+# Cosine of the angle between a thigh and the body's down. Who sits, kneels or squats lifts a thigh further
+# and may point the knee aside.
+LIFTED_THIGH = 0.5
 
 
 def compare_motions(source: Clip, result: Clip, scale: float) -> dict[str, Any]:
@@ -524,13 +527,14 @@ def _knee_cosine(
     """Mean cosine of the angle between where a knee points and where the body faces, while the knee is bent.
 
     A frame counts by how much further than BENT_KNEE the knee bends, since a nearly straight leg hardly shows
-    where its knee points. None if the knee is bent in less than a tenth of the frames. at: role -> (F, 3)
-    positions. up: (3,) or (F, 3), the direction up along the body.
+    where its knee points, and not at all if the thigh is lifted. None if less than a tenth of the frames
+    count. at: role -> (F, 3) positions. up: (3,) or (F, 3), the direction up along the body.
     """
     # The body's left times its up gives its forward.
     ahead = unit(np.cross(at["left_hip"] - at["right_hip"], up))
     hip, knee, heel = (at[f"{side}_{part}"] for part in ("hip", "knee", "heel"))
-    weight = np.maximum(_bend(at, side, ANGLES["knee"]) - BENT_KNEE, 0.0)
+    lifted = np.sum(unit(hip - knee) * unit(np.asarray(up)), axis=-1) < LIFTED_THIGH
+    weight = np.where(lifted, 0.0, np.maximum(_bend(at, side, ANGLES["knee"]) - BENT_KNEE, 0.0))
     if np.mean(weight > 0) < 0.1:
         return None
     outward = bend_direction(hip, knee, heel)  # where the knee points
