@@ -16,15 +16,18 @@ import pytest
 from hobble.core import quat
 from hobble.core.clip import Clip
 from hobble.core.errors import InputError
-from hobble.core.skeleton import local_rotations
+from hobble.core.skeleton import local_rotations, rest_positions
 from hobble.motion.other_formats import BLENDER_SCRIPT, read_motion
 
 X, Y, _ = np.eye(3)
 ARMATURE = quat.from_axis_angle(X, -np.pi / 2)  # Blender writes its Z-up figures below such a node
 
 
-def write_gltf(path: Path, clip: Clip, interpolation: str = "LINEAR") -> Path:
-    """Write a clip as Blender does: bones point along Y of their joints; an armature scales it to metres."""
+def write_gltf(path: Path, clip: Clip, interpolation: str = "LINEAR", posed: bool = False) -> Path:
+    """Write a clip as Blender does: bones point along Y of their joints; an armature scales it to metres.
+
+    posed: the nodes have the pose of the first frame; how the body rests is told only by its skin.
+    """
     skeleton = clip.skeleton
     bones = [
         next((skeleton.offsets[k] for k in skeleton.children(j)), Y) for j in range(len(skeleton.joints))
@@ -60,7 +63,15 @@ def write_gltf(path: Path, clip: Clip, interpolation: str = "LINEAR") -> Path:
         node = pygltflib.Node(name=name, children=children, translation=place.tolist())
         node.rotation = local_rest[j][xyzw].tolist()
         gltf.nodes.append(node)
+        if posed:
+            node.rotation = turns[0, j][xyzw].tolist()
     gltf.skins = [pygltflib.Skin(joints=list(range(1, len(gltf.nodes))))]
+    if posed:
+        bind = np.tile(np.eye(4), (len(skeleton.joints), 1, 1))
+        bind[:, :3, :3] = quat.to_matrix(rest) * 0.01
+        bind[:, :3, 3] = rest_positions(skeleton) * 0.01
+        columns = np.linalg.inv(bind).transpose(0, 2, 1).reshape(-1, 16)
+        gltf.skins[0].inverseBindMatrices = accessor(columns, "MAT4")
     gltf.scenes = [pygltflib.Scene(nodes=[0])]
     times = accessor(np.arange(len(clip))[:, None] / clip.fps, "SCALAR")
     animation = pygltflib.Animation()
@@ -94,6 +105,14 @@ def test_a_gltf_file_gives_the_motion_of_the_bvh_file(tmp_path, walk, bvh, make,
     from_gltf, other = make(write_gltf(tmp_path / name, walk, interpolation))
     assert (other["source_fps"], other["rig"], other["unit_name"]) == (120.0, report["rig"], "m")
     assert np.abs(from_gltf.positions - from_bvh.positions).max() < 0.1
+
+
+def test_the_rest_pose_of_a_gltf_file_is_that_of_its_skin(tmp_path, walk, bvh, make):
+    """The nodes stand in the middle of a step, with bent knees."""
+    from_bvh, _ = make(bvh(walk))
+    from_gltf, other = make(write_gltf(tmp_path / "posed.glb", walk, posed=True))
+    assert np.abs(from_gltf.positions - from_bvh.positions).max() < 0.1
+    assert not other["unsure"]
 
 
 @pytest.mark.shared

@@ -1,7 +1,8 @@
 """Reads motion from BVH, glTF and FBX files. FBX is read by way of Blender.
 
 The joints of a glTF file get axes that are parallel to the world's in its rest pose. So all rotations are
-zero there, as in a BVH file whose zero pose is a stance.
+zero there, as in a BVH file whose zero pose is a stance. The rest pose is the one in which the mesh was
+bound to the joints, if the file has it, since many programs write the pose of some frame into the nodes.
 """
 
 from __future__ import annotations
@@ -29,6 +30,7 @@ MOTION_SUFFIXES = (".bvh", ".glb", ".gltf", ".fbx")
 ORDER = "ZYX"  # of the rotation channels that the joints of a glTF file get
 POSITIONS = tuple(f"{axis}position" for axis in "XYZ")
 ROTATIONS = tuple(f"{axis}rotation" for axis in ORDER)
+BOUND, MOST_TURN = 0.05, 60.0  # longest bones, degrees; see _bind_pose
 MOVES = 1e-3  # longest bones: a joint that moves further relative to its parent gets position channels
 LONGEST_STEP, SPARSE = 0.11, 30.0  # seconds: keys that are further apart get frames at 30 Hz between them
 BLENDER_SECONDS = 600  # Blender may take this long for one file
@@ -140,7 +142,8 @@ class _Scene:
             names.append(name if name not in names else f"{name}_{old}")
         parents = [-1] * first + [new.get(above.get(old, -1), first - 1) for old in order]
         still = (np.zeros(3), quat.IDENTITY, np.ones(3))
-        rest = [still] * first + [_rest_of(gltf.nodes[old]) for old in order]
+        bound = _bind_pose(gltf, path, above)
+        rest = [still] * first + [bound.get(old) or _rest_of(gltf.nodes[old]) for old in order]
         keys = {(new[node], what): key for (node, what), key in channels.items() if node in new}
         return cls(names, parents, rest, keys)
 
@@ -217,6 +220,51 @@ def _longest_animation(gltf: Any, path: Path) -> dict[tuple[int, str], tuple[Arr
     return best
 
 
+def _bind_pose(gltf: Any, path: Path, above: dict[int, int]) -> dict[int, tuple[Array, Array, Array]]:
+    """Translation, rotation and scale of the joints in the pose in which the first skin was bound to them.
+
+    A file does not tell whether the mesh was bound in its own coordinates or in the world's. What turns the
+    root joint less from its node is taken, and neither if it turns by more than MOST_TURN. Empty without a
+    skin, or if the length of a bone differs by more than BOUND from that of the nodes. above: node -> its
+    parent.
+    """
+    skin = next((i for i, skin in enumerate(gltf.skins or ()) if skin.inverseBindMatrices is not None), None)
+    if skin is None:
+        return {}
+    to_joint = _numbers(gltf, path, gltf.skins[skin].inverseBindMatrices).reshape(-1, 4, 4).transpose(0, 2, 1)
+    try:
+        pose = dict(zip(gltf.skins[skin].joints, np.linalg.inv(to_joint), strict=True))
+    except np.linalg.LinAlgError:
+        return {}
+    meshes = [i for i, node in enumerate(gltf.nodes) if node.skin == skin]
+    longest = max(float(np.linalg.norm(_rest_of(gltf.nodes[j])[0])) for j in pose if above.get(j) in pose)
+    bound = {}
+    for joint, matrix in pose.items():
+        node = _rest_of(gltf.nodes[joint])
+        if above.get(joint) in pose:
+            bound[joint] = _parts_of(np.linalg.inv(pose[above[joint]]) @ matrix)
+            if abs(np.linalg.norm(bound[joint][0]) - np.linalg.norm(node[0])) > BOUND * longest:
+                return {}
+            continue
+        base = np.linalg.inv(_world_of(gltf, above.get(joint), above))
+        tried = [_parts_of(base @ _world_of(gltf, mesh, above) @ matrix) for mesh in (None, *meshes[:1])]
+        turned = [float(np.degrees(quat.angle(turn, node[1]))) for _, turn, _ in tried]
+        if min(turned) < MOST_TURN:
+            bound[joint] = node[0], tried[int(np.argmin(turned))][1], node[2]
+    return bound
+
+
+def _world_of(gltf: Any, node: int | None, above: dict[int, int]) -> Array:
+    """(4, 4) the transform of a node to the world outside of animations. None is the world itself."""
+    matrix = np.eye(4)
+    while node is not None:
+        place, turn, scale = _rest_of(gltf.nodes[node])
+        own = np.eye(4)
+        own[:3, :3], own[:3, 3] = quat.to_matrix(turn) * scale, place
+        matrix, node = own @ matrix, above.get(node)
+    return matrix
+
+
 def _numbers(gltf: Any, path: Path, number: int) -> Array:
     """(N, width) the values of an accessor. Whole numbers stand for shares of their largest value."""
     accessor = gltf.accessors[number]
@@ -229,7 +277,7 @@ def _numbers(gltf: Any, path: Path, number: int) -> Array:
     else:
         data = read_bytes(path.parent / Path(uri).name, MOST_BYTES)
     kind = {5120: "i1", 5121: "u1", 5122: "<i2", 5123: "<u2", 5126: "<f4"}[accessor.componentType]
-    width = {"SCALAR": 1, "VEC3": 3, "VEC4": 4}[accessor.type]
+    width = {"SCALAR": 1, "VEC3": 3, "VEC4": 4, "MAT4": 16}[accessor.type]
     size = np.dtype(kind).itemsize
     start = (view.byteOffset or 0) + (accessor.byteOffset or 0)
     strides = (view.byteStride or width * size, size)
@@ -240,12 +288,16 @@ def _numbers(gltf: Any, path: Path, number: int) -> Array:
 def _rest_of(node: Any) -> tuple[Array, Array, Array]:
     """Translation, rotation (w, x, y, z) and scale of a node outside of animations."""
     if node.matrix:
-        matrix = np.array(node.matrix, float).reshape(4, 4).T
-        scale = np.linalg.norm(matrix[:3, :3], axis=0)
-        return matrix[:3, 3], quat.from_matrix(matrix[:3, :3] / scale), scale
+        return _parts_of(np.array(node.matrix, float).reshape(4, 4).T)
     x, y, z, w = node.rotation or (0.0, 0.0, 0.0, 1.0)
     place, scale = node.translation or (0.0, 0.0, 0.0), node.scale or (1.0, 1.0, 1.0)
     return np.array(place, float), np.array([w, x, y, z]), np.array(scale, float)
+
+
+def _parts_of(matrix: Array) -> tuple[Array, Array, Array]:
+    """Translation, rotation and scale of a (4, 4) matrix."""
+    scale = np.linalg.norm(matrix[:3, :3], axis=0)
+    return matrix[:3, 3], quat.from_matrix(matrix[:3, :3] / scale), scale
 
 
 def _at_times(times: Array, values: Array, interpolation: str, when: Array) -> Array:
