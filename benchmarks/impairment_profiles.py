@@ -6,7 +6,6 @@ python benchmarks/impairment_profiles.py IMPAIRED_WALKS.npz
 from __future__ import annotations
 
 import sys
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +13,7 @@ import numpy as np
 
 from hobble.core.files import load_npz, write_json
 from hobble.core.quat import Array
-from hobble.hurt.amounts import CURVES, HARMONICS, PROFILES_FILE, Profile
+from hobble.hurt.amounts import CURVES, HARMONICS, PROFILES_FILE
 
 NORMAL = "normal"  # name of the walk without an impairment
 SOURCE = "Jun et al. 2020, IEEE Access 8: means over ten people who imitated impairments of the right leg"
@@ -31,9 +30,7 @@ def derive_profiles(walks: str | Path, path: str | Path = PROFILES_FILE) -> None
     data = load_npz(walks)
     gaits = [str(name) for name in data["gaits"]]
     derived = {
-        gait: asdict(_derive_profile(data, i, gaits.index(NORMAL)))
-        for i, gait in enumerate(gaits)
-        if gait != NORMAL
+        gait: _derive_profile(data, i, gaits.index(NORMAL)) for i, gait in enumerate(gaits) if gait != NORMAL
     }
     for profile in derived.values():
         for name, value in profile.items():
@@ -41,7 +38,7 @@ def derive_profiles(walks: str | Path, path: str | Path = PROFILES_FILE) -> None
     write_json(path, {"source": SOURCE, "profiles": derived})
 
 
-def _derive_profile(data: Any, gait: int, normal: int) -> Profile:
+def _derive_profile(data: Any, gait: int, normal: int) -> dict[str, Any]:
     """Compare two kinds of walk. gait, normal: their indices in the arrays of `data`.
 
     In the recordings the right side (R) is hurt and the left side (L) is sound.
@@ -59,26 +56,26 @@ def _derive_profile(data: Any, gait: int, normal: int) -> Profile:
         return ratio(np.ptp(curves[name].astype(float), axis=-1))
 
     strike = scalars["left_strike_phase"]
-    return Profile(
-        speed=ratio(scalars["speed_per_leg"]),
-        stride=ratio(scalars["stride_seconds"]),
-        strike=difference("left_strike_phase"),
-        stance_hurt=difference("stance_share_R"),
-        stance_sound=difference("stance_share_L"),
-        step_hurt=ratio(scalars["step_R"]),
-        step_sound=ratio(scalars["step_L"]),
-        width=difference("step_width"),
-        knee=ratio_of_ranges("knee_flexion_R"),
-        arm_hurt=ratio_of_ranges("arm_forward_R"),
-        arm_sound=ratio_of_ranges("arm_forward_L"),
-        curves={
+    return {
+        "speed": ratio(scalars["speed_per_leg"]),
+        "stride": ratio(scalars["stride_seconds"]),
+        "strike": difference("left_strike_phase"),
+        "stance_hurt": difference("stance_share_R"),
+        "stance_sound": difference("stance_share_L"),
+        "step_hurt": ratio(scalars["step_R"]),
+        "step_sound": ratio(scalars["step_L"]),
+        "width": difference("step_width"),
+        "knee": ratio_of_ranges("knee_flexion_R"),
+        "arm_hurt": ratio_of_ranges("arm_forward_R"),
+        "arm_sound": ratio_of_ranges("arm_forward_L"),
+        "curves": {
             name: list(
                 _fit_harmonics(curves[name][gait], strike[gait])
                 - _fit_harmonics(curves[name][normal], strike[normal])
             )
             for name in CURVES
         },
-    )
+    }
 
 
 def _fit_harmonics(curve: Array, strike: Array) -> Array:

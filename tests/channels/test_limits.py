@@ -16,6 +16,7 @@ from hobble.channels.speed_limits import (
     Limits,
     combine_limits,
 )
+from hobble.core.errors import InputError
 
 WALK, JOG, GAITS = 1, 2, 6
 LIMITS = Limits(
@@ -87,7 +88,7 @@ def test_learnt_limits_never_rise_with_severity_and_are_equal_on_both_sides() ->
     assert (np.diff(limits.speeds, axis=2) <= 0).all()
     assert (limits.speeds[WALK] <= limits.speeds[WALK, 0, 0]).all()
     np.testing.assert_array_equal(limits.speeds[:, 0], limits.speeds[:, 1])
-    again = Limits.from_dict(limits.to_dict(), GAITS, 3, 10.0)
+    again = Limits.from_dict("net", "injury", limits.to_dict(), GAITS, 3, 10.0)
     np.testing.assert_allclose(again.speeds, limits.speeds, atol=1e-4)
 
 
@@ -124,17 +125,16 @@ def test_the_slowness_of_one_channel_is_not_learnt_for_another() -> None:
     ("changes", "says"),
     [
         ({"levels": np.array([0.0, 5.0, 9.0])}, "rise from 0 to 10"),
-        ({"levels": np.array([0.0, 5.0])}, "do not fit 1 gaits and 2 labels"),
-        ({"speeds": -LIMITS.speeds}, "above 0"),
-        ({"speeds": LIMITS.speeds * np.nan}, "above 0"),
+        ({"levels": np.array([0.0, 5.0])}, r"speeds has shape \(1, 2, 3\)"),
+        ({"speeds": -LIMITS.speeds}, "below the limit"),
+        ({"speeds": LIMITS.speeds * np.nan}, "not finite"),
         ({"speeds": LIMITS.speeds[..., ::-1]}, "stay the same or fall"),
-        ({"usual": np.array([3.5, 3.5])}, "do not fit 1 gaits and 2 labels"),
-        ({"usual": np.array([-1.0])}, "usual speeds"),
+        ({"usual": np.array([3.5, 3.5])}, "usual has shape"),
     ],
 )
 def test_a_malformed_table_of_limits_is_refused(changes, says: str) -> None:
     data = {key: value.tolist() for key, value in vars(replace(LIMITS, **changes)).items()}
-    with pytest.raises(ValueError, match=says):
-        Limits.from_dict(data, 1, 2, 10.0)
-    with pytest.raises(ValueError, match="tables of numbers"):
-        Limits.from_dict({"levels": "all"}, 1, 2, 10.0)
+    with pytest.raises(InputError, match=says):
+        Limits.from_dict("net", "injury", data, 1, 2, 10.0)
+    with pytest.raises(InputError, match="tables of numbers"):
+        Limits.from_dict("net", "injury", {"levels": "all"}, 1, 2, 10.0)

@@ -6,14 +6,15 @@ import numpy as np
 import pytest
 
 from hobble.core import quat
+from hobble.core.clip import Clip
 from hobble.core.errors import HobbleError
 from hobble.core.skeleton import other_side
 from hobble.hurt.hurt_clip import hurt_clip
-from hobble.labels.clip_labels import LabelReport
+from hobble.labels.clip_labels import CONTACT_ROLES, LabelReport, Labels
 from hobble.labels.label import mirror_labels
 from hobble.motion.edit import mirror_clip
-from tests.hurt.gait import SIDES, fastest, knee, slide, toe_heights
 
+SIDES = ("left", "right")
 MADE = ("straight", "turning", "jog", "starting", "uneven")
 CAPTURED = ("07_01", "105_29", "09_01", "03_01")
 HURT = (
@@ -43,17 +44,55 @@ def test_frames_before_an_injury_are_unchanged(made, hurting) -> None:
     assert np.abs(hurt.clip.positions[600:900] - clip.positions[600:900]).max() > 20
 
 
-@pytest.mark.parametrize("links", HURT, ids=lambda links: next(iter(links)))
-@pytest.mark.parametrize("name", MADE)
-def test_generated_clips_keep_to_the_ground_when_hurt(made, hurting, name, links) -> None:
-    _keeps_to_the_ground(made(name), hurting, links)
+def knee(clip: Clip, side: str) -> np.ndarray:
+    """(F,) knee flexion in degrees; negative if the knee is bent backwards."""
+    hip, joint, ankle = (
+        clip.positions[:, clip.skeleton.role(f"{side}_{r}")] for r in ("hip", "knee", "heel")
+    )
+    thigh, shank = joint - hip, ankle - joint
+    cosine = np.sum(thigh * shank, axis=1) / np.linalg.norm(thigh, axis=1) / np.linalg.norm(shank, axis=1)
+    angle = np.degrees(np.arccos(np.clip(cosine, -1, 1)))
+    leg = ankle - hip
+    out = thigh - leg * np.sum(thigh * leg, axis=1, keepdims=True) / np.sum(leg * leg, axis=1, keepdims=True)
+    pelvis = clip.skeleton.role("hips")
+    across = (
+        clip.positions[:, clip.skeleton.role("left_hip")] - clip.positions[:, clip.skeleton.role("right_hip")]
+    )
+    ahead = np.cross(across, quat.rotate(clip.global_rotations[:, pelvis], np.array([0.0, 1.0, 0.0])))
+    return np.where(np.sum(out * ahead, axis=1) < 0, -angle, angle)
+
+
+def slide(clip: Clip, labels: Labels) -> float:
+    """cm a frame that the joints in contact move over the ground, on average."""
+    feet = clip.positions[:, [clip.skeleton.role(role) for role in CONTACT_ROLES]]
+    moved = np.linalg.norm(np.diff(feet[..., [0, 2]], axis=0), axis=2)
+    both = labels.contacts[:-1] & labels.contacts[1:]
+    return float(moved[both].mean()) if both.sum() > 20 else 0.0
+
+
+def toe_heights(clip: Clip, labels: Labels) -> np.ndarray:
+    """Heights of the toe joints that are in contact."""
+    toes = clip.positions[:, [clip.skeleton.role(f"{side}_toe") for side in SIDES], 1]
+    return np.asarray(toes[labels.contacts[:, [1, 3]]])
+
+
+def fastest(clip: Clip) -> float:
+    """Degrees a second of the fastest turning joint."""
+    return float(np.degrees(quat.angle(clip.rotations[:-1], clip.rotations[1:]).max()) * clip.fps)
+
+
+# Each clip with two of the injuries, so that each injury is seen in several kinds of motion.
+@pytest.mark.parametrize(("name", "i"), [(name, (i + k) % 5) for i, name in enumerate(MADE) for k in (0, 2)])
+def test_generated_clips_keep_to_the_ground_when_hurt(made, hurting, name, i) -> None:
+    _keeps_to_the_ground(made(name), hurting, HURT[i])
 
 
 @pytest.mark.shared
-@pytest.mark.parametrize("links", HURT, ids=lambda links: next(iter(links)))
-@pytest.mark.parametrize("name", CAPTURED)
-def test_captured_clips_keep_to_the_ground_when_hurt(captured, hurting, name, links) -> None:
-    _keeps_to_the_ground(captured(name), hurting, links)
+@pytest.mark.parametrize(
+    ("name", "i"), [(name, (i + k) % 5) for i, name in enumerate(CAPTURED) for k in (0, 2)]
+)
+def test_captured_clips_keep_to_the_ground_when_hurt(captured, hurting, name, i) -> None:
+    _keeps_to_the_ground(captured(name), hurting, HURT[i])
 
 
 def _keeps_to_the_ground(healthy, hurting, links) -> None:
@@ -79,7 +118,7 @@ def _keeps_to_the_ground(healthy, hurting, links) -> None:
     assert np.ptp(lengths, axis=0).max() < 1e-6
 
 
-@pytest.mark.parametrize("links", HURT, ids=lambda links: next(iter(links)))
+@pytest.mark.parametrize("links", HURT[1:4], ids=lambda links: next(iter(links)))
 def test_hurting_the_mirrored_clip_on_the_other_side_is_the_mirror_of_the_hurt_clip(
     made, hurting, links
 ) -> None:

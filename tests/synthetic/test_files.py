@@ -6,13 +6,10 @@ import itertools
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from hobble.core.errors import HobbleError
-from hobble.synthetic.generate_clip import footsteps_text, gait_text, write_clip
+from hobble.synthetic.generate_clip import write_clip
 from hobble.synthetic.options import Synthetic
-from hobble.synthetic.plan import Segment, gait_keys
 
 RECIPES = ["walk-straight", "walk", "jog", "walk-jog-walk", "uneven", "crouch"]
 
@@ -65,36 +62,6 @@ def test_gait_keys_name_the_gait_and_fade_between_two(written):
         if label == following:
             inner = speed[int(a) // 2 : int(b) // 2]
             assert (inner.mean() > 200) == (label == "jog")
-
-
-segments = st.lists(
-    st.builds(Segment, st.sampled_from(["stand", "walk", "jog", "crouch"]), seconds=st.floats(0.2, 4.0)),
-    min_size=1,
-    max_size=8,
-)
-
-
-@settings(max_examples=60, deadline=None)
-@given(segments, st.integers(30, 900))
-def test_gait_keys_start_at_the_first_frame_and_rise(plan, frames):
-    keys = gait_keys(plan, frames, 60)
-    at = [frame for frame, _ in keys]
-    assert at[0] == 0
-    assert all(a < b for a, b in itertools.pairwise(at))
-    assert at[-1] < frames
-    assert gait_text(keys).splitlines()[0] == f"1 {plan[0].gait}"
-
-
-@settings(max_examples=60, deadline=None)
-@given(st.lists(st.integers(1, 40), min_size=2, max_size=30), st.booleans())
-def test_footstep_lines_pair_each_right_with_the_next_left(gaps, left_first):
-    frames = np.cumsum(gaps).tolist()
-    left, right = frames[0 if left_first else 1 :: 2], frames[1 if left_first else 0 :: 2]
-    numbers = [int(x) for x in footsteps_text(right, left).split()]
-    assert len(numbers) % 2 == 0
-    assert numbers == sorted(numbers)
-    assert all(n - 1 in right for n in numbers[::2])
-    assert all(n - 1 in left for n in numbers[1::2])
 
 
 def test_a_clip_too_short_for_a_step_is_refused_with_the_minimum(holden31, tmp_path):

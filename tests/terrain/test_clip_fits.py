@@ -1,24 +1,36 @@
-"""Whole clips: exact geometry, the order of heights, flat clips, and errors."""
+"""Whole clips, the order of heights, flat floors, and the surface that is added to meet the feet."""
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
-from hobble.core.errors import InputError
 from hobble.core.skeleton import Skeleton
 from hobble.motion.options import ClipMotion
 from hobble.motion.root import RootFrames
 from hobble.terrain.clip_fits import clip_fits, heights_under, sample_points, save_fits
-from hobble.terrain.cycle_ground import IS_HEEL, find_soles, fit_cycle, heel_above_toe
-from hobble.terrain.heightmaps import heightmaps
-from hobble.terrain.options import FitOptions, HeightmapOptions
-from hobble.terrain.patches import Patches, draw_patches
-from tests.terrain.grounds import GROUNDS
+from hobble.terrain.cycle_ground import (
+    IS_HEEL,
+    distances,
+    find_soles,
+    fit_surfaces,
+    gather_stances,
+    heel_above_toe,
+)
+from hobble.terrain.options import FitOptions
+from hobble.terrain.patches import Patches
+
+GROUNDS = {
+    "level": lambda x, z: np.zeros_like(z),
+    "slope": lambda x, z: 0.2 * z + 0.05 * x,
+    "waves": lambda x, z: 12 * np.sin(z / 70) + 5 * np.sin(x / 9),
+    "steps": lambda x, z: 15 * np.clip(np.floor(z / 60) % 6, 0, 4),
+}
 
 
 @pytest.mark.parametrize("kind", ["rocky", "jumpy", "beam"])
@@ -32,17 +44,6 @@ def test_fitted_ground_meets_the_feet_and_is_never_above_them(
     assert fits.foot_error[..., 0].max() < 1
     assert fits.foot_below.max() <= 1
     assert np.all(np.diff(fits.error, axis=1) >= 0)
-
-
-def test_patch_and_feet_have_the_same_mean_height(made: SimpleNamespace, patches: Patches) -> None:
-    walk = made.walk(GROUNDS["slope"])
-    soles = walk.clip.positions[60:200, -4:] - np.array([0.0, 3.0, 0.0])
-    contacts, path = walk.labels["contacts"][60:200], walk.clip.root[60:200, [0, 2]]
-    sides = np.tile([1.0, 0.0], (len(path), 1))
-    ground = fit_cycle(patches, soles, contacts, path, sides, "rocky", FitOptions(fits=5))
-    patch = replace(ground, surfaces=(), pits=())
-    assert np.allclose(patch.height_above_soles(soles)[:, contacts].mean(axis=1), 0, atol=1e-3)
-    assert np.allclose(ground.centre, soles[contacts][:, [0, 2]].mean(axis=0))
 
 
 def test_heights_of_rows_are_those_of_the_fits_of_their_cycles(
@@ -93,22 +94,6 @@ def test_a_clip_without_cycles_has_no_fits(made: SimpleNamespace, patches: Patch
         assert len(fits.frame) == len(fits.fits) == 0
 
 
-def test_labels_of_another_clip_are_refused(made: SimpleNamespace, patches: Patches) -> None:
-    walk = made.walk(GROUNDS["level"])
-    few = {**walk.labels, "contacts": walk.labels["contacts"][1:]}
-    with pytest.raises(
-        InputError, match=r"figure: the contacts have shape \(419, 4\), but the clip has 420 frames"
-    ):
-        clip_fits(walk.clip, few, patches, "rocky", made.options(), made.database())
-    late = {**walk.labels, "cycles": np.array([[64, 128], [300, 420]])}
-    with pytest.raises(
-        InputError, match="frame 300: a cycle has frames 300 to 420, but the clip has 420 frames"
-    ):
-        clip_fits(walk.clip, late, patches, "rocky", made.options(), made.database())
-    with pytest.raises(InputError, match="300 patches are fewer than the 400 fits"):
-        clip_fits(walk.clip, walk.labels, patches, "rocky", made.options(fits=400), made.database())
-
-
 def test_heights_of_joints_above_their_soles(made: SimpleNamespace, holden31: Skeleton) -> None:
     walk = made.walk(GROUNDS["level"])
     contacts, frames = walk.labels["contacts"], np.arange(60, 360)
@@ -121,23 +106,6 @@ def test_heights_of_joints_above_their_soles(made: SimpleNamespace, holden31: Sk
     expected = walk.clip.positions[:, -4:, 1] - np.where(IS_HEEL, 5.0, 4.5)
     assert np.allclose(given.soles[..., 1], expected)
     assert heel_above_toe(holden31) == pytest.approx(4.5)
-
-
-def honest_over(heightmap: dict, files: list[Path], made: SimpleNamespace) -> None:
-    """A walk over waves, fitted to patches of one heightmap."""
-    options = made.options(patches=100)
-    maps = heightmaps([HeightmapOptions(**heightmap)], files, cell=options.cell, height_scale=3.0)
-    drawn = options.model_dump(include={"cell", "size", "highest", "seed"})
-    patches = draw_patches(maps, count=100, **drawn)
-    walk = made.walk(GROUNDS["waves"])
-    fits = clip_fits(walk.clip, walk.labels, patches, "rocky", options, made.database())
-    assert np.ptp(patches.heights_at(range(100), np.zeros((1, 2), np.float32))) > 1  # it has hills
-    assert fits.foot_error[..., 0].max() < 1
-    assert fits.foot_below.max() <= 1
-
-
-def test_real_clips_can_be_fitted_to_a_real_landscape(made: SimpleNamespace) -> None:
-    honest_over({"kind": "elevation"}, [], made)
 
 
 @pytest.mark.shared
@@ -177,3 +145,107 @@ def test_real_clips_stand_on_the_fitted_ground(shared: Path, root: Path, made: S
             # Its left leg is 2 % shorter than its right one. On equal legs, the feet stand 1.5 cm apart in
             # height, and the ground meets them.
             assert np.abs(fits.heights).max() < 3.5
+
+
+def test_flat_ground_is_zero_and_one_fit(made: SimpleNamespace, patches: Patches) -> None:
+    walk = made.walk(GROUNDS["level"])
+    fits = clip_fits(walk.clip, walk.labels, patches, "flat", made.options(), made.database())
+    assert np.all(fits.fits == 1)
+    assert fits.heights.shape == (len(fits.frame), 36)
+    assert np.all(fits.heights == 0)
+    assert np.all(fits.patch == -1)
+    assert fits.foot_error.shape == (len(walk.labels["cycles"]), 10, 2)
+    assert fits.foot_error.max() < 0.01
+
+
+@pytest.mark.parametrize("bent", [True, False])
+def test_an_uneven_floor_is_adapted_only_if_configured(
+    made: SimpleNamespace, patches: Patches, bent: bool
+) -> None:
+    walk = made.walk(GROUNDS["waves"])
+    options = made.options(bend_flat=bent)
+    fits = clip_fits(walk.clip, walk.labels, patches, "flat", options, made.database())
+    assert np.all(fits.fits == 1)
+    assert np.any(fits.heights != 0) is np.bool_(bent)
+    assert (fits.foot_error[..., 0].max() < 1) is np.bool_(bent)
+    assert (fits.foot_below.max() <= 1) is np.bool_(bent)
+
+
+def test_a_foot_below_a_flat_floor_makes_only_a_local_pit(made: SimpleNamespace, patches: Patches) -> None:
+    walk = made.walk(GROUNDS["level"])
+    contacts = walk.labels["contacts"]
+    frame = np.flatnonzero(~contacts[:, 1] & (np.arange(420) > 100))[5]
+    feet = walk.clip.positions[:, -4:].copy()
+    feet[frame, 1, 1] = 2.5 - 4
+    clip = made.figure(feet, walk.clip.root)
+    fits = clip_fits(clip, walk.labels, patches, "flat", made.options(), made.database())
+    assert np.all(fits.heights == 0)
+    assert fits.foot_error.max() < 0.01
+    assert 0 < fits.foot_below.max() <= 1
+    options = made.options(bend_flat=False)
+    as_it_is = clip_fits(clip, walk.labels, patches, "flat", options, made.database())
+    assert as_it_is.foot_below.max() == pytest.approx(4)
+
+
+def test_a_heel_held_up_over_its_standing_toe_is_not_on_a_flat_floor(
+    made: SimpleNamespace, patches: Patches
+) -> None:
+    """Like a crouch on the balls of the feet: heels that do not move are labelled as contacts."""
+    walk = made.walk(GROUNDS["level"])
+    feet = walk.clip.positions[:, -4:].copy()
+    feet[:, [0, 2], 1] += 5
+    clip = made.figure(feet, walk.clip.root)
+    fits = clip_fits(clip, walk.labels, patches, "flat", made.options(), made.database())
+    assert np.all(fits.heights == 0)
+    assert fits.foot_error.max() < 0.01
+
+
+def test_flat_ground_can_be_at_the_height_of_the_feet_as_in_the_original(
+    made: SimpleNamespace, patches: Patches
+) -> None:
+    walk = made.walk(lambda x, z: np.full_like(z, 3.0))
+    for level, expected in (("zero", 0.0), ("feet", 3.0)):
+        options = made.options(flat_level=level, deepest=None)
+        fits = clip_fits(walk.clip, walk.labels, patches, "flat", options, made.database())
+        assert np.allclose(fits.heights, expected, atol=1e-5)
+
+
+def test_the_surface_solves_the_regularised_system_of_the_original() -> None:
+    rng = np.random.default_rng(1)
+    places, residual = rng.uniform(-200, 200, (12, 2)), rng.normal(0, 5, (1, 12))
+    points = np.column_stack([places, np.zeros(12), np.ones(12)])
+    spread = distances(places, places).mean()
+    weights = np.linalg.solve(distances(places, places) / spread - 0.1 * np.eye(12), residual[0])
+    elsewhere = rng.uniform(-300, 300, (40, 2))
+    expected = distances(elsewhere, places) / spread @ weights
+    assert np.allclose(fit_surfaces(points, residual, 0.1)[0].heights_at(elsewhere), expected)
+
+
+@settings(max_examples=20, deadline=None)
+@given(st.integers(0, 10_000))
+def test_only_large_residuals_are_fitted_more_closely_than_in_the_original(seed: int) -> None:
+    """Like feet beside a beam: heights differ by half a metre over a short distance."""
+    rng = np.random.default_rng(seed)
+    place = rng.uniform(-60, 60, (40, 2))
+    count = rng.integers(1, 9, 40).astype(float)
+    at = np.column_stack([place, np.zeros(40), count])
+    residual = np.stack([rng.normal(0, 0.1, 40), rng.choice([0.0, 50.0], 40)])
+    once, met = fit_surfaces(at, residual, 0.1), fit_surfaces(at, residual, 0.1, 0.5)
+    left = [np.abs(r - s.heights_at(place)) @ count / count.sum() for r, s in zip(residual, met, strict=True)]
+    assert max(left) <= 0.5 + 1e-9
+    assert np.abs(residual[1] - once[1].heights_at(place)) @ count / count.sum() > 0.5
+    assert np.array_equal(once[0].weights, met[0].weights)
+
+
+def test_stances_are_runs_of_one_joint_of_limited_length() -> None:
+    soles = np.zeros((20, 4, 3))
+    soles[:, :, 0] = np.arange(4) * 10.0
+    soles[:, :, 1] = np.arange(20)[:, None]
+    contacts = np.zeros((20, 4), bool)
+    contacts[2:7, 0] = True
+    contacts[8:10, 0] = True
+    contacts[5:10, 3] = True
+    x, _, height, count = gather_stances(soles, contacts, longest=3).T
+    assert count.tolist() == [3, 2, 2, 3, 2]
+    assert x.tolist() == [0, 0, 0, 30, 30]
+    assert height.tolist() == [3, 5.5, 8.5, 6, 8.5]

@@ -14,10 +14,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from hobble.core.declared import ArrayOf, check_arrays
+from hobble.core.errors import InputError
 from hobble.core.quat import Array
 
 UNLIMITED = 1e4  # cm a frame: limit of a gait if the database has no healthy forward cycle in this gait
@@ -61,9 +64,7 @@ class Limits:
         values: (C, L) value of each label for each character. If several values are above 0, the shares
         of the healthy speed that they take add up as a p-norm (see SUM_NORM). If all are 0, the speed is inf.
         """
-        below = np.clip(np.searchsorted(self.levels, values, side="right") - 1, 0, len(self.levels) - 2)
-        low, high = self.levels[below], self.levels[below + 1]
-        weight = (values - low) / (high - low)
+        below, weight = _between_levels(self.levels, values)
         label = np.arange(values.shape[1])
         speed_low, speed_high = self.speeds[:, label, below], self.speeds[:, label, below + 1]
         speeds = np.where(values > 0, speed_low + weight * (speed_high - speed_low), np.inf)
@@ -80,29 +81,34 @@ class Limits:
         return {"levels": self.levels.tolist(), "speeds": speeds, "usual": usual}
 
     @classmethod
-    def from_dict(cls, data: Mapping[str, Any], gaits: int, labels: int, highest: float) -> Limits:
+    def from_dict(
+        cls, path: str | Path, name: str, data: Mapping[str, Any], gaits: int, labels: int, highest: float
+    ) -> Limits:
         """The inverse of `to_dict`. In older files without `usual`, it is the highest of the gait's `speeds`.
 
-        gaits, labels: how many there are. highest: the highest value of the channel. Raises ValueError if a
-        key is missing, a shape does not fit these numbers, or a value is not possible.
+        path, name: the file and the name of the channel, for messages. gaits, labels: how many there are.
+        highest: the highest value of the channel. Raises InputError for limits that are not possible.
         """
+        where, arrays = f"limits of {name}: ", {}
         try:
-            levels, speeds = (np.array(data[key], float) for key in ("levels", "speeds"))
-            usual = np.array(data.get("usual", np.max(speeds, axis=(1, 2), initial=0.0)), float)
+            for key in ("levels", "speeds", "usual"):
+                arrays[where + key] = np.array(
+                    np.max(data["speeds"], axis=(1, 2), initial=0.0) if key not in data else data[key], float
+                )
         except (KeyError, TypeError, ValueError, OverflowError):
-            raise ValueError("`levels` and `speeds` have to be tables of numbers") from None
-        shapes = [table.shape for table in (levels, speeds, usual)]
-        if levels.size < 2 or shapes != [(levels.size,), (gaits, labels, levels.size), (gaits,)]:
-            found = "levels {}, speeds {}, usual {}".format(*shapes)
-            raise ValueError(f"shapes do not fit {gaits} gaits and {labels} labels: {found}")
-        if levels[0] != 0 or levels[-1] != highest or not (np.diff(levels) > 0).all():
-            raise ValueError(f"levels do not rise from 0 to {highest:g}")
-        if not ((speeds > 0) & (speeds <= UNLIMITED)).all():
-            raise ValueError(f"speeds are not all above 0 and at most {UNLIMITED:g}")
+            problem = f"{where}`levels` and `speeds` have to be tables of numbers"
+            raise InputError(path, problem) from None
+        declared = {
+            f"{where}levels": ArrayOf(("K",), low=0.0, high=highest),
+            f"{where}speeds": ArrayOf((gaits, labels, "K"), low=1e-9, high=UNLIMITED),
+            f"{where}usual": ArrayOf((gaits,), low=0.0, high=UNLIMITED),
+        }
+        check_arrays(path, arrays, declared)
+        levels, speeds, usual = arrays.values()
+        if levels.size < 2 or levels[0] != 0 or levels[-1] != highest or not (np.diff(levels) > 0).all():
+            raise InputError(path, f"{where}levels do not rise from 0 to {highest:g}")
         if (np.diff(speeds, axis=2) > 0).any():
-            raise ValueError("speeds rise with the level; they must stay the same or fall")
-        if not ((usual >= 0) & (usual <= UNLIMITED)).all():
-            raise ValueError(f"usual speeds are not all from 0 to {UNLIMITED:g}")
+            raise InputError(path, f"{where}speeds rise with the level; they must stay the same or fall")
         return cls(levels, speeds, usual)
 
 
@@ -121,21 +127,19 @@ def combine_limits(limits: Sequence[Array], usual: Array) -> Array:
     return np.where(lowest < usual, usual * np.prod(shares, axis=0), lowest)
 
 
-@dataclass(frozen=True)
-class _Cycles:
+class _Cycles(NamedTuple):
     """N gait cycles of one clip.
 
-    gait: (N,) index of the main gait. speed: (N,) mean speed, cm a frame. ahead: (N,) mean forward speed, cm
-    a frame; negative: backwards. values: (N, L) mean value of each label, 0 if it is below FAINT. number:
-    (N,) number of the cycle in the clip. others: (N,) bool, whether another channel has a value above 0.
+    number: (N,) number of the cycle in the clip. gait: (N,) index of the main gait. speed: (N,) mean speed,
+    cm a frame. ordinary: (N,) bool, whether the body moves forward and no other channel has a value above 0.
+    values: (N, L) mean value of each label, 0 if it is below FAINT.
     """
 
+    number: np.ndarray
     gait: np.ndarray
     speed: Array
-    ahead: Array
+    ordinary: np.ndarray
     values: Array
-    number: np.ndarray
-    others: np.ndarray
 
 
 class LimitLearner:
@@ -168,31 +172,23 @@ class LimitLearner:
         cycle in the clip. others: (R,) bool, whether another channel has a value above 0. source: if the clip
         is a hurt version, the name of the clip from which it was computed.
         """
-        numbers, of_row, count = np.unique(cycle, return_inverse=True, return_counts=True)
-
-        def mean(rows: Array) -> Array:
-            """(N,) the mean of `rows` (R,) in each cycle."""
-            return np.asarray(np.bincount(of_row, rows, len(numbers)) / np.maximum(count, 1))
-
-        # Rows sorted by cycle, and where each cycle starts among them: `reduceat` needs consecutive rows.
-        order = np.argsort(of_row, kind="stable")
-        starts = np.cumsum(count) - count
-        highest = np.maximum.reduceat(values[order], starts) if len(order) else values
-        lowest = np.minimum.reduceat(values[order], starts) if len(order) else values
-        shares = np.stack([mean(column) for column in gait.T], axis=1)
-        means = np.stack([mean(column) for column in values.T], axis=1)
+        order = np.argsort(cycle, kind="stable")
+        numbers, starts, count = np.unique(cycle[order], return_index=True, return_counts=True)
+        table = np.column_stack([np.hypot(*velocity.T), velocity[:, 1], others, gait, values])[order]
+        means = np.add.reduceat(table, starts) / count[:, None]
+        speed, ahead, others = means[:, :3].T
+        shares, value = np.split(means[:, 3:], [self.gaits], axis=1)
         cycles = _Cycles(
-            shares.argmax(axis=1),
-            mean(np.hypot(velocity[:, 0], velocity[:, 1])),
-            mean(velocity[:, 1]),
-            np.where(means < FAINT * self.highest, 0.0, means),
-            numbers,
-            mean(others.astype(float)) > 0,
+            number=numbers,
+            gait=shares.argmax(axis=1),
+            speed=speed,
+            ordinary=(ahead >= AHEAD * speed) & (others == 0),
+            values=np.where(value < FAINT * self.highest, 0.0, value),
         )
+        highest, lowest = (f.reduceat(values[order], starts) for f in (np.maximum, np.minimum))
         # Only cycles with one main gait and with steady values.
         keep = (shares.max(axis=1) > 0.5) & ((highest - lowest).max(axis=1) <= STEADY * self.highest)
-        kept = _Cycles(**{name: getattr(cycles, name)[keep] for name in vars(cycles)})
-        self._clips[clip] = (source, kept)
+        self._clips[clip] = source, _Cycles(*(part[keep] for part in cycles))
 
     def learn(self) -> Limits | None:
         """The limits, or None if no cycle with a value above 0 can be compared with a healthy one.
@@ -235,8 +231,7 @@ class LimitLearner:
         """(n, 2) index of the gait, and speed, of each forward cycle in which all channels are 0."""
         found = [np.zeros((0, 2))]
         for _, cycles in self._clips.values():
-            neutral = ~cycles.values.any(axis=1) & ~cycles.others
-            kept = neutral & (cycles.ahead >= AHEAD * cycles.speed) & (cycles.speed > MOVING)
+            kept = cycles.ordinary & ~cycles.values.any(axis=1) & (cycles.speed > MOVING)
             found.append(np.stack([cycles.gait[kept], cycles.speed[kept]], axis=1))
         return np.concatenate(found)
 
@@ -257,14 +252,12 @@ class LimitLearner:
                 speed_of = dict(zip(origin.number.tolist(), source_speed.tolist(), strict=True))
                 healthy_speed = np.array([speed_of.get(n, 0.0) for n in cycles.number.tolist()])
             else:  # without a source, only forward cycles without values in other channels can be compared
-                comparable = (cycles.ahead >= AHEAD * cycles.speed) & ~cycles.others
-                healthy_speed = np.where(comparable, usual[cycles.gait], 0.0)
+                healthy_speed = np.where(cycles.ordinary, usual[cycles.gait], 0.0)
             kept = changed & (healthy_speed > MOVING)
             share = np.clip(cycles.speed[kept] / healthy_speed[kept], SLOWEST, 1.0)
             parts.append((cycles.gait[kept], share, cycles.values[kept]))
-        if not parts:
-            return np.zeros(0, int), np.zeros(0), np.zeros((0, len(self.counterparts)))
-        gait, share, values = (np.concatenate(column) for column in zip(*parts, strict=True))
+        nothing = np.zeros(0, int), np.zeros(0), np.zeros((0, len(self.counterparts)))
+        gait, share, values = (np.concatenate(column) for column in zip(nothing, *parts, strict=True))
         return gait, share, values
 
 
@@ -286,6 +279,12 @@ def _cycles_of_label(label: int, values: Array, across: np.ndarray) -> Sequence[
     return [(indices, values[indices, k]) for indices, k in zip(cycles, sides, strict=True)]
 
 
+def _between_levels(levels: Array, values: Array) -> tuple[np.ndarray, Array]:
+    """The index of the level below each value, and how far the value is from it to the next level, 0 to 1."""
+    below = np.clip(np.searchsorted(levels, values, side="right") - 1, 0, len(levels) - 2)
+    return below, (values - levels[below]) / (levels[below + 1] - levels[below])
+
+
 def _fit_shares(levels: Array, values: Array, shares: Array, expected: Array) -> Array:
     """(K,) shares of the healthy speed at `levels` (K,), fitted to n cycles by least squares.
 
@@ -293,8 +292,7 @@ def _fit_shares(levels: Array, values: Array, shares: Array, expected: Array) ->
     levels are interpolated. The first share is 1, and the shares never rise with the level. expected: (K,)
     share at each level, which counts as much as EXPECTED_WEIGHT cycles there.
     """
-    below = np.clip(np.searchsorted(levels, values, side="right") - 1, 0, len(levels) - 2)
-    weight = (values - levels[below]) / (levels[below + 1] - levels[below])
+    below, weight = _between_levels(levels, values)
     basis = np.zeros((len(values), len(levels)))  # basis @ (shares at the levels) = shares in the cycles
     rows = np.arange(len(values))
     basis[rows, below], basis[rows, below + 1] = 1 - weight, weight

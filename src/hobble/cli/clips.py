@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from hobble.channels.injury.status import FPS, InjurySpell, Status, parse_links, write_status
-from hobble.channels.injury.table import skeleton_links, write_statuses
+from hobble.channels.injury.table import write_statuses
 from hobble.cli.command import (
     Command,
     Message,
@@ -231,7 +231,7 @@ def hurt(options: argparse.Namespace) -> int:
 
     The clips are retargeted to the skeleton holden31, which has the links. Severities are 0 to 10.
     """
-    links = skeleton_links(find_skeleton(SKELETON))
+    links = load_skeleton(find_skeleton(SKELETON)).skeleton.link_names
     pairs = parse_links(options.injury, links, "--injury")
     values = dict(pairs)
 
@@ -289,7 +289,7 @@ def injury(options: argparse.Namespace) -> int:
     the last. FOLDER has the clips' BVH files. For each clip of the table, the command writes a file
     CLIP_injuries.txt beside the clip's BVH file, where the workflow looks for it.
     """
-    links = skeleton_links(find_skeleton(options.skeleton))
+    links = load_skeleton(find_skeleton(options.skeleton)).skeleton.link_names
     paths = [str(path) for path in write_statuses(options.table, options.folder, links)]
     print_result(options, paths, "\n".join(paths))
     return 0

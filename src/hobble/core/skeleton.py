@@ -310,3 +310,15 @@ def aim_bone(rotation: Array, bone: Array, direction: Array) -> Array:
     in the joint's own axes. direction: (..., 3) in the world. Returns the new world rotation (..., 4).
     """
     return quat.mul(quat.between(quat.rotate(rotation, bone), direction), rotation)
+
+
+def bone_axes(along: Array, side: Array) -> Array:
+    """(..., 3, 3) rotation matrix of a bone that points along Y and bends about X.
+
+    along: (..., 3) direction of the bone's Y axis. side: (..., 3) approximate direction of its X axis, of any
+    length; it must not be parallel to `along`.
+    """
+    y = along / np.linalg.norm(along, axis=-1, keepdims=True)
+    x = side - y * np.sum(side * y, axis=-1, keepdims=True)
+    x = x / np.maximum(np.linalg.norm(x, axis=-1, keepdims=True), 1e-9)
+    return np.stack([x, y, np.cross(x, y)], axis=-1)

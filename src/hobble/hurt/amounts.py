@@ -11,8 +11,8 @@ these people.
 from __future__ import annotations
 
 import functools
-from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -26,9 +26,11 @@ CURVES = ("trunk_forward", "trunk_left", "pelvis_left_up", "pelvis_turn_left", "
 HARMONICS = 2  # a profile has the mean and this many harmonics of each curve
 
 
-@dataclass(frozen=True)
-class Profile:
-    """A walk with an impairment of the right leg, compared with the same people's normal walk.
+@functools.cache
+def read_profiles() -> dict[str, dict[str, Any]]:
+    """The profiles in PROFILES_FILE by name: antalgic, stiff_legged, steppage, trendelenburg, lurch.
+
+    A profile is a walk with an impairment of the right leg, compared with the same people's normal walk.
 
     Ratios of the impaired walk to the normal walk: speed; stride (time of a cycle); step_hurt, step_sound
     (length of the step onto the hurt and onto the sound foot); knee (range of the hurt knee's flexion);
@@ -40,29 +42,8 @@ class Profile:
     harmonic. The curve begins when the hurt foot lands. Its time is warped so that the sound foot lands half
     a cycle later.
     """
-
-    speed: float
-    stride: float
-    strike: float
-    stance_hurt: float
-    stance_sound: float
-    step_hurt: float
-    step_sound: float
-    width: float
-    knee: float
-    arm_hurt: float
-    arm_sound: float
-    curves: dict[str, list[float]]
-
-    def harmonics(self) -> Array:
-        """(5, 1 + 2 * HARMONICS) the values of `curves`: one row for each of CURVES."""
-        return np.array([self.curves[name] for name in CURVES])
-
-
-@functools.cache
-def read_profiles() -> dict[str, Profile]:
-    """The profiles in PROFILES_FILE by name: antalgic, stiff_legged, steppage, trendelenburg, lurch."""
-    return {name: Profile(**values) for name, values in read_json(PROFILES_FILE)["profiles"].items()}
+    profiles: dict[str, dict[str, Any]] = read_json(PROFILES_FILE)["profiles"]
+    return profiles
 
 
 # How much a hurt part of the body changes the motion at severity 10.
@@ -154,7 +135,7 @@ def changes_of_hurt_part(part: str) -> dict[str, float | Array]:
     `arm_sound`: ratios of each arm's swing. `off`, `off_sound`, `land_sound`: cycles by which a foot leaves
     or lands later. `step`: ratio of the length of the step onto the hurt foot, minus the ratio that speed and
     stride time alone would give. `width`: leg lengths by which steps are wider. `curves`: (5, 5) factors of
-    CURVES, as described in `Profile` of `hobble.hurt.amounts`.
+    CURVES, as described in `read_profiles`.
     """
     changes = dict(ADDED_CHANGES[part])
     out: dict[str, float | Array] = {"curves": np.zeros((len(CURVES), 1 + 2 * HARMONICS))}
@@ -162,9 +143,10 @@ def changes_of_hurt_part(part: str) -> dict[str, float | Array]:
         profiles = [(share, read_profiles()[name]) for name, share in mix.items()]
 
         def mixed(name: str) -> float:
-            return float(sum(share * getattr(profile, name) for share, profile in profiles))
+            return float(sum(share * profile[name] for share, profile in profiles))
 
-        curves = CURVE_FACTOR.get(part, 1.0) * np.sum([s * p.harmonics() for s, p in profiles], axis=0)
+        harmonics = [share * np.array([p["curves"][name] for name in CURVES]) for share, p in profiles]
+        curves = CURVE_FACTOR.get(part, 1.0) * np.sum(harmonics, axis=0)
         # How far pelvis and shoulders turn is the change `turn`.
         curves[CURVES.index("pelvis_turn_left") :, 1:] = 0.0
         # The ratio of the stride's length is the product of the ratios of speed and stride time.

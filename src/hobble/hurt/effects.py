@@ -101,24 +101,19 @@ HELD_ARM_OF_PART = {"shoulder": "upper", "upper arm": "upper", "forearm": "fore"
 class Effects:
     """The changes of each of F frames of a clip, named as in `hobble.hurt.amounts`.
 
-    body_changes: name -> (F,). side_changes: name -> (F, 2), left and right. curves: (F, 5, 5) factors of
-    CURVES, as in `Profile` of `hobble.hurt.amounts`. strength: (F,) of the worst link, 0 to
-    1 (see STRENGTH_POWER). shown_severity: (F, L) severities of the L links, as the motion shows them: after
-    a change of the requested severity they follow over about a second.
+    changes: name -> (F,) for changes of the WHOLE_BODY, (F, 2), left and right, for SIDED ones. curves:
+    (F, 5, 5) factors of CURVES, as in `read_profiles` of `hobble.hurt.amounts`. shown_severity: (F, L)
+    severities of the L links, as the motion shows them: after a change of the requested severity they follow
+    over about a second.
     """
 
-    body_changes: dict[str, Array] = field(repr=False)
-    side_changes: dict[str, Array] = field(repr=False)
+    changes: dict[str, Array] = field(repr=False)
     curves: Array = field(repr=False)
-    strength: Array = field(repr=False)
     shown_severity: Array = field(repr=False)
 
     def ratio(self, name: str) -> Array:
         """A change of RATIOS (`hobble.hurt.amounts`) as a ratio to the healthy clip: (F,) or (F, 2)."""
-        return np.maximum(
-            1.0 + (self.body_changes[name] if name in self.body_changes else self.side_changes[name]),
-            LEAST_RATIO,
-        )
+        return np.maximum(1.0 + self.changes[name], LEAST_RATIO)
 
 
 def effects_of_severities(
@@ -134,8 +129,8 @@ def effects_of_severities(
     strength = gaussian(
         (np.clip(severity, 0, HIGHEST_SEVERITY) / HIGHEST_SEVERITY) ** STRENGTH_POWER, SETTLING_SECONDS * fps
     )
-    body = {name: _Sum(np.zeros(frames)) for name in WHOLE_BODY}
-    sided = {name: _Sum(np.zeros((frames, 2))) for name in SIDED}
+    sums = {name: _Sum(np.zeros(frames)) for name in WHOLE_BODY}
+    sums |= {name: _Sum(np.zeros((frames, 2))) for name in SIDED}
     curves = _Sum(np.zeros((frames, 5, 5)))
     parts: dict[tuple[str, int | None], Array] = {}
     for link, column in zip(skeleton.links, strength.T, strict=True):
@@ -146,10 +141,17 @@ def effects_of_severities(
     guarded = np.broadcast_to(np.clip(guarding, 0.0, 1.0) ** GUARD_POWER, frames)
 
     def add(name: str, values: Array, side: int | None) -> None:
+        """Add values (F,) of a change to its sum. side: the hurt side."""
         if name in WHOLE_BODY:
-            body[name].add(values)
+            sums[name].add(values)
+            return
+        both = np.zeros((frames, 2))
+        if name == "arms":  # the change "arm" of both sides
+            name, both = "arm", both + values[:, None]
         else:
-            _add_sided(sided, name, values, side)
+            hurt = RIGHT if side is None else side  # a part on the midline changes both sides alike
+            both[:, 1 - hurt if name.endswith(SOUND_SUFFIX) else hurt] = values
+        sums[name.removesuffix(SOUND_SUFFIX)].add(both)
 
     for (part, side), part_strength in parts.items():
         if not part_strength.any():
@@ -167,32 +169,10 @@ def effects_of_severities(
                 for each in sides:
                     add(name, share * guarded * part_strength * amount, each)
         if part in HELD_ARM_OF_PART and side is not None:
-            _add_sided(sided, HELD_ARM_OF_PART[part], part_strength, side)
-    return Effects(
-        {name: total.value() for name, total in body.items()},
-        {name: total.value() for name, total in sided.items()},
-        curves.value(),
-        strength.max(axis=1, initial=0.0),
-        _shown_severity(strength),
-    )
-
-
-def _shown_severity(strength: Array) -> Array:
-    """The severities (F, L) of strengths (F, L). Severities below LEAST_SEVERITY become 0."""
-    severity = np.round(HIGHEST_SEVERITY * np.clip(strength, 0.0, 1.0) ** (1 / STRENGTH_POWER), 3)
-    return np.where(severity < LEAST_SEVERITY, 0.0, severity)
-
-
-def _add_sided(sided: dict[str, _Sum], name: str, values: Array, side: int | None) -> None:
-    """Add values (F,) of a change to the sum of the side that it changes. side: the hurt side."""
-    if name == "arms":  # the change "arm" of both sides
-        sided["arm"].add(np.stack([values, values], axis=1))
-        return
-    hurt = RIGHT if side is None else side  # a part on the midline has the same changes for both sides
-    changed_side = 1 - hurt if name.endswith(SOUND_SUFFIX) else hurt
-    both = np.zeros((len(values), 2))
-    both[:, changed_side] = values
-    sided[name.removesuffix(SOUND_SUFFIX)].add(both)
+            add(HELD_ARM_OF_PART[part], part_strength, side)
+    shown = np.round(HIGHEST_SEVERITY * np.clip(strength, 0.0, 1.0) ** (1 / STRENGTH_POWER), 3)
+    shown = np.where(shown < LEAST_SEVERITY, 0.0, shown)
+    return Effects({name: total.value() for name, total in sums.items()}, curves.value(), shown)
 
 
 def _curves_of_side(curves: Array, side: int | None) -> Array:

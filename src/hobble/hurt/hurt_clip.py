@@ -168,9 +168,9 @@ def _desired_reach(leg: Leg, changes: Effects, source: HealthyClip, timing: Timi
     (`vault`), which lifts the hips.
     """
     when, other_when = timing.leg_frames[:, side], timing.leg_frames[:, 1 - side]
-    crouch = np.radians(changes.side_changes["crouch"][:, side]) * (1 - source.swing_curve[:, side])
+    crouch = np.radians(changes.changes["crouch"][:, side]) * (1 - source.swing_curve[:, side])
     bend = interpolate_values(knee_flexion(leg.reach, leg.thigh_length, leg.shank_length) + crouch, when)
-    source_vault = np.clip(changes.side_changes["vault"][:, side], 0.0, 1.0) * source.swing_curve[:, 1 - side]
+    source_vault = np.clip(changes.changes["vault"][:, side], 0.0, 1.0) * source.swing_curve[:, 1 - side]
     vault = interpolate_values(source_vault, other_when)
     bend = bend - vault * np.clip(bend - STRAIGHT_KNEE, 0.0, MOST_VAULT)
     changed = (interpolate_values(crouch, when) > 0) | (vault > 0)

@@ -11,7 +11,7 @@ import numpy as np
 from hobble.core import quat
 from hobble.core.clip import Clip
 from hobble.core.quat import Array
-from hobble.core.skeleton import Skeleton, two_bone_knee
+from hobble.core.skeleton import Skeleton, bone_axes, two_bone_knee
 from hobble.core.smooth import gaussian, interpolate_curve, smooth_above, smoothstep
 from hobble.hurt.effects import SIDES, Effects
 from hobble.hurt.healthy_clip import (
@@ -209,7 +209,7 @@ def move_foot(
         _new_footprint(old, stance.middle, source, effects, path, side)
         for old, stance in zip(old_footprints, stances, strict=True)
     ]
-    yaw = quat.yaw(np.radians(OUTWARD_SIGN[side] * effects.side_changes["toe_out"][:, side]))
+    yaw = quat.yaw(np.radians(OUTWARD_SIGN[side] * effects.changes["toe_out"][:, side]))
     ankle, least_ball = np.empty_like(foot.ankle), np.empty(len(source))
     ball = source.clip.positions[:, source.clip.skeleton.role(f"{SIDES[side]}_toe"), 1]
     # Of each stance: height of the ball in the source, cm by which the footprint rises, first and last frame.
@@ -224,7 +224,7 @@ def move_foot(
         ankle[frames] = new + quat.rotate(yaw[frames], foot.ankle[frames] - old)
     along = quat.rotate(yaw, foot.ball - foot.ankle)
     lift = effects.ratio("lift")[:, side]
-    out = effects.side_changes["out"][:, side] * source.leg_length * OUTWARD_SIGN[side]
+    out = effects.changes["out"][:, side] * source.leg_length * OUTWARD_SIGN[side]
     outward = quat.rotate(source.heading, np.array([1.0, 0.0, 0.0])) * out[:, None]
     for i, ((_, off), (land, _)) in enumerate(itertools.pairwise(spans)):
         if land - off < 2:
@@ -278,11 +278,11 @@ def _new_footprint(
     velocity = (
         np.gradient(source.path[near], axis=0)[nearest - near.start] if len(source) > 1 else np.zeros(2)
     )
-    step = effects.side_changes["step"][near]
+    step = effects.changes["step"][near]
     change = interpolate_curve(step[:, side] - step[:, 1 - side], when - near.start)
     # A step lasts half a cycle. Half of its change is made by this foot, the other half by the other foot.
     ahead = change / 2 * velocity * source.cycle_frames[nearest] / 2
-    widening = interpolate_curve(effects.side_changes["width"][near].max(axis=1), when - near.start)
+    widening = interpolate_curve(effects.changes["width"][near].max(axis=1), when - near.start)
     width = widening * source.leg_length / 2
     outward = quat.rotate(source.heading[nearest], np.array([OUTWARD_SIGN[side] * width, 0.0, 0.0]))
     return path.move_point(old, when) + np.array([ahead[0], 0.0, ahead[1]]) + outward
@@ -440,16 +440,5 @@ def _point_bone(world: Array, hinge: Array, bone: Array, along: Array) -> Array:
     bone: (3,) vector of the bone at rest. hinge: (N, 3) axis of the knee in the world. The bone's angle to
     this axis may change, but the bone does not roll against the axis.
     """
-    turn = _bone_axes(along, hinge) @ np.swapaxes(_bone_axes(quat.rotate(world, bone), hinge), -1, -2)
+    turn = bone_axes(along, hinge) @ np.swapaxes(bone_axes(quat.rotate(world, bone), hinge), -1, -2)
     return quat.mul(quat.from_matrix(turn), world)
-
-
-def _bone_axes(along: Array, hinge: Array) -> Array:
-    """(N, 3, 3) the axes of a bone as columns, unit vectors that are orthogonal to each other.
-
-    They are: the hinge without its part along the bone; the direction of the bone; the normal of these two.
-    """
-    y = along / np.linalg.norm(along, axis=-1, keepdims=True)
-    x = hinge - y * np.sum(hinge * y, axis=-1, keepdims=True)
-    x = x / np.maximum(np.linalg.norm(x, axis=-1, keepdims=True), 1e-9)
-    return np.stack([x, y, np.cross(x, y)], axis=-1)

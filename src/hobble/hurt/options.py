@@ -40,8 +40,8 @@ class Hurt(Section):
     seconds: Annotated[float, Field(ge=1, le=3600)] = Field(6.0, description="about how long an injury lasts")
     longest: Annotated[float, Field(gt=0, le=10)] = Field(
         0.9,
-        description="greatest length of a hurt version relative to its healthy clip; a longer version is cut "
-        "off, except if the healthy clip is shorter than 6 seconds",
+        description="greatest length of a hurt version relative to its healthy clip; later gait cycles are "
+        "not used, except if the healthy clip is shorter than 6 seconds",
     )
     in_between: bool = Field(
         True,

@@ -55,7 +55,7 @@ class Timing:
 
 def retime(source: HealthyClip, effects: Effects) -> Timing:
     """Slow the cadence, and shift each foot's landing and leaving within the cycle, as `effects` says."""
-    stride_ratio = 1 + effects.body_changes["stride"] * (1 - (1 - JOG_STRIDE) * source.jog_share)
+    stride_ratio = 1 + effects.changes["stride"] * (1 - (1 - JOG_STRIDE) * source.jog_share)
     cadence_times = np.concatenate([[0.0], np.cumsum((stride_ratio[1:] + stride_ratio[:-1]) / 2)])
     new_cycle = source.cycle_frames * stride_ratio
     new = np.arange(int(cadence_times[-1] + 1e-6) + 1, dtype=float)
@@ -64,8 +64,8 @@ def retime(source: HealthyClip, effects: Effects) -> Timing:
     shares = 1 - (1 - JOG_SHIFT) * source.jog_share
     for side in (LEFT, RIGHT):
         # Delays in new frames, for each source frame.
-        land = _limit_shift(effects.side_changes["land"][:, side]) * shares * new_cycle
-        off = _limit_shift(effects.side_changes["off"][:, side]) * shares * new_cycle
+        land = _limit_shift(effects.changes["land"][:, side]) * shares * new_cycle
+        off = _limit_shift(effects.changes["off"][:, side]) * shares * new_cycle
         events = []
         for stance in source.stances[side]:
             events += [(stance.land, land), (stance.off, off)]

@@ -107,7 +107,7 @@ def _positions_in_trunk(skeleton: Skeleton) -> list[tuple[str, float]]:
 def _added_rotations(source: HealthyClip, effects: Effects) -> tuple[Array, Array, Array]:
     """World rotations to add to pelvis, chest and head, (F, 4) each."""
     phase, known = source.phase, np.clip(source.phase_known, 0.0, 1.0)
-    # The harmonics of the curves, see `Profile` of `hobble.hurt.amounts`. Without steps there is
+    # The harmonics of the curves, see `read_profiles` of `hobble.hurt.amounts`. Without steps there is
     # no phase, so only the mean of each curve counts.
     waves = [np.ones(len(source))]
     for h in range(1, HARMONICS + 1):
@@ -117,17 +117,17 @@ def _added_rotations(source: HealthyClip, effects: Effects) -> tuple[Array, Arra
     # Shorter steps turn pelvis and shoulders less.
     less = effects.ratio("turn") - 1.0
     turn, shoulders = turn + less * _turning(source, "hip"), shoulders + less * _turning(source, "shoulder")
-    side, raised = effects.side_changes["side"], effects.side_changes["list"] * source.swing_curve
+    side, raised = effects.changes["side"], effects.changes["list"] * source.swing_curve
     # As a hurt foot bears weight, which is while the other foot swings, the head nods and the trunk follows.
-    dip = np.sum(effects.side_changes["dip"] * source.swing_curve[:, ::-1], axis=1)
-    forward = forward + effects.body_changes["forward"] + TRUNK_DIP * dip
+    dip = np.sum(effects.changes["dip"] * source.swing_curve[:, ::-1], axis=1)
+    forward = forward + effects.changes["forward"] + TRUNK_DIP * dip
     left = left + side[:, LEFT] - side[:, RIGHT]
     left_up = left_up + raised[:, LEFT] - raised[:, RIGHT]
     pelvis = _turn_and_lean(source, turn, left_up, PELVIS_LEAN * forward)
     chest = _turn_and_lean(source, shoulders, -left, forward)
     rest = 1 - LOOK_AHEAD  # what the head does not undo
     head = _turn_and_lean(
-        source, rest * shoulders, -rest * left, rest * forward + effects.body_changes["nod"] + dip
+        source, rest * shoulders, -rest * left, rest * forward + effects.changes["nod"] + dip
     )
     return pelvis, chest, head
 
@@ -160,9 +160,7 @@ def _hold_arm(source: HealthyClip, effects: Effects, world: Array, side: int) ->
     """
     skeleton = source.clip.skeleton
     # How much the arm is held in each way, (F,) from 0 to 1.
-    weights = {
-        name: np.clip(effects.side_changes[name][:, side], 0.0, 1.0) ** HOLD_POWER for name in HELD_ARMS
-    }
+    weights = {name: np.clip(effects.changes[name][:, side], 0.0, 1.0) ** HOLD_POWER for name in HELD_ARMS}
     weights["carry"] = CARRY_STRENGTH * weights["carry"]
     held = ARM_STILL * np.max(list(weights.values()), axis=0)
     if not held.any():

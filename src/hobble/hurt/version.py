@@ -1,7 +1,7 @@
 """Makes a hurt version of a clip in a data set: decides which links hurt, when, and at which severities.
 
-A link is the bone between two joints. The links are dealt like cards: a card is a link with two severities,
-and the deck holds the cards of all links. Links with large effects have several cards.
+A link is the bone between two joints. The links are dealt like cards from a deck that holds all links. Links
+with large effects are in it several times.
 """
 
 from __future__ import annotations
@@ -9,7 +9,6 @@ from __future__ import annotations
 import itertools
 import math
 import zlib
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -51,80 +50,56 @@ def schedule_severities(
 
     clip: name of the hurt version. version_number: its number among all versions of the data set, from 0.
 
-    The version is divided into stretches. In each stretch the link of the next card hurts, at one severity in
-    the first half and at another in the second half. In a short stretch it has only one of the two. All
-    versions of a data set use the same deck. `version_number` decides with which card a version begins, so
-    that all cards are used about equally often. `clip` and the option `seed` decide which links hurt besides,
-    and which severity a short stretch has. Raises HobbleError for an unknown link.
+    The version is divided into stretches. In each stretch the link of the next card hurts. For half of the
+    stretch it has the highest severity, because a network learns most from it, for the other half another
+    one. In a short stretch it has only one of the two. All versions of a data set use the same deck.
+    `version_number` decides with which card a version begins, so that all cards are used about equally
+    often. `clip` and the option `seed` decide which links hurt besides, and at which severities. Raises
+    HobbleError for an unknown link.
     """
     rng = np.random.default_rng([options.seed, zlib.crc32(clip.encode())])
     deck = _make_deck(skeleton, options)
-    arms = [card for card in deck if part_of_link(skeleton, skeleton.links[card[0]]).name in ARMS]
+    arms = [link for link in deck if part_of_link(skeleton, skeleton.links[link]).name in ARMS]
     out = np.zeros((frames, len(skeleton.links)), np.float32)
     highest = max(options.severities)
     lower_severities = sorted(set(options.severities) - {highest}) or [highest]
     first = int(math.modf((version_number + 1) * GOLDEN)[0] * len(deck))
-    begin = 0
-    for i, length in enumerate(_stretch_lengths(frames, options.seconds * fps)):
+    edges = np.round(np.linspace(0, frames, 1 + _stretch_count(frames, options.seconds * fps))).astype(int)
+    for i, (begin, end) in enumerate(itertools.pairwise(edges.tolist())):
         hurt = [deck[(first + i) % len(deck)]]
         if options.at_once > 1 and rng.random() < FURTHER_LINKS:
-            hurt += [deck[j] for j in rng.permutation(len(deck))[: rng.integers(1, options.at_once)]]
+            hurt += rng.permutation(deck)[: rng.integers(1, options.at_once)].tolist()
         if arms and len(hurt) < options.at_once and rng.random() < ARM_TOO:
-            # The lower severity is drawn anew each time, because the cards of an arm do not have all of them.
-            # A network that never saw an arm at 5 held it there almost as still as at 10.
-            link, first_half, _ = arms[rng.integers(len(arms))]
-            lower = float(rng.choice(lower_severities))
-            hurt += [(link, highest, lower) if first_half == highest else (link, lower, highest)]
-        if length < SECONDS_FOR_TWO * fps:
-            half = begin + length * int(rng.integers(2))  # the whole stretch is the first half, or the second
-        else:
-            half = begin + length // 2
-        # Backwards: if two cards have the same link, the first card counts.
-        for link, first_half, second_half in hurt[::-1]:
-            out[begin:half, link] = first_half
-            out[half : begin + length, link] = second_half
-        begin += length
+            hurt.append(int(rng.choice(arms)))
+        half = (begin + end) // 2
+        if end - begin < SECONDS_FOR_TWO * fps:
+            half = int(rng.choice([begin, end]))  # the whole stretch is the second half, or the first
+        for link in hurt:
+            out[begin:half, link], out[half:end, link] = rng.permutation(
+                [highest, rng.choice(lower_severities)]
+            )
     return out
 
 
-def _make_deck(skeleton: Skeleton, options: Hurt) -> list[tuple[int, float, float]]:
-    """The cards of the data set: (index of a link, severity in the first half, severity in the second half).
-
-    One of the two severities is the highest, because a network learns most from it. For the other severity,
-    the cards of a link take turns with the remaining severities.
-    """
+def _make_deck(skeleton: Skeleton, options: Hurt) -> list[int]:
+    """The cards of the data set: indices of links. The cards of a link are spread evenly over the deck."""
     names = list(skeleton.link_names)
     if unknown := [link for link in options.links if link not in names]:
         raise HobbleError(
             f"hurt.links: skeleton {skeleton.name} has no link {', '.join(unknown)}. "
             f"Its links are {', '.join(names)}."
         )
-    links = [names.index(link) for link in options.links] if options.links else list(range(len(names)))
     rng = np.random.default_rng(options.seed)
-    # (place in the deck, 0 to 1; index of the link; severities in the first and in the second half)
-    cards: list[tuple[float, int, tuple[float, float]]] = []
-    for i in links:
+    places: list[tuple[float, int]] = []  # place in the deck, 0 to 1, and link
+    for i in (names.index(link) for link in options.links or names):
         count = CARDS_OF_PART.get(part_of_link(skeleton, skeleton.links[i]).name, 1)
-        values = sorted(options.severities, reverse=True)
-        others = [values[j] for j in 1 + rng.permutation(len(values) - 1)] or values
-        start = rng.random()
-        for n in range(count):
-            pair = (values[0], others[n % len(others)])
-            # The cards of a link are spread over the deck, so that a clip does not get only this link.
-            cards.append((math.modf(start + n / count)[0], i, pair if n % 2 == 0 else pair[::-1]))
-    return [(i, *pair) for _, i, pair in sorted(cards)]
+        places += [((rng.random() / count + n / count), i) for n in range(count)]
+    return [i for _, i in sorted(places)]
 
 
-def _stretch_lengths(frames: int, length: float) -> list[int]:
-    """Divide `frames` frames into stretches of about `length` frames. Returns the length of each stretch."""
-    count = max(1, math.floor(frames / length + 1 - LEAST_REST))
-    edges = np.round(np.linspace(0, frames, count + 1)).astype(int)
-    return [int(n) for n in np.diff(edges)]
-
-
-# Makes a hurt version of a clip in a data set.
-#
-# It chooses the severities, lets `hobble.hurt.hurt_clip` change the motion, and limits the version's length.
+def _stretch_count(frames: int, length: float) -> int:
+    """Into how many stretches of about `length` frames a version of `frames` frames is divided."""
+    return max(1, math.floor(frames / length + 1 - LEAST_REST))
 
 
 SEVERITY_TOLERANCE = 0.5  # a severity counts as a requested severity if they differ by at most this
@@ -159,44 +134,28 @@ def hurt_version(
         margins=report.margins,
         guarding=guarding_of_clip(name),
     )
+    frames = len(hurt.clip)
+    unused = np.zeros(frames, bool)
     if not options.in_between:
-        hurt = leave_out_other_severities(hurt, options.severities, report)
+        allowed = np.array([0.0, *options.severities])
+        away = np.abs(hurt.severity[..., None] - allowed).min(axis=-1)
+        unused = (away > SEVERITY_TOLERANCE).any(axis=1)
     if len(clip) >= UNCUT_SECONDS * clip.fps:
-        hurt = cut_to_length(hurt, round(options.longest * len(clip)), report)
-    _, dropped = find_cycles(hurt.labels.footsteps, len(hurt.clip), report.phase_zero, report.margins)
-    return hurt, replace(report, clip=name, cycles_dropped=dropped)
+        unused |= np.arange(frames) >= options.longest * len(clip)
+    return leave_out(hurt, unused, replace(report, clip=name))
 
 
-def leave_out_other_severities(hurt: HurtClip, severities: Sequence[float], report: LabelReport) -> HurtClip:
-    """Leave out the cycles in which the severity of a link is neither 0 nor one of `severities`.
+def leave_out(hurt: HurtClip, unused: np.ndarray, report: LabelReport) -> tuple[HurtClip, LabelReport]:
+    """Leave out the cycles with frames that are `unused`, (N,) bool. Returns the clip and the report.
 
     The frames stay, but the labels no longer list these cycles. Their footsteps are marked as unused, so that
     the labels of the mirrored clip lack these cycles, too. Such a mark may also leave out the cycle before
     (see `hobble.labels.phase`).
     """
-    allowed = np.array([0.0, *severities])
-    other = (np.abs(hurt.severity[..., None] - allowed).min(axis=-1) > SEVERITY_TOLERANCE).any(axis=1)
     footsteps = hurt.labels.footsteps.copy()  # a row holds a right landing, a left landing and a mark
     for row, following in itertools.pairwise(footsteps):
         if np.isfinite(row[0]) and np.isfinite(following[0]):
-            row[2] = max(row[2], float(other[whole_frame(row[0]) : whole_frame(following[0]) + 1].any()))
-    cycles, _ = find_cycles(footsteps, len(hurt.clip), report.phase_zero, report.margins)
-    return replace(hurt, labels=replace(hurt.labels, footsteps=footsteps, cycles=cycles))
-
-
-def cut_to_length(hurt: HurtClip, frames: int, report: LabelReport) -> HurtClip:
-    """The first `frames` frames of a hurt clip, or the whole clip if it is not longer."""
-    if frames >= len(hurt.clip):
-        return hurt
-    clip, labels = hurt.clip, hurt.labels
-    footsteps = labels.footsteps.copy()
-    landings = footsteps[:, :2]  # a view, so the next line changes `footsteps`
-    landings[landings > frames - 1] = np.nan
-    # Drop rows that have lost their landings. Keep rows that had none before: they end bouts of walking.
-    ends_bout = np.isnan(labels.footsteps[:, :2]).all(axis=1)
-    footsteps = footsteps[ends_bout | ~np.isnan(landings).all(axis=1)]
-    cycles, _ = find_cycles(footsteps, frames, report.phase_zero, report.margins)
-    cut = {name: getattr(labels, name)[:frames] for name in ("contacts", "phase", "phase_known", "gait")}
-    short = replace(labels, **cut, footsteps=footsteps, cycles=cycles)
-    part = clip.part(slice(frames))
-    return HurtClip(part, hurt.severity[:frames], short, hurt.source_frames[:frames])
+            row[2] = max(row[2], float(unused[whole_frame(row[0]) : whole_frame(following[0]) + 1].any()))
+    cycles, dropped = find_cycles(footsteps, len(hurt.clip), report.phase_zero, report.margins)
+    labels = replace(hurt.labels, footsteps=footsteps, cycles=cycles)
+    return replace(hurt, labels=labels), replace(report, cycles_dropped=dropped)

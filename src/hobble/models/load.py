@@ -219,12 +219,8 @@ def _read_limits(path: str | Path, meta: Meta, channels: Mapping[str, tuple[str,
     for name, table in meta.limits.items():
         if name not in channels:
             raise InputError(path, f"has limits of {name!a:.40}, which is not one of its channels")
-        try:
-            limits[name] = Limits.from_dict(
-                table, len(meta.gaits), len(channels[name]), channel(name).highest
-            )
-        except ValueError as error:
-            raise InputError(path, f"limits of {name}: {error}") from None
+        sizes = len(meta.gaits), len(channels[name])
+        limits[name] = Limits.from_dict(path, name, table, *sizes, channel(name).highest)
     return limits
 
 

@@ -7,7 +7,7 @@ from scipy.ndimage import gaussian_filter1d
 
 from hobble.core import quat
 from hobble.core.quat import Array
-from hobble.core.skeleton import Skeleton, local_rotations, two_bone_knee
+from hobble.core.skeleton import Skeleton, bone_axes, local_rotations, two_bone_knee
 from hobble.core.smooth import smooth_above
 from hobble.synthetic.feet import FootPoses
 from hobble.synthetic.plan import Ground, PlannedPath, flat
@@ -184,21 +184,11 @@ def _set_leg(skeleton: Skeleton, world: Array, root: Array, foot: FootPoses, sid
     upper, lower = leg_lengths(skeleton, name)
     knee, ankle = two_bone_knee(hip_joint, foot.ankle, knee_direction, upper, lower)
     side_axis = np.cross(hip_joint - ankle, knee_direction)
-    world[:, skeleton.index(f"{name}UpLeg")] = _bone_rotation(hip_joint - knee, side_axis)
-    world[:, skeleton.index(f"{name}Leg")] = _bone_rotation(knee - ankle, side_axis)
+    # A bone of the leg hangs down (-Y) at rest and bends about its X axis.
+    for joint, up in (("UpLeg", hip_joint - knee), ("Leg", knee - ankle)):
+        world[:, skeleton.index(f"{name}{joint}")] = quat.from_matrix(bone_axes(up, side_axis))
     world[:, skeleton.index(f"{name}Foot")] = foot.foot
     world[:, skeleton.index(f"{name}ToeBase")] = foot.toes
-
-
-def _bone_rotation(up: Array, side_axis: Array) -> Array:
-    """(F, 4) world rotation of a bone that hangs down (-Y) at rest and bends about its X axis.
-
-    up: (F, 3) direction of the bone's Y axis. side_axis: (F, 3) approximate direction of its X axis.
-    """
-    y = up / np.linalg.norm(up, axis=-1, keepdims=True)
-    x = side_axis - y * np.sum(y * side_axis, axis=-1, keepdims=True)
-    x = x / np.linalg.norm(x, axis=-1, keepdims=True)
-    return quat.from_matrix(np.stack([x, y, np.cross(x, y)], axis=-1))
 
 
 def _set_arm(

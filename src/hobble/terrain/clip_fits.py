@@ -34,7 +34,6 @@ from hobble.terrain.options import FitOptions, HeightSampling
 from hobble.terrain.patches import Patches
 
 log = logging.getLogger("hobble.terrain")
-REMAKE = "Delete the motion and the labels of this clip; the next run makes both again from the same file."
 
 
 @dataclass(frozen=True)
@@ -78,17 +77,9 @@ def clip_fits(
 
     labels: `contacts` (F, 4) bool, and `cycles` (C, 2), the first and last frame of each cycle. ground:
     "flat", "rocky", "jumpy" or "beam".
-    Raises InputError if the labels do not belong to the clip, or if there are fewer patches than fits.
     """
     cycles, contacts = np.asarray(labels["cycles"], int), np.asarray(labels["contacts"], bool)
     window = sampling.window
-    _check_labels(clip, cycles, contacts)
-    if len(patches) < options.fits:
-        raise InputError(
-            "terrain.patches",
-            f"{len(patches)} patches are fewer than the {options.fits} fits of a cycle",
-            fix="Raise terrain.patches or lower terrain.fits.",
-        )
     root = extend_root(root_frames(clip, sampling.facing_sigma), window)
     samples = sample_points(root, sampling.terrain_side)
     feet = _standing_feet(clip, contacts, cycles, window, ground == "flat", options)
@@ -105,7 +96,7 @@ def clip_fits(
         if c in shown and np.any(heights[-1]):
             pictures.append(make_picture(clip, c, fit, feet, around))
     frame, cycle = _frame_and_cycle_of_rows(cycles)
-    fits = ClipFits(
+    return ClipFits(
         frame=frame,
         cycle=cycle,
         fits=np.array([len(fit.chosen) for fit, _, _ in fitted], np.int32)[cycle],
@@ -115,24 +106,6 @@ def clip_fits(
         toe_height=feet.toe_height,
         pictures=tuple(pictures),
     )
-    _warn_if_off_ground(clip.name, fits, options.deepest)
-    return fits
-
-
-def _warn_if_off_ground(name: str, fits: ClipFits, deepest: float | None) -> None:
-    """Log a warning if the ground does not meet the feet. deepest: cm; None: log nothing.
-
-    The ground does not meet the feet if the mean distance of feet in contact from it is more than `deepest`,
-    or if any foot is more than `deepest` below it.
-    """
-    if deepest is None or not len(fits.patch):
-        return
-    mean, below = float(fits.foot_error[..., 0].mean()), float(fits.foot_below.max())
-    if max(mean, below) > 1.001 * deepest:  # the factor allows for rounding
-        text = (
-            "%s: on average, feet in contact are %.2f cm from the ground; the lowest foot is %.2f cm below it"
-        )
-        log.warning(text, name, mean, below)
 
 
 def _standing_feet(
@@ -233,24 +206,6 @@ def _frame_and_cycle_of_rows(cycles: np.ndarray) -> tuple[np.ndarray, np.ndarray
         np.concatenate([nothing, *frames]).astype(np.int32),
         np.concatenate([nothing, *numbers]).astype(np.int32),
     )
-
-
-def _check_labels(clip: Clip, cycles: np.ndarray, contacts: Mask) -> None:
-    """Raise InputError if contacts or cycles do not match the frames of the clip."""
-    if contacts.shape != (len(clip), 4):
-        raise InputError(
-            clip.name,
-            f"the contacts have shape {contacts.shape}, but the clip has {len(clip)} frames",
-            fix=REMAKE,
-        )
-    for start, end in cycles:
-        if not 0 <= start < end < len(clip):
-            raise InputError(
-                clip.name,
-                f"a cycle has frames {start} to {end}, but the clip has {len(clip)} frames",
-                frame=int(start),
-                fix=REMAKE,
-            )
 
 
 def save_fits(path: str | Path, fits: ClipFits) -> None:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from hobble.core.clip import Clip
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton, rest_positions
+from hobble.core.smooth import true_runs
 from hobble.terrain.options import FitOptions
 from hobble.terrain.patches import FootPoints, Patches, best_patches
 
@@ -93,43 +94,20 @@ WALL_STEEPNESS = 2.0  # least steepness of the walls of a pit, cm per cm
 MAX_REFITS = 8
 
 
-@dataclass(frozen=True)
-class Stances:
-    """Positions of soles, gathered into N points, for example one for each contact of a foot joint.
-
-    place: (N, 2) x and z, cm. height: (N,) of the sole, cm. count: (N,) number of frames of each point, which
-    is its weight.
-    """
-
-    place: Array = field(repr=False)
-    height: Array = field(repr=False)
-    count: Array = field(repr=False)
-
-
-def gather_stances(soles: Array, contacts: Mask, longest: int) -> Stances:
+def gather_stances(soles: Array, contacts: Mask, longest: int) -> Array:
     """Average the sole of each joint over consecutive frames in contact.
 
-    soles: (T, 4, 3). contacts: (T, 4) bool. longest: at most this many frames become one point;
-    longer contacts are cut into several.
+    soles: (T, 4, 3). contacts: (T, 4) bool. longest: at most this many frames become one point; longer
+    contacts are cut into several. Returns points (N, 4): x, z and height of the sole, cm, and the number of
+    frames of each point, which is its weight.
     """
-    frame, joint = np.nonzero(contacts)
-    order = np.lexsort((frame, joint))
-    frame, joint = frame[order], joint[order]
-    begins = np.ones(len(frame), bool)  # whether a contact begins at this entry
-    begins[1:] = (np.diff(frame) != 1) | (np.diff(joint) != 0)
-    first = np.flatnonzero(begins)
-    contact = np.cumsum(begins) - 1
-    frames_since_begin = np.arange(len(frame)) - first[contact]
-    point = np.cumsum(begins | (frames_since_begin % longest == 0)) - 1
-    count = np.bincount(point)
-    positions = soles[frame, joint]
-    mean = [np.bincount(point, positions[:, k]) / count for k in range(3)]
-    return Stances(np.stack([mean[0], mean[2]], axis=1), mean[1], count.astype(float))
-
-
-def join_points(a: Stances, b: Stances) -> Stances:
-    """The points of `a`, then those of `b`."""
-    return Stances(*(np.concatenate([getattr(one, name) for one in (a, b)]) for name in vars(a)))
+    points = [
+        [*soles[part, joint].mean(axis=0)[[0, 2, 1]], len(soles[part, joint])]
+        for joint in range(4)
+        for start, end in true_runs(contacts[:, joint]).tolist()
+        for part in (slice(f, min(f + longest, end)) for f in range(start, end, longest))
+    ]
+    return np.array(points).reshape(-1, 4)
 
 
 @dataclass(frozen=True)
@@ -145,42 +123,40 @@ class Surface:
 
     def heights_at(self, points: Array) -> Array:
         """Heights (M,) at points (M, 2)."""
-        from hobble.terrain.kernels import distance_sum
-
-        return distance_sum(*_columns(points), *_columns(self.places), self.weights / self.spread)
+        return distances(points, self.places) @ (self.weights / self.spread)
 
 
 def fit_surfaces(
-    points: Stances, residual: Array, smoothing: float, most: float | None = None, standing: int | None = None
+    points: Array, residual: Array, smoothing: float, most: float | None = None, standing: int | None = None
 ) -> list[Surface]:
     """One surface for each row of `residual` (K, N), the heights that it should have at N points, cm.
 
-    smoothing: regularisation. A point with count m has smoothing / m on the diagonal of the system of
-    equations, and the weight m in the mean distance between points. So the surface is exactly that of m
-    points at one place.
+    points: (N, 4) from `gather_stances`. smoothing: regularisation. A point with count m has smoothing / m on
+    the diagonal of the system of equations, and the weight m in the mean distance between points. So the
+    surface is exactly that of m points at one place.
 
     most: largest mean difference, cm, that may be left between a surface and its residual; None: no limit. A
     surface that leaves more is fitted again with less smoothing. This happens, for example, if feet stand
     half a metre beside a beam. standing: the mean is taken over the first `standing` points; None: all.
     """
-    apart = distances(points.place, points.place)
-    spread = float(points.count @ apart @ points.count / points.count.sum() ** 2)
+    places, count = points[:, :2], points[:, 3]
+    apart = distances(places, places)
+    spread = float(count @ apart @ count / count.sum() ** 2)
     if spread < 1e-6:  # all points are at one place, so no surface can be fitted
-        return [Surface(points.place[:1], np.zeros(1), 1.0)] * len(residual)
-    diagonal = smoothing / points.count
-    weights = np.linalg.solve(apart / spread - np.diag(diagonal), residual.T).T
-    share = points.count[:standing] / points.count[:standing].sum()
-    # Indices of the surfaces that may leave too much.
-    refit = np.arange(len(residual)) if most is not None else np.zeros(0, int)
-    for _ in range(MAX_REFITS):
+        return [Surface(places[:1], np.zeros(1), 1.0)] * len(residual)
+    diagonal, weights = smoothing / count, np.zeros_like(residual)
+    share = count[:standing] / count[:standing].sum()
+    refit = np.arange(len(residual))  # indices of the surfaces that are still to be fitted
+    for _ in range(1 + MAX_REFITS):
+        weights[refit] = np.linalg.solve(apart / spread - np.diag(diagonal), residual[refit].T).T
+        if most is None:
+            break
         # The system of equations is surface - diagonal * weights = residual, so diagonal * weights is left.
-        mean_left = np.sum(np.abs(weights[refit] * diagonal)[:, :standing] * share, axis=1)  # cm
-        refit = refit[mean_left > (most or 0.0)]
+        refit = refit[np.sum(np.abs(weights[refit] * diagonal)[:, :standing] * share, axis=1) > most]
         if not len(refit):
             break
         diagonal = diagonal / 4
-        weights[refit] = np.linalg.solve(apart / spread - np.diag(diagonal), residual[refit].T).T
-    return [Surface(points.place, w, spread) for w in weights]
+    return [Surface(places, w, spread) for w in weights]
 
 
 @dataclass(frozen=True)
@@ -196,23 +172,19 @@ class Pits:
 
     def lower(self, ground: Array, points: Array) -> Array:
         """(M,) at points (M, 2): the lowest of the heights `ground` (M,) and the cones."""
-        from hobble.terrain.kernels import lowest_cone
-
-        if not len(self.places):
-            return ground
-        cones = lowest_cone(*_columns(points), *_columns(self.places), self.heights, self.steepness)
-        return np.minimum(ground, cones)
+        cones = self.heights + self.steepness * distances(points, self.places)
+        return np.minimum(ground, cones.min(axis=1, initial=np.inf))
 
 
-def dig_pits(soles: Array, standing: Stances, depth: float) -> Pits:
+def dig_pits(soles: Array, standing: Array, depth: float) -> Pits:
     """Pits that lower the ground until soles (N, 3) are only `depth` cm below it.
 
-    The walls of a pit are so steep that the ground under standing feet nearby is not lowered, for example on
-    the next step of stairs.
+    standing: (M, 4) points of standing feet, from `gather_stances`. The walls of a pit are so steep that the
+    ground under standing feet nearby is not lowered, for example on the next step of stairs.
     """
     places, heights = soles[:, [0, 2]], soles[:, 1] + depth
-    apart = np.maximum(distances(places, standing.place), 1e-3)
-    needed_steepness = ((standing.height - heights[:, None]) / apart).max(axis=1)
+    apart = np.maximum(distances(places, standing[:, :2]), 1e-3)
+    needed_steepness = ((standing[:, 2] - heights[:, None]) / apart).max(axis=1)
     return Pits(places, heights, np.maximum(needed_steepness, WALL_STEEPNESS))
 
 
@@ -220,11 +192,6 @@ def distances(a: Array, b: Array) -> Array:
     """Distances (M, N) between points a (M, 2) and b (N, 2)."""
     x, z = a[:, None, 0] - b[None, :, 0], a[:, None, 1] - b[None, :, 1]
     return np.sqrt(x * x + z * z)
-
-
-def _columns(points: Array) -> tuple[Array, Array]:
-    """The x and z of points (M, 2), each (M,)."""
-    return np.ascontiguousarray(points[:, 0]), np.ascontiguousarray(points[:, 1])
 
 
 # Fits the ground under one cycle: finds the patches that suit it best, and makes them meet the feet.
@@ -335,7 +302,7 @@ def meet_feet(uncorrected: CycleGround, soles: Array, contacts: Mask, options: F
     `deepest` below the ground. If `deepest` is None, one surface is fitted, without a limit.
     """
     standing = gather_stances(soles, contacts, STANCE_FRAMES)
-    residual = standing.height - uncorrected.heights_at(standing.place)
+    residual = standing[:, 2] - uncorrected.heights_at(standing[:, :2])
     smoothing, deepest = options.smoothing, options.deepest
     most = None if deepest is None else deepest / 2
     ground = replace(uncorrected, surfaces=fit_surfaces(standing, residual, smoothing, most))
@@ -344,13 +311,13 @@ def meet_feet(uncorrected: CycleGround, soles: Array, contacts: Mask, options: F
     surfaces = list(ground.surfaces)
     for k, covered in enumerate(ground.height_above_soles(soles) > deepest / 2):
         if covered.any():
-            points = join_points(standing, gather_stances(soles, covered & ~contacts, COVERED_FRAMES))
-            residual = (points.height - uncorrected.heights_at(points.place)[k])[None]
-            (surfaces[k],) = fit_surfaces(points, residual, smoothing, most, len(standing.count))
+            points = np.concatenate([standing, gather_stances(soles, covered & ~contacts, COVERED_FRAMES)])
+            residual = (points[:, 2] - uncorrected.heights_at(points[:, :2])[k])[None]
+            (surfaces[k],) = fit_surfaces(points, residual, smoothing, most, len(standing))
     return _with_pits(replace(uncorrected, surfaces=surfaces), soles, standing, deepest)
 
 
-def _with_pits(ground: CycleGround, soles: Array, standing: Stances, deepest: float) -> CycleGround:
+def _with_pits(ground: CycleGround, soles: Array, standing: Array, deepest: float) -> CycleGround:
     """The ground of each fit with pits for the feet that are more than `deepest` below it.
 
     In a pit the ground is lowered until the foot is only deepest / 2 below it.

@@ -1,4 +1,4 @@
-"""Compiled loops that compute heights and errors of patches, sums of distances, and heights of cones.
+"""Compiled loops that compute heights and errors of patches.
 
 A patch is a view of a heightmap. A cell (u, v) of the patch is counted from its middle, along the world's x
 and z. Its row and column in the heightmap are A (u, v, 1), where A (2, 3) is the affine map of the patch.
@@ -71,78 +71,31 @@ def view_heights(heights, starts, shapes, which, affine, mean, points):
 def check_views(heights, starts, shapes, which, affine, size, highest):
     """Mean height (P,) of P views of `size` x `size` cells, and whether (P,) each view stays near its mean.
 
-    A view passes if all its cells are within `highest` cm of the mean. First only every eighth row and column
-    is read. If the heights there differ by more than 2 * highest, the view does not pass. The rest of it is
-    not read, and its mean is given as 0.
+    A view passes if all its cells are within `highest` cm of the mean. A view is not read to the end once its
+    heights differ by more than 2 * highest; then its mean is given as 0.
     """
     mean = np.zeros(len(which), np.float32)
     passes = np.zeros(len(which), np.bool_)
     half = size // 2
-    seen = np.empty(size * size, np.float32)
     for p in range(len(which)):
         cells, rows, columns = cells_of_map(heights, starts, shapes, which[p])
         a = affine[p]
-        low, high = np.float32(np.inf), np.float32(-np.inf)
-        for i in range(0, size, 8):
-            for j in range(0, size, 8):
-                u, v = np.float32(i - half), np.float32(j - half)
-                r = a[0, 0] * u + a[0, 1] * v + a[0, 2]
-                c = a[1, 0] * u + a[1, 1] * v + a[1, 2]
-                h = height(cells, rows, columns, r, c)
-                low, high = min(low, h), max(high, h)
-        if not high - low <= 2 * highest:
-            continue
-        total = 0.0
-        n = 0
+        low, high, total = np.float32(np.inf), np.float32(-np.inf), 0.0
         for i in range(size):
             for j in range(size):
                 u, v = np.float32(i - half), np.float32(j - half)
                 r = a[0, 0] * u + a[0, 1] * v + a[0, 2]
                 c = a[1, 0] * u + a[1, 1] * v + a[1, 2]
-                seen[n] = height(cells, rows, columns, r, c)
-                total += seen[n]
-                n += 1
-        middle = total / n
-        passes[p] = True
-        for k in range(n):
-            if not abs(seen[k] - middle) <= highest:
-                passes[p] = False
+                h = height(cells, rows, columns, r, c)
+                low, high = min(low, h), max(high, h)
+                total += h
+            if not high - low <= 2 * highest:
                 break
-        mean[p] = middle
+        else:
+            middle = total / (size * size)
+            passes[p] = high - middle <= highest and middle - low <= highest
+            mean[p] = middle
     return mean, passes
-
-
-@njit(fastmath=FAST)
-def distance_sum(x, z, place_x, place_z, weights):
-    """(M,) weighted sum of the distances from each of M points to N places.
-
-    x, z: (M,) of the points. place_x, place_z, weights: (N,) of the places.
-    """
-    out = np.empty(len(x))
-    for m in range(len(x)):
-        total = 0.0
-        for n in range(len(weights)):
-            a, b = x[m] - place_x[n], z[m] - place_z[n]
-            total += weights[n] * np.sqrt(a * a + b * b)
-        out[m] = total
-    return out
-
-
-@njit(fastmath=FAST)
-def lowest_cone(x, z, place_x, place_z, heights, steepness):
-    """(M,) height of the lowest of N cones at each of M points, cm. The cones have the tip at the bottom.
-
-    x, z: (M,) of the points. place_x, place_z, heights: (N,) of the tips, cm. steepness: (N,) rise from the
-    tip, cm per cm.
-    """
-    out = np.empty(len(x))
-    for m in range(len(x)):
-        lowest = np.inf
-        for n in range(len(heights)):
-            a, b = x[m] - place_x[n], z[m] - place_z[n]
-            lowest = min(lowest, heights[n] + steepness[n] * np.sqrt(a * a + b * b))
-        out[m] = lowest
-    return out
 
 
 @njit(fastmath=FAST, forceinline=True, cache=False)
@@ -241,16 +194,6 @@ def _error(heights, rows, columns, a, tables, jumps, limit):
 def _rows_as_tuples(a):
     """The two rows of A, as tuples of numbers."""
     return (a[0, 0], a[0, 1], a[0, 2]), (a[1, 0], a[1, 1], a[1, 2])
-
-
-@njit
-def view_errors(heights, starts, shapes, which, affine, tables, jumps):
-    """The error (P,) of every patch, cm². tables, jumps: see `_error`."""
-    out = np.empty(len(which))
-    for p in range(len(which)):
-        cells, rows, columns = cells_of_map(heights, starts, shapes, which[p])
-        out[p] = _error(cells, rows, columns, _rows_as_tuples(affine[p]), tables, jumps, np.inf)
-    return out
 
 
 @njit

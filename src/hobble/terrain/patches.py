@@ -256,16 +256,6 @@ def best_patches(patches: Patches, footing: FootPoints, count: int) -> tuple[np.
     return found
 
 
-def patch_errors(patches: Patches, footing: FootPoints) -> Array:
-    """The errors (P,) of all patches, cm²; `best_patches` finds the lowest."""
-    from hobble.terrain.kernels import view_errors
-
-    errors: Array = view_errors(  # type: ignore[call-arg]
-        *patches.arrays[:-1], _foot_tables(footing), footing.jumps
-    )
-    return errors
-
-
 def _foot_tables(footing: FootPoints) -> tuple[tuple[Array, ...], ...]:
     """Four tables, each as a tuple of its columns.
 

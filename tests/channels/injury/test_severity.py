@@ -18,7 +18,6 @@ from hobble.channels.injury.status import (
     InjurySpell,
     Status,
     clip_severity,
-    range_warnings,
     read_status,
     severity_matrix,
     source_rows,
@@ -26,7 +25,7 @@ from hobble.channels.injury.status import (
 from hobble.core.clip import Clip
 from hobble.core.errors import InputError
 from hobble.core.files import read_json
-from hobble.core.skeleton import Skeleton
+from hobble.core.skeleton import Skeleton, other_side
 
 THIGH, ARM = "LeftUpLeg-LeftLeg", "LeftArm-LeftForeArm"
 
@@ -49,7 +48,7 @@ def column(holden31: Skeleton, link: str) -> int:
 def test_a_later_line_replaces_an_earlier_one_in_its_frames_and_links():
     first = InjurySpell(1, 8, ((THIGH, 3.0), (ARM, 2.0)), 2)
     later = InjurySpell(5, 9, ((THIGH, 9.0),), 3)
-    out = severity_matrix(Status(10, (first, later)), (THIGH, ARM))
+    out, _ = severity_matrix(Status(10, (first, later)), (THIGH, ARM))
     assert out[:, 0].tolist() == [3, 3, 3, 3, 9, 9, 9, 9, 9, 0]
     assert out[:, 1].tolist() == [2] * 8 + [0, 0]
 
@@ -61,18 +60,11 @@ def test_odd_frame_ranges_are_reported_with_their_lines():
         InjurySpell(11, 14, ((ARM, 4.0),), 4),
         InjurySpell(1, 10, ((ARM, 1.0),), 5),
     )
-    said = range_warnings(Status(10, spells), "walk_injuries.txt")
-    assert [s.split(": ")[0] for s in said] == [
-        "walk_injuries.txt, line 2",
-        "walk_injuries.txt, line 2",
-        "walk_injuries.txt, line 3",
-        "walk_injuries.txt, line 4",
-    ]
-    for sentence, word in zip(
-        said, ("past the last", "starts at 0", "overlaps the range of line 2", "was ignored"), strict=True
-    ):
+    out, said = severity_matrix(Status(10, spells), (THIGH, ARM))
+    words = ("past the last", "starts at 0", "overlaps the range of line 2", "was ignored")
+    for sentence, line, word in zip(said, (2, 2, 3, 4), words, strict=True):
+        assert sentence.startswith(f"line {line}: ")
         assert word in sentence
-    out = severity_matrix(Status(10, spells), (THIGH, ARM))
     assert out.shape == (10, 2)
     assert out[0, 0] == 3
     assert out[-1, 0] == 3
@@ -143,13 +135,7 @@ def test_mirroring_twice_gives_the_same_back(holden31, link, value):
     links = holden31.mirror_links
     once = CHANNEL.mirror(severity, SimpleNamespace(mirror_links=links))
     assert (CHANNEL.mirror(once, SimpleNamespace(mirror_links=links)) == severity).all()
-    name = holden31.link_names[link]
-    other = name.replace("Left", "#").replace("Right", "Left").replace("#", "Right")
-    swap = {"LHipJoint": "RHipJoint", "RHipJoint": "LHipJoint", "LThumb": "RThumb", "RThumb": "LThumb"}
-    for old, new in swap.items():
-        if old in name:
-            other = other.replace(old, new)
-            break
+    other = "-".join(other_side(joint) for joint in holden31.link_names[link].split("-"))
     assert (once[:, holden31.link_names.index(other)] == np.float32(value)).all()
 
 
@@ -175,8 +161,9 @@ def test_saved_values_keep_their_columns_and_the_report_lists_the_injuries(clip,
 def test_severities_equal_the_published_matrices_of_ferre(shared: Path, holden31, name):
     stem = shared / "mocap/ferre" / f"Injured_{name}_extended_converted_injuries"
     status = read_status(stem.with_suffix(".txt"), holden31.link_names)
-    assert (severity_matrix(status, holden31.link_names) == np.loadtxt(stem)).all()
-    assert len(range_warnings(status, stem)) == 1
+    severity, warnings = severity_matrix(status, holden31.link_names)
+    assert (severity == np.loadtxt(stem)).all()
+    assert len(warnings) == 1
 
 
 def test_source_rows_of_a_looped_clip_start_over_with_each_cycle():

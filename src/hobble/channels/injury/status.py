@@ -35,8 +35,6 @@ HIGHEST_SEVERITY = 10.0
 # A file may have at most this many spells. Three minutes at 120 Hz have about as many frames.
 MOST_SPELLS = 20_000
 SPELL_LINE = re.compile(r"(\d{1,12})\s*-\s*(\d{1,12})\s+(.*)")  # first frame, last frame, links
-# At most this many spells may share a frame. Only one of them counts for a link, and warnings compare them.
-MOST_AT_ONCE = 100
 MOST_WARNINGS = 100
 
 
@@ -189,71 +187,46 @@ def parse_severity(path: str | Path, line: int | None, link: str, text: str) -> 
 
 def _similar_links(name: str, links: Sequence[str]) -> str:
     """Advice on a wrong name: the links with similar names, or all links if none is similar."""
+    if not links:
+        return "Name a skeleton that can be hurt, such as holden31."
     near = difflib.get_close_matches(name[:200], links)
     return f"Did you mean {' or '.join(near)}?" if near else f"The links are {', '.join(links)}."
 
 
-def severity_matrix(status: Status, links: Sequence[str]) -> Array:
-    """(status.frames, L) float32 severities, one row for each frame that `status` counts.
+def severity_matrix(status: Status, links: Sequence[str]) -> tuple[Array, list[str]]:
+    """(status.frames, L) float32 severities, one row for each frame that `status` counts, and warnings.
 
     links: the names of the columns. Where spells overlap, the one that comes later in `status` counts for the
-    links that it names.
+    links that it names. There is a warning for each range that starts at 0, goes past the last frame or
+    contradicts an earlier line. Of many warnings, the first MOST_WARNINGS are returned.
     """
     out = np.zeros((status.frames, len(links)), np.float32)
+    line_of = np.zeros(out.shape, np.int32)  # number of the line that set each severity
     column = {link: i for i, link in enumerate(links)}
-    for spell in status.spells:
-        for link, severity in spell.links:
-            out[max(spell.first, 1) - 1 : spell.last, column[link]] = severity
-    return out
-
-
-def range_warnings(status: Status, path: str | Path) -> list[str]:
-    """A warning for each range that starts at 0, goes past the last frame or contradicts an earlier line.
-
-    status: the content of the status file `path`. Of many warnings, the first MOST_WARNINGS are returned, and
-    how many there are. Raises InputError if more than MOST_AT_ONCE ranges share a frame.
-    """
     warnings: list[str] = []
-    overlaps = _overlaps(status.spells, path)
-    for i, spell in enumerate(status.spells):
-        place = f"{Path(path).name}, line {spell.line}: the range {spell.first}-{spell.last}"
+    for spell in status.spells:
+        place = f"line {spell.line}: the range {spell.first}-{spell.last}"
         if spell.first > status.frames:
             warnings.append(f"{place} lies past the last frame ({status.frames}) and was ignored.")
         elif spell.last > status.frames:
             warnings.append(f"{place} goes past the last frame ({status.frames}) and was cut there.")
         if spell.first == 0:
             warnings.append(f"{place} starts at 0. Frames count from 1, so it was taken to start at 1.")
-        for earlier in overlaps.get(i, ()):
-            if links := _conflicting_links(earlier, spell):
-                warnings.append(
-                    f"{place} overlaps the range of line {earlier.line}. The later line counts for {links}."
-                )
-    if more := len(warnings) - MOST_WARNINGS:
-        warnings[MOST_WARNINGS:] = [f"{Path(path).name}: {more} more ranges like these."] * (more > 0)
-    return warnings
-
-
-def _overlaps(spells: Sequence[InjurySpell], path: str | Path) -> dict[int, list[InjurySpell]]:
-    """Index of a spell -> the spells before it in the list that share frames with it, in their order."""
-    found: dict[int, list[int]] = {}  # index of a spell -> indices of such spells
-    lasting: list[int] = []  # indices of spells that last at the first frame of spell i
-    for i in sorted(range(len(spells)), key=lambda i: spells[i].first):
-        lasting = [j for j in lasting if spells[j].last >= spells[i].first]
-        if len(lasting) >= MOST_AT_ONCE:
-            problem = f"more than {MOST_AT_ONCE} ranges share frame {spells[i].first}"
-            raise InputError(
-                path, problem, line=spells[i].line, fix="Leave out those that later lines replace."
+        replaced: dict[int, list[str]] = {}  # number of an earlier line -> links whose severities it loses
+        for link, severity in spell.links:
+            cells = slice(max(spell.first, 1) - 1, spell.last), column[link]
+            if len(warnings) <= MOST_WARNINGS:
+                for number in np.unique(line_of[cells][out[cells] != np.float32(severity)]).tolist():
+                    replaced.setdefault(number, []).append(link)
+            out[cells], line_of[cells] = severity, spell.line or 0
+        for number in sorted(replaced.keys() - {0}):
+            names = ", ".join(replaced[number])
+            warnings.append(
+                f"{place} overlaps the range of line {number}. The later line counts for {names}."
             )
-        for j in lasting:
-            found.setdefault(max(i, j), []).append(min(i, j))
-        lasting.append(i)
-    return {i: [spells[j] for j in sorted(others)] for i, others in found.items()}
-
-
-def _conflicting_links(earlier: InjurySpell, later: InjurySpell) -> str:
-    """The links for which two overlapping spells give different severities, separated by commas."""
-    earlier_values = dict(earlier.links)
-    return ", ".join(link for link, severity in later.links if earlier_values.get(link, severity) != severity)
+    if len(warnings) > MOST_WARNINGS:
+        warnings[MOST_WARNINGS:] = ["there are more ranges like these."]
+    return out, warnings
 
 
 def clip_severity(
@@ -275,7 +248,7 @@ def clip_severity(
     if status is not None:
         where = f"status of {clip.name} in the data set's configuration"
         whole_clip = InjurySpell(1, len(clip), parse_links(status, links, where))
-        return severity_matrix(Status(len(clip), (whole_clip,)), links), []
+        return severity_matrix(Status(len(clip), (whole_clip,)), links)
     if status_file is None:
         return np.zeros((len(clip), len(links)), np.float32), []
     file_status = read_status(status_file, links)
@@ -287,14 +260,14 @@ def clip_severity(
             line=1,
             fix="Write the number of frames of the BVH file, at its own rate, and check the ranges.",
         )
-    warnings = range_warnings(file_status, status_file)
+    rows, warnings = severity_matrix(file_status, links)
     if file_status.frames != motion_report["source_frames"]:
         warnings.insert(
             0,
-            f"{Path(status_file).name}, line 1: counts {file_status.frames} frames, but "
-            f"{in_source}. The ranges were used unchanged. Check that the status file belongs to this clip.",
+            f"line 1: counts {file_status.frames} frames, but {in_source}. The ranges were used unchanged. "
+            "Check that the status file belongs to this clip.",
         )
-    rows = severity_matrix(file_status, links)
+    warnings = [f"{Path(status_file).name}, {warning}" for warning in warnings]
     return rows[source_rows(len(clip), file_status.frames, motion_report)], warnings
 
 
