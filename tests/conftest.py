@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import os
+import shutil
+import subprocess
 import threading
+import time
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
@@ -14,6 +17,7 @@ import yaml
 from hypothesis import HealthCheck, settings
 
 from hobble.core.skeleton import Skeleton
+from tests.checkout import Workflow, copy_of
 
 ROOT = Path(__file__).resolve().parents[1]
 collect_ignore = ["engine/bake_in_blender.py"]  # it runs in Blender
@@ -90,6 +94,55 @@ def server() -> Iterator[Server]:
     http.shutdown()
     http.server_close()
     thread.join()
+
+
+@pytest.fixture
+def workflow(root: Path, tmp_path: Path) -> Workflow:
+    """A fresh copy with no results."""
+    return copy_of(root, tmp_path)
+
+
+RUN = "results/test/report.html"
+LIMIT = 1200  # seconds that the shared run may take
+
+
+def shared_folder(config: pytest.Config) -> Path:
+    """A folder that all processes of this session of pytest share."""
+    base = config._tmp_path_factory.getbasetemp()  # type: ignore[attr-defined]
+    return (base.parent if hasattr(config, "workerinput") else base) / "shared"
+
+
+def pytest_collection_finish(session: pytest.Session) -> None:
+    """Start the run of `test` that many tests look at, once for all processes, while other tests run."""
+    worker = getattr(session.config, "workerinput", {}).get("workerid", "gw0")
+    wanted = {"finished", "copied", "clips"}
+    if worker != "gw0" or not any(wanted & set(getattr(i, "fixturenames", ())) for i in session.items):
+        return
+    folder = shared_folder(session.config)
+    made = copy_of(ROOT, folder)
+    script = '"$@" > said 2>&1; echo $? > status.part; mv status.part status'
+    command = ["sh", "-c", script, "sh", *made.command("-c2", RUN, "-d", str(made.folder))]
+    command += ["-s", str(made.folder / "Snakefile")]
+    subprocess.Popen(command, cwd=folder, env=made.environment())
+
+
+@pytest.fixture(scope="session")
+def finished(request: pytest.FixtureRequest) -> Workflow:
+    """The finished run of configuration `test`. Tests must not change it."""
+    folder, began = shared_folder(request.config), time.monotonic()
+    while not (folder / "status").exists():
+        assert time.monotonic() < began + LIMIT, (folder / "said").read_text()
+        time.sleep(0.2)
+    assert (folder / "status").read_text() == "0\n", (folder / "said").read_text()
+    return Workflow(folder / "checkout")
+
+
+@pytest.fixture
+def copied(finished: Workflow, tmp_path: Path) -> Workflow:
+    """A copy of the finished run that a test may change. File times are kept, so nothing is out of date."""
+    target = tmp_path / "copy"
+    shutil.copytree(finished.folder, target / "checkout", symlinks=True)
+    return Workflow(target / "checkout")
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:

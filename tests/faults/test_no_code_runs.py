@@ -24,8 +24,7 @@ from hobble.motion import read as bvh
 from hobble.motion.skeleton_file import load_skeleton
 from hobble.terrain.heightmaps import read_heights
 
-from .refusals import write
-from .texts import SKELETON
+from .conftest import SKELETON, write
 
 
 class Payload:
@@ -64,14 +63,7 @@ def test_nothing_is_unpickled(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
 
 FORBIDDEN = {"eval", "exec", "compile", "__import__", "execfile"}
 MODULES = {"pickle", "cPickle", "dill", "joblib", "marshal", "shelve", "cloudpickle"}
-CALLS = {
-    "os.system",
-    "os.popen",
-    "yaml.load",
-    "yaml.unsafe_load",
-    "yaml.full_load",
-    "torch.load",
-}
+CALLS = {"os.system", "os.popen", "yaml.load", "yaml.unsafe_load", "yaml.full_load", "torch.load"}
 
 
 @pytest.mark.parametrize("folder", ["src", "workflow"])

@@ -9,24 +9,19 @@ from random import Random
 
 import pytest
 
-from . import texts, throws
-from .grammar import BVH, STATUS, STATUS_BASE, mutated
-from .judging import FAULT, REFUSED
+from . import throws
 from .lab import Lab
 from .same import same
 
 pytestmark = [pytest.mark.workflow, pytest.mark.slow]
-SEED = 20
 CLIPS = ("walk-straight-1_hurt1", "uneven-1")
-TARGETS = [f"results/datasets/tiny/database/clips/{clip}.npz" for clip in CLIPS]
 
 
 @pytest.fixture(scope="module")
 def lab() -> Iterator[Lab]:
     with tempfile.TemporaryDirectory(prefix="lab-") as folder:
         Path(folder).chmod(0o755)  # a job runs as the user `nobody`, who may not enter pytest's own folders
-        made = Lab(Path(folder) / "lab")
-        made.undisturbed(*TARGETS)
+        made = Lab(Path(folder) / "lab", *(f"results/datasets/tiny/database/clips/{c}.npz" for c in CLIPS))
         rules = {job.rule for job in made.jobs}
         assert rules >= {"synthetic_clips", "motion_clips", "terrain_fits", "database_clips"}
         yield made
@@ -34,37 +29,13 @@ def lab() -> Iterator[Lab]:
 
 @pytest.mark.parametrize(
     ("throw", "times", "refusals"),
-    [
-        (throws.kill, 16, 0),
-        (throws.orphan, 8, 0),
-        (throws.gone, 5, 0),
-        (throws.full_disk, 4, 0),
-        (throws.no_permission, 4, 0),
-        (throws.harm, 40, 20),
-        (throws.wrong_value, 60, 30),
-    ],
-)
+    [(throws.kill, 16, 0), (throws.orphan, 8, 0), (throws.gone, 5, 0), (throws.full_disk, 4, 0),
+     (throws.no_permission, 4, 0), (throws.harm, 40, 20), (throws.wrong_value, 60, 30)],
+)  # fmt: skip
 def test_no_fault_of_a_job_damages_a_result(lab: Lab, throw, times: int, refusals: int) -> None:
-    thrown = [throw(lab, Random(f"{SEED}-{number}")) for number in range(times)]
-    assert "\n".join(one.detail for one in thrown if one.happened == FAULT) == ""
-    assert sum(one.happened == REFUSED for one in thrown) >= refusals
-
-
-@pytest.mark.parametrize("which", ["bvh", "status"])
-def test_every_mutation_of_a_file_gives_a_result_or_one_message(
-    tiny_bvh: str, tmp_path: Path, which: str
-) -> None:
-    table, base = (BVH, tiny_bvh) if which == "bvh" else (STATUS, STATUS_BASE)
-    read = texts.read_clip if which == "bvh" else texts.read_severity
-    path = tmp_path / ("clip.bvh" if which == "bvh" else "clip_injuries.txt")
-    path.write_text(base)
-    whole = read(path)
-    for number, name in enumerate(table):
-        texts.judge(mutated(base, table, [name], number), path, read, whole)
-    if which == "status":
-        became: list[str] = []
-        texts.throw(which, base, tmp_path, 60, SEED, lambda case, what: became.append(what))
-        assert len(became) >= 60
+    thrown = [throw(lab, Random(f"20-{number}")) for number in range(times)]
+    assert "\n".join(one.detail for one in thrown if one.happened == throws.FAULT) == ""
+    assert sum(one.happened == throws.REFUSED for one in thrown) >= refusals
 
 
 def test_same_ignores_times_and_nothing_else(tmp_path: Path) -> None:
@@ -72,8 +43,6 @@ def test_same_ignores_times_and_nothing_else(tmp_path: Path) -> None:
     for path, time, laps in ((a, 1, 2), (b, 9, 2)):
         path.parent.mkdir(exist_ok=True)
         path.write_text(f'{{"milliseconds": {{"total": {time}}}, "laps": {laps}}}')
-    assert same(a, b)
     assert same(a.parent, b.parent)
     b.write_text('{"milliseconds": {"total": 1}, "laps": 3}')
-    assert not same(a, b)
     assert not same(a.parent, b.parent)

@@ -49,7 +49,7 @@ def test_a_channel_needs_one_folder_and_one_name_in_the_list(workflow) -> None:
     (package / "channels/toy").mkdir()
     (package / "channels/toy/__init__.py").write_text(TOY)
     workflow.edit("src/hobble/channels/__init__.py", "CHANNEL_NAMES = (", 'CHANNEL_NAMES = ("toy", ')
-    (workflow.checkout / "config/toy.yaml").write_text(
+    (workflow.folder / "config/toy.yaml").write_text(
         "extends: test\nchannels: [injury, toy]\nnetwork: {units: 8}\ntraining: {passes: 1}\n"
     )
     weights = "results/toy/network/weights.npz"

@@ -33,10 +33,8 @@ def bvh(path: Path, rows: int, promised: int, frame_time: str = "0.01") -> Path:
 
 @pytest.mark.workflow
 def test_a_stage_has_a_job_for_each_batch_of_clips(workflow, tmp_path) -> None:
-    (workflow.checkout / "config/datasets/many.yaml").write_text(MANY)
-    (workflow.checkout / "config/many.yaml").write_text(
-        "extends: holden\ndataset: many\nchannels: [injury]\n"
-    )
+    (workflow.folder / "config/datasets/many.yaml").write_text(MANY)
+    (workflow.folder / "config/many.yaml").write_text("extends: holden\ndataset: many\nchannels: [injury]\n")
     (tmp_path / "many").mkdir()
     for number in range(CLIPS):
         bvh(tmp_path / f"many/clip-{number:02}.bvh", 100, 100, frame_time=f"0.0100{number:02}")

@@ -22,10 +22,10 @@ clips: {walk: }
 def test_a_clip_that_the_folder_lacks_is_downloaded_once(workflow, clips, server) -> None:
     server.content = Path(clips[1]).read_bytes()
     sha256 = hashlib.sha256(server.content).hexdigest()
-    config = workflow.checkout / "config/datasets"
+    config = workflow.folder / "config/datasets"
     (config / "far.yaml").write_text(DATASET % server.url.replace("walk", "{subject}/{clip}"))
     (config / "far.sha256").write_text(f"{'0' * 64}  walk.bvh\n")
-    kept = workflow.checkout / "data/downloaded/far/walk.bvh"
+    kept = workflow.folder / "data/downloaded/far/walk.bvh"
 
     assert workflow.planned(TARGET) == {"download_clip": 1, "motion_clips": 1, "clip_file": 1}
     assert server.requests == 0

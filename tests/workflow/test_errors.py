@@ -40,7 +40,7 @@ def mine(clips: list[Path], workflow):
     for path in clips:
         for file in path.parent.glob(f"{path.stem}[._]*"):
             (folder / file.name).write_bytes(file.read_bytes())
-    (workflow.checkout / "config/datasets/mine.yaml").write_text(DATASET)
+    (workflow.folder / "config/datasets/mine.yaml").write_text(DATASET)
     workflow.clip, workflow.other = (path.stem for path in clips)
     workflow.mine = folder
     return workflow

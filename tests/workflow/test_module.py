@@ -24,7 +24,7 @@ rule mine:
 @pytest.mark.parametrize("place", ["", "walkers/"])
 def test_a_module_makes_the_same_in_its_place(workflow, finished, tmp_path, place: str) -> None:
     prefix = f'prefix: "{place}"' if place else ""
-    text = IMPORTING.format(checkout=workflow.checkout, prefix=prefix, place=place)
+    text = IMPORTING.format(checkout=workflow.folder, prefix=prefix, place=place)
     (tmp_path / "Snakefile").write_text(text)
     motion = f"{place}results/datasets/tiny/batches/motion/uneven-1"
     for target in ("-n", motion):

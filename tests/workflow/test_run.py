@@ -116,7 +116,7 @@ def test_an_edit_runs_what_depends_on_it(copied, file: str, more: str, again: se
 
 def test_a_configuration_that_continues_another_starts_at_its_end(copied) -> None:
     more = "extends: test\ntraining:\n  passes: 3\n  continues: test\n"
-    (copied.checkout / "config/more.yaml").write_text(more)
+    (copied.folder / "config/more.yaml").write_text(more)
     weights = "results/more/network/weights.npz"
     assert copied.planned(weights) == {"training": 1}
     copied.run("-c2", weights)

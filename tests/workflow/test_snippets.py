@@ -92,11 +92,11 @@ def test_every_command_of_hobble_runs(
 @pytest.mark.slow
 def test_every_workflow_can_be_planned(root: Path, workflow, clips: list[Path]) -> None:
     """Runs of hours are planned only, with -n. A command with FOLDER needs the reader's data."""
-    write_configurations(root, workflow.checkout)
-    (workflow.checkout / "data/mine").mkdir(parents=True)
+    write_configurations(root, workflow.folder)
+    (workflow.folder / "data/mine").mkdir(parents=True)
     for number in range(3):
         text = clips[1].read_bytes() + b"\n" * number
-        (workflow.checkout / f"data/mine/walk-{number}.bvh").write_bytes(text)
+        (workflow.folder / f"data/mine/walk-{number}.bvh").write_bytes(text)
     planned = 0
     for words in lines():
         if program(words) == "snakemake" and not PLACEHOLDER.search(" ".join(words)):

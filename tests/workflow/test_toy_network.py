@@ -17,7 +17,7 @@ TOY = Path(__file__).parent / "toy_network"
 @pytest.mark.slow
 def test_a_linear_network_goes_from_training_to_the_page(copied: Workflow) -> None:
     shutil.copytree(TOY, copied.own_source() / "models" / "toy")
-    (copied.checkout / "config" / "toy.yaml").write_text("extends: test\nnetwork:\n  kind: toy\n")
+    (copied.folder / "config" / "toy.yaml").write_text("extends: test\nnetwork:\n  kind: toy\n")
     # No existing network, row or measurement is made again because of it.
     assert set(copied.planned("results/test/report.html")) <= {"page_bundle", "report"}
     copied.run("-c2", "results/toy/report.html")

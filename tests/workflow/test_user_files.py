@@ -49,7 +49,7 @@ OWN = ("motion_clips", "labels_clips", "channel_clips", "terrain_fits", "databas
 def test_a_new_clip_and_another_content_with_an_older_time_run_only_their_own_jobs(clips, workflow) -> None:
     folder = workflow.folder / "mocap/mine"
     folder.mkdir(parents=True)
-    (workflow.checkout / "config/datasets/mine.yaml").write_text(DATASET)
+    (workflow.folder / "config/datasets/mine.yaml").write_text(DATASET)
     asked = (TARGET, "--config", "mocap=mocap")
     (folder / "a.bvh").write_bytes(clips[0].read_bytes())
     workflow.run("-c2", *asked)

@@ -17,9 +17,7 @@ MB = 1 << 20  # bytes
 MAX_TEXT_BYTES = 64 * MB  # enough for a label file of ten minutes at 100 Hz with 1 kB for each frame
 MAX_YAML_BYTES = 4 * MB  # enough for a data set of 20,000 clips with five keys each
 MAX_YAML_DEPTH = 100  # levels of lists and mappings within each other
-# At most this many values in a file, counted after each alias (`*name`) is replaced by what it stands for.
-# This number of values takes about 100 MB of memory.
-MAX_YAML_NODES = 1_000_000
+MAX_YAML_VALUES = 1_000_000  # in a file; so many take about 100 MB of memory
 LONGEST_INTEGER = 40  # characters; Python refuses to print a number of more than 4,300 digits
 
 
@@ -84,7 +82,8 @@ def read_yaml(path: str | Path) -> Any:
     """The content of a YAML file as plain data.
 
     Raises InputError, with the line if it is known, for invalid YAML, tags that would create Python objects,
-    duplicate keys, nesting deeper than MAX_YAML_DEPTH, and more than MAX_YAML_NODES values.
+    aliases (`*name`, with which a small file can stand for a huge one), duplicate keys, integers of many
+    digits, nesting deeper than MAX_YAML_DEPTH, and more than MAX_YAML_VALUES values.
     """
     import yaml  # imported here because most jobs do not need it
 
@@ -92,78 +91,51 @@ def read_yaml(path: str | Path) -> Any:
     loader_class = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
     loader = loader_class(text)
     try:
-        _check_depth(yaml.parse(text, loader_class))
+        _check_events(path, yaml.parse(text, loader_class))
         node = loader.get_single_node()
         if node is None:
             return None
-        if _expanded_size(node, {}, set()) > MAX_YAML_NODES:
-            raise InputError(path, f"has more than {MAX_YAML_NODES} values, with its aliases expanded")
-        _check_keys(path, node)
+        _check_node(path, node)
         return loader.construct_document(node)
     except yaml.MarkedYAMLError as error:
         line = error.problem_mark.line + 1 if error.problem_mark else None
         raise InputError(path, f"not valid YAML: {error.problem}", line=line) from None
-    except RecursionError:
-        raise InputError(path, "nested too deeply, or has an alias that contains itself") from None
-    except (yaml.YAMLError, ValueError) as error:
-        raise InputError(path, f"not valid YAML: {' '.join(str(error).split())}") from None
+    except (yaml.YAMLError, ValueError) as error:  # ValueError: a date such as 2001-99-99
+        raise InputError(path, f"not valid YAML: {printable(error)}") from None
     finally:
         loader.dispose()
 
 
-def _check_depth(events: Iterable[yaml.Event]) -> None:
-    """Raise RecursionError for too deep nesting. libyaml would recurse into it and crash the process."""
+def _check_events(path: str | Path, events: Iterable[yaml.Event]) -> None:
+    """Check what could use up the memory, or crash libyaml, which recurses into lists and mappings."""
     import yaml
 
     depth = 0
-    for event in events:
+    for number, event in enumerate(events):
+        line = event.start_mark.line + 1
         depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
         if depth > MAX_YAML_DEPTH:
-            raise RecursionError
+            raise InputError(path, f"nested deeper than {MAX_YAML_DEPTH} levels", line=line)
+        if number > MAX_YAML_VALUES:
+            raise InputError(path, f"has more than {MAX_YAML_VALUES} values")
+        if isinstance(event, yaml.AliasEvent):
+            problem, fix = f"*{event.anchor:.40} is an alias", "Write out what it stands for."
+            raise InputError(path, problem, line=line, fix=fix)
 
 
-def _check_keys(path: str | Path, top: yaml.Node) -> None:
+def _check_node(path: str | Path, node: yaml.Node) -> None:
     """Raise InputError for a duplicate key, of which YAML's loader would take the last, or a huge integer."""
-    todo, seen = [top], set()
-    while todo:
-        node = todo.pop()
-        if id(node) in seen or not isinstance(node.value, list):
-            continue
-        seen.add(id(node))
-        todo += _children(node)
-        lines: dict[tuple[str, str], int] = {}  # (type, text) of a key -> its line, from 1
-        for scalar in _children(node):
-            if scalar.tag == "tag:yaml.org,2002:int" and len(scalar.value) > LONGEST_INTEGER:
-                problem = f"an integer of {len(scalar.value)} characters"
-                raise InputError(path, problem, line=scalar.start_mark.line + 1)
-        for key in (child[0] for child in node.value if isinstance(child, tuple)):
-            if not isinstance(key.value, str):
-                continue  # not a valid key; the loader reports it
-            name, line = (key.tag, key.value), key.start_mark.line + 1
+    line = node.start_mark.line + 1
+    if node.tag == "tag:yaml.org,2002:int" and len(node.value) > LONGEST_INTEGER:
+        raise InputError(path, f"an integer of {len(node.value)} characters", line=line)
+    lines: dict[tuple[str, str], int] = {}  # (type, text) of a key -> its line, from 1
+    for child in node.value if isinstance(node.value, list) else ():
+        parts = child if isinstance(child, tuple) else (child,)  # a key and its value, or an item
+        for part in parts:
+            _check_node(path, part)
+        if len(parts) == 2 and isinstance(parts[0].value, str):
+            name, line = (parts[0].tag, parts[0].value), parts[0].start_mark.line + 1
             if name in lines:
-                problem = f"the key {key.value:.80} is given twice, first in line {lines[name]}"
+                problem = f"the key {name[1]:.80} is given twice, first in line {lines[name]}"
                 raise InputError(path, problem, line=line, fix="Keep one of them.")
             lines[name] = line
-
-
-def _children(node: yaml.Node) -> list[yaml.Node]:
-    """The items of a list, or the keys and values of a mapping."""
-    pairs = (child if isinstance(child, tuple) else (child,) for child in node.value)
-    return [part for pair in pairs for part in pair]
-
-
-def _expanded_size(node: yaml.Node, known: dict[int, int], above: set[int]) -> int:
-    """Number of values in a node after every alias is replaced by what it stands for.
-
-    known: `id` of each list or mapping counted so far -> its number of values. above: `id`s of the nodes that
-    contain `node`. Raises RecursionError for an alias that contains itself.
-    """
-    if not isinstance(node.value, list):
-        return 1
-    if id(node) in above:
-        raise RecursionError
-    if id(node) not in known:
-        above.add(id(node))
-        known[id(node)] = 1 + sum(_expanded_size(child, known, above) for child in _children(node))
-        above.remove(id(node))
-    return known[id(node)]

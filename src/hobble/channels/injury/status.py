@@ -28,7 +28,7 @@ from hobble.core.clip import Clip
 from hobble.core.errors import InputError
 from hobble.core.files import write_text
 from hobble.core.quat import Array
-from hobble.core.untrusted import read_text
+from hobble.core.untrusted import printable, read_text
 
 FPS = 60.0  # frames a second of every clip, whatever the rate of its BVH file
 HIGHEST_SEVERITY = 10.0
@@ -166,7 +166,9 @@ def _parse_spell(path: Path, number: int, line: str, links: Sequence[str]) -> In
 def check_link(path: str | Path, line: int | None, name: str, links: Sequence[str]) -> None:
     """Raise InputError unless `name` is one of `links`. path, line: where it stands, for the message."""
     if name not in links:
-        raise InputError(path, f"no such link: {name[:80]}", line=line, fix=_similar_links(name, links))
+        raise InputError(
+            path, f"no such link: {printable(name, 80)}", line=line, fix=_similar_links(name, links)
+        )
 
 
 def parse_severity(path: str | Path, line: int | None, link: str, text: str) -> float:

@@ -1,0 +1,386 @@
+"""Files from strangers are refused in limited memory and time: text, BVH, arrays, images, YAML and JSON."""
+
+from __future__ import annotations
+
+import io
+import json
+import os
+import struct
+import zipfile
+import zlib
+from collections.abc import Callable
+from pathlib import Path
+from random import Random
+from typing import Any
+
+import numpy as np
+import pytest
+
+from hobble.channels.injury.status import (
+    clip_severity,
+    range_warnings,
+    read_status,
+    severity_matrix,
+)
+from hobble.config.load_configuration import Catalogue
+from hobble.core.clip import Clip, load_clip
+from hobble.core.declared import ArrayOf
+from hobble.core.errors import InputError
+from hobble.core.files import load_npz, read_json
+from hobble.core.untrusted import read_bytes, read_yaml
+from hobble.labels.label_files import SourceTime, read_phase
+from hobble.measures.study import FilmAnswer, ShownFilm, Study, read_answers, read_study
+from hobble.models.load import load_network, read_arrays
+from hobble.motion.make import make_clip
+from hobble.motion.options import ClipMotion
+from hobble.motion.read import MOST_BYTES, MOST_HEADER, MOST_JOINTS, read_bvh
+from hobble.motion.skeleton_file import load_skeleton
+from hobble.terrain.heightmaps import read_heights
+
+from .conftest import MB, SKELETON, refused, write
+from .damage import change_text
+
+LINKS = load_skeleton(SKELETON).skeleton.link_names
+
+
+def clip(path: Path) -> Clip:
+    return make_clip(path, SKELETON, SKELETON.parent, "clip", "holden31", ClipMotion())[0]
+
+
+def status(path: Path) -> Any:
+    found = read_status(path, ["A-B"])
+    return range_warnings(found, path)
+
+
+def phase(path: Path) -> Any:
+    return read_phase(path, SourceTime(200, 60.0), 200)
+
+
+def severity(path: Path) -> Any:
+    standing = Clip(
+        "a", load_skeleton(SKELETON).skeleton, 60.0, np.eye(4)[np.zeros((9, 31), int)], np.zeros((9, 3))
+    )
+    return clip_severity(standing, path, None, {"source_frames": 9, "source_fps": 60.0, "source": "a.bvh"})
+
+
+HEADER = "HIERARCHY\nROOT Hips\n{\nOFFSET 0 0 0\nCHANNELS 1 Xposition\n"
+BODY = HEADER + "}\nMOTION\nFrames: 9\nFrame Time: 0.0083\n"
+END = "}\nMOTION\nFrames: %d\nFrame Time: 0.0083\n" + "1\n"
+
+
+def joints(named: int, more: int = 0, deep: bool = False) -> str:
+    """The first `named` joints have their own names."""
+    closing = "" if deep else "}\n"
+    joint = f"JOINT j%d\n{{\nOFFSET 0 1 0\n{closing}"
+    text = "".join(joint % i for i in range(named)) + joint * more
+    return HEADER + text + "}\n" * ((named + more) * deep)
+
+
+def star(joints: int) -> str:
+    """A BVH file in which all joints but one are children of the root."""
+    turns = "CHANNELS 3 Zrotation Xrotation Yrotation"
+    joint = f"JOINT j%d\n{{\nOFFSET %d %d 5\n{turns}\nEnd Site\n{{\nOFFSET 0 1 0\n}}\n}}\n"
+    text = HEADER.replace("1 Xposition", turns.removeprefix("CHANNELS "))
+    text += "".join(joint % (i, i % 7, 10 + i % 3) for i in range(joints))
+    rows = "".join(" ".join(str((7 * f + i) % 50) for i in range(3 + 3 * joints)) + "\n" for f in range(200))
+    return f"{text}}}\nMOTION\nFrames: 200\nFrame Time: 0.0166667\n{rows}"
+
+
+STUDY = Study("s", "limp", ("a", "b"), tuple(ShownFilm(i, "one part", ("a",), (5.0,)) for i in range(1, 6)))
+
+
+def answers(path: Path) -> list[FilmAnswer]:
+    return read_answers(path, STUDY)
+
+
+def answer(film: int) -> dict[str, Any]:
+    marks = dict.fromkeys(("fluidity", "progress", "realism"), "fair")
+    return {"film": film, "noticed": "yes", **marks, "parts": ["a"]}
+
+
+def saved(**changes: Any) -> str:
+    """A file of answers, of which the second is changed."""
+    rows = list(map(answer, range(1, 6)))
+    rows[1] |= changes
+    return json.dumps({"study": "s", "answers": rows})
+
+
+def films(**changes: Any) -> str:
+    """A films.json, of which the first film is changed."""
+    film = {"film": 1, "kind": "one part", "parts": ["a"], **changes}
+    return json.dumps({"study": "s", "configuration": "limp", "parts": ["a"], "films": [film]})
+
+
+READERS: dict[str, tuple[str, Callable[[Path], Any]]] = {
+    "status": ("a.txt", status), "severity": ("a.txt", severity), "phase": ("a.phase", phase),
+    "bvh": ("a.bvh", read_bvh), "clip": ("a.bvh", clip), "answers": ("a.json", answers),
+    "study": ("films.json", read_study), "json": ("a.json", read_json), "image": ("a.png", read_heights),
+    "array": ("a.npy", read_heights),
+}  # fmt: skip
+BLANKS, DOUBT = " " * 6000, "it is in doubt which joints are which parts"
+# What a file holds, or a function that makes it -> its reader, and what is said of it.
+FILES: dict[str, tuple[str, str | bytes | Callable[[], str | bytes], str]] = {
+    "blanks before a link": ("status", f"frames:10\n1-10 {BLANKS}x\n", "line 2: 'x' does not read as"),
+    "blanks after a link": ("status", f"frames:10\n1-10 A{BLANKS}[\n", "line 2: 'A "),
+    "blanks in a severity": ("status", f"frames:10\n1-10 A-B[{BLANKS}5\n", "line 2: 'A-B["),
+    "blanks in a range": ("status", f"frames:10\n1{BLANKS}\n", "line 2: '1' does not read as"),
+    "19,000 ranges": ("status", "frames:9\n" + "1-9 A-B[1];\n" * 19_000, "line 102: more than 100 ranges"),
+    "2 billion hurt": ("severity", "frames:2000000000\n1-2000000000 LeftUpLeg-LeftLeg[5];\n", "line 1"),
+    "2 million phases": ("phase", "0\n" * 2_000_000, "larger than 0.2"),
+    "a star of 300 joints": ("clip", lambda: star(300), DOUBT),
+    "HIERARCHY 2,000 times": ("clip", lambda: "HIERARCHY " * 2000 + star(1)[9:], "'HIERARCHY' is not known"),
+    "2 billion frames": ("bvh", BODY.replace("9", "2000000000", 1), "declares 2000000000 frames"),
+    "300,000 joints": ("bvh", lambda: joints(5_000, 295_000) + END % 1, "more than 4096 joints"),
+    "300,000 joints deep": ("bvh", lambda: joints(5_000, 295_000, True) + END % 1, "more than 4096 joints"),
+    "the longest chain of joints": (
+        "clip", lambda: joints(MOST_JOINTS - 1, 0, True).replace("Xposition", "Zrotation") + END % 1, DOUBT
+    ),
+    "joints without channels": (
+        "bvh", lambda: joints(4000) + END % 20_000 + "1\n" * 19_999, "20000 frames of 4001 joints"
+    ),
+    "a header of line ends": ("bvh", lambda: HEADER + "\n" * MOST_HEADER + END % 1, "MOTION comes after"),
+    "a header of one line": ("bvh", lambda: HEADER + "x " * MOST_HEADER + END % 1, "MOTION comes after"),
+    "many MOTIONs": ("bvh", lambda: "HIERARCHY\n" + "MOTIONx " * 4 * MB + "\n", "no MOTION section"),
+    "a frame of one line": ("bvh", lambda: BODY + "1 " * 8 * MB, "declares 9 frames and has 8388608"),
+    "a number of one line": ("bvh", lambda: BODY + "1" * 9 * MB + "\n1\n", "line 10: a line of more"),
+    "a body of line ends": ("bvh", lambda: BODY + "1\n" + "\n" * 50_000_000, "declares 9 frames and has 1"),
+    "50,000 answers": (
+        "answers", json.dumps({"study": "s", "answers": [answer(1)] * 50_000}), "film 1 is answered twice"
+    ),
+    "a film that is a list": ("answers", saved(film=[1]), "answer 2: film: "),
+    "a film that is true": ("answers", saved(film=True), "answer 2: film: "),
+    "parts that are a number": ("answers", saved(parts=1), "answer 2: parts: "),
+    "a part that is a list": ("answers", saved(parts=[["a"]]), "answer 2: parts.0: "),
+    "a mark that is NaN": ("answers", saved(fluidity=float("nan")), "not valid JSON: NaN"),
+    "a kind that is a list": ("study", films(kind=["one part"]), "films.0.kind: "),
+    "a film without a number": ("study", films(film=None), "films.0.film: "),
+    "films in a list": ("study", "[1]", "the questionnaire: "),
+    "an integer in JSON": ("json", "9" * 20_000, "not valid JSON"),
+    "infinity in JSON": ("json", '{"a": [-Infinity]}', "-Infinity is not a number"),
+    "deep JSON": ("json", "[" * 200_000, "not valid JSON"),
+    "a large image": ("image", lambda: png(60_000), "a.png: "),
+    "an image of 81 million pixels": ("image", lambda: png(9_000), "a.png: "),
+    "an array of a terabyte": ("array", lambda: npy((10**6, 10**6)), "not an array file"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("what", FILES)
+def test_it_is_refused_in_seconds(what: str, tmp_path: Path) -> None:
+    reader, content, says = FILES[what]
+    name, read = READERS[reader]
+    path = write(tmp_path / name, content() if callable(content) else content)
+    refused(lambda: read(path), name, says, mb=1000 if "300,000" in what else 300, letters=5000)
+
+
+def test_a_slow_frame_rate_cannot_make_a_clip_too_long(tmp_path: Path, tiny_bvh: str) -> None:
+    head, _, rest = tiny_bvh.partition("Frames: ")
+    rows = rest.split("\n", 2)[2].strip().split("\n") * 20
+    path = write(tmp_path / "a.bvh", f"{head}Frames: {len(rows)}\nFrame Time: 10\n" + "\n".join(rows) + "\n")
+    refused(lambda: clip(path), "a.bvh: 3600 frames at 0.1 a second", "source_fps")
+
+
+def test_endless_files_are_refused(tmp_path: Path) -> None:
+    with open(tmp_path / "large.bvh", "wb") as file:
+        file.truncate(MOST_BYTES + 1)
+    os.mkfifo(tmp_path / "pipe.bvh")
+    (tmp_path / "zero.bvh").symlink_to("/dev/zero")
+    (tmp_path / "folder.bvh").mkdir()
+    says = {"large": "larger than 1024 MB", "pipe": "a pipe", "zero": "a device", "folder": "not a file"}
+    for name, what in says.items():
+        refused(lambda n=name: read_bvh(tmp_path / f"{n}.bvh"), f"{name}.bvh: ", what, mb=64)
+    assert len(read_bytes(write(tmp_path / "a", bytes(MB)), MB)) == MB
+    with pytest.raises(InputError, match="larger than 1 MB"):
+        read_bytes(write(tmp_path / "a", bytes(MB + 1)), MB)
+
+
+STATUS = (
+    "frames:300\n1-300 RightUpLeg-RightLeg[10];\n50-200 LeftShoulder-LeftArm[5];LeftUpLeg-LeftLeg[2.5];\n"
+    "120-260 LeftUpLeg-LeftLeg[7];\n"
+)
+
+
+def whole_severity(path: Path) -> np.ndarray:
+    found = read_status(path, LINKS)
+    if found.frames > 100_000:  # the stage compares this with the clip before it makes room for it
+        return np.zeros(1)
+    return severity_matrix(found, LINKS)
+
+
+@pytest.mark.parametrize("kind", ["bvh", "status"])
+def test_a_damaged_text_gives_a_sound_result_or_one_message(tmp_path: Path, tiny_bvh: str, kind: str) -> None:
+    path, text = tmp_path / f"a.{kind}", tiny_bvh if kind == "bvh" else STATUS
+    read: Callable[[Path], np.ndarray] = whole_severity if kind == "status" else lambda p: clip(p).positions
+    messages, sound = list[str](), 0
+    for number in range(60 if kind == "bvh" else 300):
+        write(path, change_text(Random(number), text).encode(errors="surrogateescape"))
+        try:
+            found = read(path)
+        except InputError as error:
+            messages.append(str(error))
+        else:
+            assert np.isfinite(found).all(), number
+            assert kind == "bvh" or 0 <= found.min() <= found.max() <= 10, number
+            sound += 1
+    assert [m for m in messages if not (m.startswith(str(path)) and m.isprintable() and len(m) < 2000)] == []
+    assert min(sound, len(messages)) > (sound + len(messages)) / 5
+
+
+def npy(shape: tuple[int, ...], data: bytes = bytes(800), header: str = "") -> bytes:
+    text = (header or str({"descr": "<f8", "fortran_order": False, "shape": shape})).encode()
+    text += b" " * (-(len(text) + 11) % 64) + b"\n"
+    return b"\x93NUMPY\x01\x00" + struct.pack("<H", len(text)) + text + data
+
+
+def zipped(path: Path, data: bytes, kind: int = zipfile.ZIP_STORED) -> Path:
+    with zipfile.ZipFile(path, "w", kind) as archive:
+        archive.writestr("heights.npy", data)
+    return path
+
+
+HEADERS = {
+    "more than the file holds": str({"descr": "<f8", "fortran_order": False, "shape": (10**12,)}),
+    "a dictionary that does not end": "{",
+    "brackets that do not end": "(" * 9000,
+    "signs without a number": "-" * 9000 + "1",
+    "a text that does not end": "'''",
+    "lines that go on": "\\\n" * 4000,
+    "a type in brackets": "{'descr': ('<f8',), 'fortran_order': False, 'shape': (8,)}",
+    "a length of 100 digits": "{'descr': '<f8', 'fortran_order': False, 'shape': (1%s,)}" % ("0" * 99),
+    "a length below 0": "{'descr': '<f8', 'fortran_order': False, 'shape': (-8, -1)}",
+    "a type of a terabyte": "{'descr': 'V1000000000000', 'fortran_order': False, 'shape': (8,)}",
+    "objects": "{'descr': '|O', 'fortran_order': False, 'shape': (8,)}",
+}
+
+
+@pytest.mark.parametrize("what", HEADERS)
+def test_a_hostile_array_header_is_refused(tmp_path: Path, what: str) -> None:
+    array = npy((), bytes(64), HEADERS[what])
+    path = zipped(tmp_path / "a.npz", array)
+    for read in (load_npz, load_clip, load_network, read_heights):
+        refused(lambda r=read: r(path), "a.npz: damaged", mb=64, letters=400)
+    path = write(tmp_path / "a.npy", array)
+    refused(lambda: read_heights(path), "a.npy: not an array file", mb=64, letters=400)
+
+
+def test_arrays_of_one_byte_numbers_are_limited_in_memory(tmp_path: Path) -> None:
+    """A megabyte of compressed bytes that unpacks to a gigabyte of one-byte heights or weights."""
+    path, side = tmp_path / "a.npz", 9000
+    np.savez_compressed(path, heights=np.zeros((side, side), np.int8))
+    refused(lambda: read_heights(path), "a.npz: 81000000 heights, more than 67108864")
+    arrays = {"Xmean": np.zeros(9), "W0": np.zeros((1, side, side), np.int8)}
+    declared = {"W0": ArrayOf((1, side, side), "fiu")}
+    refused(lambda: read_arrays("a.npz", arrays, declared), "81000000 numbers; 1 to 67108864 are allowed")
+
+
+def test_a_layer_of_the_release_that_is_too_large_is_refused(tmp_path: Path) -> None:
+    """Sparse files of many gigabytes."""
+    for name in ("Xmean", "Xstd", "Ymean", "Ystd", "b0_000"):
+        write(tmp_path / f"{name}.bin", bytes(4 << 16))
+    with open(tmp_path / "W0_000.bin", "wb") as file:
+        file.truncate(4 << 32)
+    refused(lambda: load_network(tmp_path), "b0_000.bin: 65536 x 65536 weights", mb=600)
+
+
+def test_a_zip_bomb_is_not_unpacked(tmp_path: Path) -> None:
+    """Its list of files says that a compressed array unpacks to two gigabytes."""
+    path = zipped(tmp_path / "a.npz", npy((MB,), bytes(8 * MB)), zipfile.ZIP_DEFLATED)
+    data = bytearray(path.read_bytes())
+    struct.pack_into("<I", data, data.rindex(b"PK\x01\x02") + 24, 1 << 31)
+    path.write_bytes(data)
+    for read in (load_npz, read_heights):
+        refused(lambda r=read: r(path), "a.npz: damaged", "would unpack to more than 1024 MB", mb=64)
+
+
+def test_entries_that_share_bytes_are_not_read_as_often_as_they_are_listed(tmp_path: Path) -> None:
+    """One array of 8 MB, listed 400 times: 3.2 GB."""
+    path = zipped(tmp_path / "a.npz", npy((MB,), bytes(8 * MB)))
+    data = path.read_bytes()
+    start, end = data.rindex(b"PK\x01\x02"), data.rindex(b"PK\x05\x06")
+    entry, record = data[start:end], bytearray(data[end:])
+    record[8:12] = struct.pack("<HH", 400, 400)
+    record[12:16] = struct.pack("<I", 400 * len(entry))
+    path.write_bytes(data[:start] + 400 * entry + record)
+    for read in (load_npz, load_network, read_heights):
+        refused(lambda r=read: r(path), "a.npz: damaged", "its entries overlap", mb=64)
+    path = zipped(tmp_path / "b.npz", npy((4, 4), bytes(128)), zipfile.ZIP_LZMA)
+    refused(lambda: load_npz(path), "b.npz: damaged", "compressed in a way that NumPy does not use")
+
+
+def png(side: int) -> bytes:
+    """A PNG of a few bytes whose header says so many pixels."""
+
+    def chunk(kind: bytes, data: bytes) -> bytes:
+        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+
+    header = struct.pack(">IIBBBBB", side, side, 8, 0, 0, 0, 0)
+    data = chunk(b"IHDR", header) + chunk(b"IDAT", zlib.compress(bytes(1000))) + chunk(b"IEND", b"")
+    return b"\x89PNG\r\n\x1a\n" + data
+
+
+@pytest.mark.parametrize(("kind", "value"), [(3, (7, 8)), (2, "none"), (7, b"\xff")])
+def test_any_no_data_value_of_a_geotiff_is_handled(tmp_path: Path, kind: int, value: Any) -> None:
+    from PIL import Image, TiffImagePlugin
+
+    tags = TiffImagePlugin.ImageFileDirectory_v2()
+    tags.tagtype[42113] = kind
+    tags[42113] = value
+    Image.fromarray(np.eye(4, dtype=np.uint8)).save(tmp_path / "a.tif", tiffinfo=tags)
+    refused(lambda: read_heights(tmp_path / "a.tif"), "a.tif: not an image that can be read")
+
+
+def test_a_heightmap_is_read_as_its_name_says_whatever_it_holds(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from PIL import Image
+
+    eps = b"%!PS-Adobe-3.0 EPSF-3.0\n%%BoundingBox: 0 0 9 9\n%%EndComments\n(pwned) (w) file\n%%EOF\n"
+    contents = [eps, zipped(tmp_path / "z", b"1 2\n3 4\n").read_bytes()]
+    for kind in ("BMP", "GIF", "PDF"):
+        made = io.BytesIO()
+        Image.new("L", (4, 4)).save(made, kind)
+        contents.append(made.getvalue())
+    started: list[Any] = []
+    monkeypatch.setattr("subprocess.Popen.__init__", lambda *a, **k: started.append(a))
+    for suffix in (".png", ".tif", ".tiff", ".npy", ".npz", ".txt"):
+        for content in contents:
+            path = write(tmp_path / f"map{suffix}", content)
+            with pytest.raises(InputError, match=f"map{suffix}"):
+                read_heights(path)
+    assert started == []
+
+
+def multiplied(item: str, list_of: str) -> str:
+    """Each list holds the one before it nine times."""
+    lists = (f"a{i}: &a{i} {list_of}\n" % ", ".join([f"*a{i - 1}"] * 9) for i in range(1, 12))
+    return f"a0: &a0 {item}\n" + "".join(lists)
+
+
+YAML: dict[str, tuple[str | bytes, str]] = {
+    "aliases that multiply": (multiplied("[x, x]", "[%s]"), "alias"),
+    "merges that multiply": (multiplied("{k: v}", "{<<: [%s]}"), "alias"),
+    "a list that holds itself": ("a: &a [*a]\n", "alias"),
+    "deep brackets": ("a: " + "[" * 100_000, "a.yaml"),
+    "deep lists": ("- " * 50_000 + "x", "a.yaml"),
+    "much text": ("x" * (5 * MB), "larger than 4 MB"),
+    "a call": ("a: !!python/object/apply:os.system ['touch pwned']\n", "line 1"),
+    "an object": ("!!python/object/new:os.system ['touch pwned']\n", "line 1"),
+    "a wrong date": ("a: 2001-99-99\n", "not valid YAML"),
+    "a zero": ("\x00", "not valid YAML"),
+    "no text": (b"\xff\xfe", "not a text file"),
+    "a key given twice": ("a: 1\na: 2\n", "line 2"),
+    "an integer of 20,000 digits": ("a: 1\nb: " + "9" * 20_000, "line 2: an integer of"),
+    "a hexadecimal one": ("a: 0x" + "f" * 20_000, "line 1: an integer of"),
+}
+
+
+@pytest.mark.parametrize("what", YAML)
+def test_hostile_yaml_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, what: str) -> None:
+    monkeypatch.chdir(tmp_path)
+    path = write(tmp_path / "a.yaml", YAML[what][0])
+    for read in (
+        lambda: read_yaml(path),
+        lambda: Catalogue(tmp_path).configuration("a"),
+        lambda: load_skeleton(path),
+    ):
+        refused(read, "a.yaml", YAML[what][1])
+    assert not (tmp_path / "pwned").exists()
