@@ -50,13 +50,13 @@ def main() -> None:
     print(processor_name())
     mocap = arguments.mocap.resolve()
     project = Project(ROOT, {"mocap": str(mocap)})
-    clips = sorted(project.clips.listed_entries(arguments.dataset))
-    files = [Path(project.clips.source(arguments.dataset, clip)) for clip in clips]
+    clips = sorted(project.dataset(arguments.dataset).listed)
+    files = [Path(project.dataset(arguments.dataset).source(clip)) for clip in clips]
     size = sum(path.stat().st_size for path in files) / 1e6
     start = time.process_time()
     frames = sum(len(read_bvh(path)) for path in files)
     reading = time.process_time() - start
-    targets = project.batches.folders(arguments.dataset, clips, "labels")
+    targets = project.dataset(arguments.dataset).folders(clips, "labels")
     wall, busy = workflow_seconds(targets, mocap, arguments.cores)
     print(f"{len(files)} clips, {frames} frames, {size:.1f} MB")
     print(f"read                       {size / reading:8.0f} MB/s")

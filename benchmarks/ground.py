@@ -64,7 +64,7 @@ def patches_of(dataset: str, mocap: Path) -> Patches:
     project = Project(BASE, {"mocap": str(mocap)})
     options = project.catalogue.dataset(dataset).terrain
     scales = options.model_dump(include={"cell", "height_scale"})
-    maps = heightmaps(options.heightmaps, project.clips.heightmap_files(dataset), **scales)
+    maps = heightmaps(options.heightmaps, project.dataset(dataset).heightmap_files, **scales)
     drawn = options.model_dump(include={"cell", "size", "highest", "seed"})
     return draw_patches(maps, count=options.patches, **drawn)
 
@@ -72,13 +72,13 @@ def patches_of(dataset: str, mocap: Path) -> Patches:
 def source(project: Project, job: Job, folder: Path) -> tuple[Path, list[Path]]:
     """The BVH file of a clip and its label files. A synthetic clip is first written to `folder`."""
     if project.catalogue.dataset(job.dataset).synthetic is None:
-        files = [Path(file) for file in project.clips.label_files(job.dataset, job.clip)]
-        return Path(project.clips.source(job.dataset, job.clip)), files
-    entry = project.clips.entry(job.dataset, job.clip)
-    skeleton = yaml.safe_load(Path(project.clips.skeleton_file(job.dataset)).read_text())
+        files = [Path(file) for file in project.dataset(job.dataset).label_files(job.clip)]
+        return Path(project.dataset(job.dataset).source(job.clip)), files
+    entry = project.dataset(job.dataset).entry(job.clip)
+    skeleton = yaml.safe_load(Path(project.dataset(job.dataset).skeleton_file).read_text())
     name = project.catalogue.dataset(job.dataset).skeleton
     files = {part: folder / f"{job.clip}_{part}.txt" for part in ("footsteps", "gait")}
-    bvh, frames = folder / f"{job.clip}.bvh", project.datasets.frames(job.dataset, job.clip)
+    bvh, frames = folder / f"{job.clip}.bvh", project.dataset(job.dataset).frames(job.clip)
     options = project.catalogue.dataset(job.dataset).synthetic
     write_clip(job.clip, {"name": name, **skeleton}, frames, entry.recipe, options, bvh=bvh, **files)
     return bvh, [files["footsteps"], files["gait"]]
@@ -87,14 +87,14 @@ def source(project: Project, job: Job, folder: Path) -> tuple[Path, list[Path]]:
 def made(project: Project, job: Job, folder: Path) -> Iterator[tuple[Clip, dict]]:
     """The clip and its mirror, if the data set has mirrors, with their labels."""
     bvh, files = source(project, job, folder)
-    entry, dataset = project.clips.entry(job.dataset, job.clip), project.catalogue.dataset(job.dataset)
+    entry, dataset = project.dataset(job.dataset).entry(job.clip), project.catalogue.dataset(job.dataset)
     clip, report = make_clip(
         bvh,
-        project.clips.skeleton_file(job.dataset),
+        project.dataset(job.dataset).skeleton_file,
         str(BASE / "config/skeletons"),
         clip=job.clip,
         skeleton_name=dataset.skeleton,
-        options=ClipMotion(**project.datasets.motion_options(job.dataset, job.clip)),
+        options=ClipMotion(**project.dataset(job.dataset).motion_options(job.clip)),
     )
     options = dataset.labels
     labels, labels_report = label_clip(clip, files, report, entry.gait, entry.ground, options)
@@ -108,7 +108,7 @@ def found(job: Job) -> list[Found]:
     """The fits of one clip and its mirror."""
     project = Project(BASE, {"mocap": str(job.mocap)})
     options = project.catalogue.dataset(job.dataset).terrain
-    sampling = HeightSampling(**project.datasets.options_of_class(job.dataset, "database", HeightSampling))
+    sampling = HeightSampling(**project.dataset(job.dataset).options_of("database", HeightSampling))
     out = []
     with tempfile.TemporaryDirectory() as folder:
         try:
@@ -117,7 +117,7 @@ def found(job: Job) -> list[Found]:
             print(f"{job.dataset} {job.clip} left out: {error}", flush=True)
             return []
     for clip, labels in pairs:
-        for kind in job.kinds or (project.clips.entry(job.dataset, job.clip).ground,):
+        for kind in job.kinds or (project.dataset(job.dataset).entry(job.clip).ground,):
             fits = clip_fits(clip, labels, patches_of(job.dataset, job.mocap), kind, options, sampling)
             if not len(fits.patch):
                 continue
@@ -138,7 +138,7 @@ def main() -> None:
     jobs = [
         Job(d, clip, tuple(arguments.kinds), arguments.mocap)
         for d in arguments.datasets
-        for clip in project.clips.entries(d)
+        for clip in project.dataset(d).entries
     ]
     with ProcessPoolExecutor(arguments.workers) as pool:
         results = [one for some in pool.map(found, jobs) for one in some]

@@ -123,7 +123,7 @@ def pytest_collection_finish(session: pytest.Session) -> None:
     script = '"$@" > said 2>&1; echo $? > status.part; mv status.part status'
     command = ["sh", "-c", script, "sh", *made.command("-c2", RUN, "-d", str(made.folder))]
     command += ["-s", str(made.folder / "Snakefile")]
-    subprocess.Popen(command, cwd=folder, env=made.environment())
+    subprocess.Popen(command, **{**made.how(), "cwd": folder})
 
 
 @pytest.fixture(scope="session")

@@ -23,7 +23,6 @@ from snakemake_interface_logger_plugins.base import LogHandlerBase
 TICK_SECONDS = 1.0  # between two updates of the line of progress on a terminal
 PROGRESS_SECONDS = 30.0  # between lines of progress if the output goes to a file
 LONG_SECONDS = 15.0  # the log of a job that runs longer than this is named
-MAX_FAILURES_LISTED = 20  # the summary lists at most this many failed jobs
 TAIL_BYTES = 1 << 16  # an error message is searched for in this many bytes at the end of a job's log
 # A line of a job's log that reports an error: date, time, ERROR and the message.
 ERROR_LINE = re.compile(r"^\S+ \S+ ERROR (.*)$", re.M)
@@ -136,10 +135,8 @@ class Terminal:
         count = f"{self.done} of {self.total or len(self.jobs)} jobs done in {took}"
         if self.failed:
             self._print_line(f"{count}, {len(self.failed)} failed:")
-            for job in self.failed[:MAX_FAILURES_LISTED]:
+            for job in self.failed:
                 self._print_line(f"  {job.name}: {job.log}")
-            if len(self.failed) > MAX_FAILURES_LISTED:
-                self._print_line(f"  and {len(self.failed) - MAX_FAILURES_LISTED} more")
             self._print_line("When this is fixed, the same command continues from here.")
         elif self.stopped:
             self._print_line(f"{count}, then stopped. The same command continues from here.")
@@ -297,13 +294,10 @@ class LogHandler(LogHandlerBase):
     def __post_init__(self) -> None:
         settings = self.common_settings
         stream = sys.stdout if settings.stdout else sys.stderr
+        shown = (settings.debug_dag, settings.verbose, settings.dryrun, settings.printshellcmds)
         self.full = settings.printshellcmds or settings.verbose or settings.debug_dag
-        quiet, debug = (
-            settings.quiet,
-            (settings.debug_dag, settings.verbose, settings.dryrun, settings.printshellcmds),
-        )
-        self.snakemake_filter = DefaultFilter(quiet, *debug)
-        self.snakemake_formatter = DefaultFormatter(quiet, settings.show_failed_logs)
+        self.snakemake_filter = DefaultFilter(settings.quiet, *shown)
+        self.snakemake_formatter = DefaultFormatter(settings.quiet, settings.show_failed_logs)
         self.terminal = Terminal(stream, stream.isatty(), settings.dryrun)
         threading.Thread(target=self._tick, daemon=True).start()
 
@@ -318,8 +312,7 @@ class LogHandler(LogHandlerBase):
             if not self.snakemake_filter.filter(record):
                 return
             if self.full:
-                text = self.snakemake_formatter.format(record)
-                self.terminal.stream.write(f"{text}\n")
+                print(self.snakemake_formatter.format(record), file=self.terminal.stream)
             else:
                 self.terminal.show_record(record)
         except BrokenPipeError:
@@ -333,27 +326,6 @@ class LogHandler(LogHandlerBase):
             self.terminal.close()
         super().close()
 
-    @property
-    def writes_to_stream(self) -> bool:
-        """True, so that Snakemake itself prints nothing."""
-        return True
-
-    @property
-    def writes_to_file(self) -> bool:
-        """False: it writes no file."""
-        return False
-
-    @property
-    def has_filter(self) -> bool:
-        """True: it filters records itself."""
-        return True
-
-    @property
-    def has_formatter(self) -> bool:
-        """True: it formats records itself."""
-        return True
-
-    @property
-    def needs_rulegraph(self) -> bool:
-        """False: it does not use the rule graph."""
-        return False
+    writes_to_stream = True  # so that Snakemake itself prints nothing
+    has_filter = has_formatter = True
+    writes_to_file = needs_rulegraph = False

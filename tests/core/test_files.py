@@ -12,7 +12,7 @@ import pytest
 from hobble.core import files
 from hobble.core.clip import Clip, load_clip, save_clip
 from hobble.core.errors import HobbleError, InputError
-from hobble.core.files import atomic_path, load_npz, read_json, save_npz, write_json, write_text
+from hobble.core.files import atomic_path, load_npz, map_npz, read_json, save_npz, write_json, write_text
 
 
 def leftovers(folder):
@@ -85,11 +85,30 @@ def test_damaged_arrays_are_found(tmp_path):
         load_npz(tmp_path / "b.npz")
 
 
-def test_only_the_requested_arrays_are_loaded(tmp_path):
-    save_npz(tmp_path / "a.npz", x=np.arange(3), y=np.arange(4))
-    assert list(load_npz(tmp_path / "a.npz", ["y"])) == ["y"]
+def test_only_what_is_wanted_is_loaded(tmp_path):
+    path, rng = tmp_path / "a.npz", np.random.default_rng(1)
+    arrays = {"x": rng.normal(size=(50, 3, 2)), "frame": np.arange(50, dtype=np.int32)}
+    arrays |= {"name": np.array("walk"), "empty": np.zeros((0, 3))}
+    save_npz(path, **arrays)
+    assert list(load_npz(path, ["frame"])) == ["frame"]
     with pytest.raises(InputError):
-        load_npz(tmp_path / "a.npz", ["z"])
+        load_npz(path, ["z"])
+    mapped = map_npz(path)
+    assert list(mapped) == list(arrays)
+    for name, array in arrays.items():
+        assert (mapped[name].shape, mapped[name].dtype) == (array.shape, array.dtype)
+        np.testing.assert_array_equal(mapped[name], array)
+    np.testing.assert_array_equal(mapped["x"][48:60], arrays["x"][48:])
+    assert str(mapped["name"]) == "walk"
+    with pytest.raises(InputError, match=r"a\.npz: holds no array 'y'"):
+        _ = mapped["y"]
+    path.write_bytes(path.read_bytes()[:900])
+    with pytest.raises(InputError, match="damaged or not an npz file"):
+        map_npz(path)
+    for save in (np.savez_compressed, lambda p, x: np.savez(p, np.asfortranarray(x))):
+        save(tmp_path / "c.npz", np.arange(6.0).reshape(2, 3))
+        with pytest.raises(InputError, match="damaged or not an npz file"):
+            map_npz(tmp_path / "c.npz")
 
 
 def test_clips_round_trip(tmp_path, holden31):

@@ -117,7 +117,7 @@ def test_unsafe_clip_names_are_refused_with_their_folder(catalogue: Path, tmp_pa
     for name in unsafe:
         path = write(folder / f"{name}.bvh", "HIERARCHY")
         with pytest.raises(InputError, match="mocap/mine: a clip is called") as refusal:
-            Project(catalogue.parent, {"mocap": tmp_path / "mocap"}).clips.entries("mine")
+            _ = Project(catalogue.parent, {"mocap": tmp_path / "mocap"}).dataset("mine").entries
         assert str(refusal.value).isprintable()
         path.unlink()
 
@@ -170,7 +170,7 @@ def test_an_unreadable_file_that_planning_needs_is_named(closed: str) -> None:
         def read() -> None:
             project = Project(base, {"mocap": base / "mocap"})
             check_targets(project, ["results/test/report.html"])
-            project.datasets.splits("mine", [])
+            project.dataset("mine").splits([])
 
         def read_as_nobody() -> None:
             become_nobody()

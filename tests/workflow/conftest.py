@@ -6,8 +6,8 @@ import shutil
 from pathlib import Path
 
 import pytest
-from tests.checkout import Workflow
 
+from tests.checkout import Workflow
 from tests.workflow.small_project import DATASET
 
 

@@ -14,7 +14,7 @@ import pytest
 
 from hobble.core.errors import HobbleError, InputError
 from hobble.core.files import write_text
-from hobble.workflow.batches import LEAST_BATCHES, MOST_CLIPS_OF_A_BATCH, batch_count, batch_of
+from hobble.workflow.datasets import LEAST_BATCHES, MOST_CLIPS_OF_A_BATCH, batch_count, batch_of
 from hobble.workflow.job import Inputs, make_each
 from hobble.workflow.project import Project
 
@@ -119,15 +119,15 @@ def test_the_batch_of_a_clip_depends_on_its_name_and_batches_split_in_two() -> N
 
 
 def test_a_clip_has_its_folders_and_a_hurt_version_those_of_the_stage_hurt(root: Path) -> None:
-    batches = Project(root, {}).batches
-    found = batches.folders("tiny", ["uneven-1", "uneven-1_mirror"], "motion", "terrain")
+    data = Project(root, {}).dataset("tiny")
+    found = data.folders(["uneven-1", "uneven-1_mirror"], "motion", "terrain")
     assert found == [f"results/datasets/tiny/batches/{stage}/uneven-1" for stage in ("motion", "terrain")]
-    found = batches.folders("tiny", ["uneven-1_hurt1"], "motion", "labels", "channels", "terrain")
+    found = data.folders(["uneven-1_hurt1"], "motion", "labels", "channels", "terrain")
     stages = [folder.removeprefix("results/datasets/tiny/batches/") for folder in found]
     assert stages == [f"{stage}/uneven-1_hurt" for stage in ("hurt", "channels", "terrain")]
-    assert batches.named("tiny", "uneven-1_hurt").originals == ("uneven-1",)
+    assert data.batch("uneven-1_hurt").originals == ("uneven-1",)
     with pytest.raises(HobbleError, match="data set tiny has no batch 7; it has walk-straight-1, "):
-        batches.named("tiny", "7")
+        data.batch("7")
 
 
 def test_an_input_is_found_wherever_snakemake_has_put_it(tmp_path: Path) -> None:

@@ -25,7 +25,7 @@ from tests.workflow.small_project import DATASET
 def test_an_impossible_data_set_is_reported(base: Path, text: str, message: str) -> None:
     (base / "config/datasets/mine.yaml").write_text(text)
     with pytest.raises(HobbleError, match=message):
-        Project(base, {}).configurations.splits("one")
+        _ = Project(base, {}).configuration("one").splits
 
 
 @pytest.mark.parametrize(

@@ -21,7 +21,7 @@ from tests.workflow.small_project import DATASET
 def test_a_listed_clip_without_a_file_is_reported(base: Path) -> None:
     (base / "config/datasets/mine.yaml").write_text(DATASET + "clips: {a: , b: , gone: }\n")
     with pytest.raises(HobbleError, match=r"gone\.bvh: no such file"):
-        Project(base, {}).clips.source("mine", "gone")
+        Project(base, {}).dataset("mine").source("gone")
 
 
 def test_clips_are_found_in_subfolders_and_whatever_the_case_of_their_suffix(base: Path) -> None:
@@ -33,10 +33,10 @@ def test_clips_are_found_in_subfolders_and_whatever_the_case_of_their_suffix(bas
     (base / "data/mine/.trash").mkdir()
     (base / "data/mine/.trash/e.bvh").write_text("")
     project = Project(base, {})
-    assert list(project.clips.entries("mine")) == ["a", "b", "c", "d"]
-    assert project.clips.source("mine", "d") == str(below / "d.BVH")
-    assert project.clips.label_files("mine", "d") == [str(below / "d_gait.txt")]
-    assert project.datasets.channel_sources.files("mine", "d", "injury") == [str(below / "d_injuries.txt")]
+    assert list(project.dataset("mine").entries) == ["a", "b", "c", "d"]
+    assert project.dataset("mine").source("d") == str(below / "d.BVH")
+    assert project.dataset("mine").label_files("d") == [str(below / "d_gait.txt")]
+    assert project.dataset("mine").channel_files("d", "injury") == [str(below / "d_injuries.txt")]
 
 
 def test_a_clip_in_linked_folders_is_found_once(base: Path) -> None:
@@ -50,9 +50,9 @@ def test_a_clip_in_linked_folders_is_found_once(base: Path) -> None:
         (base / f"data/mine/{name}").symlink_to(base / "kept")
     (base / "data/mine/gone").symlink_to(base / "nowhere")
     project = Project(base, {})
-    assert list(project.clips.entries("mine")) == ["a", "b", "c", "d"]
-    assert project.clips.source("mine", "d") == str(base / "data/mine/first/day 1/d.bvh")
-    assert project.datasets.channel_sources.files("mine", "d", "injury") == [
+    assert list(project.dataset("mine").entries) == ["a", "b", "c", "d"]
+    assert project.dataset("mine").source("d") == str(base / "data/mine/first/day 1/d.bvh")
+    assert project.dataset("mine").channel_files("d", "injury") == [
         str(base / "data/mine/first/day 1/d_injuries.txt")
     ]
 
@@ -62,22 +62,21 @@ def test_a_mirror_beside_its_original_is_left_out(base: Path, mirror: bool) -> N
     text = DATASET.replace("mirror: true", f"mirror: {str(mirror).lower()}")
     (base / "config/datasets/mine.yaml").write_text(text)
     (base / "data/mine/a_mirror_footsteps.txt").write_text("1 2\n")
-    clips = Project(base, {}).clips
-    assert list(clips.entries("mine")) == ["a", "b", "c"]
+    clips = Project(base, {}).dataset("mine")
+    assert list(clips.entries) == ["a", "b", "c"]
     said = [] if mirror else ["1 files in .* are mirrors of other clips .a_mirror.*`mirror: true` Hobble m"]
     assert all(
-        re.search(wanted, note)
-        for wanted, note in zip(said, clips.notes_on_unused_files("mine"), strict=True)
+        re.search(wanted, note) for wanted, note in zip(said, clips.notes_on_unused_files(), strict=True)
     )
     (base / "data/mine/a_mirror.bvh").rename(base / "data/mine/z_mirror.bvh")
     with pytest.raises(HobbleError, match=r"z_mirror: names that end in _mirror are .* `mirror: true` makes"):
-        Project(base, {}).clips.entries("mine")
+        _ = Project(base, {}).dataset("mine").entries
 
 
 def test_a_status_file_without_a_clip_is_reported_with_the_nearest_name(base: Path) -> None:
     (base / "data/mine/orphan.bvh").write_text("")
     (base / "data/mine/orphn_injuries.txt").write_text("frames:9\n1-9 LeftLeg-LeftFoot[4];\n")
-    (note,) = Project(base, {}).clips.notes_on_unused_files("mine")
+    (note,) = Project(base, {}).dataset("mine").notes_on_unused_files()
     assert (
         "orphn_injuries.txt belongs to no clip and is not read. If it belongs to orphan, rename it." in note
     )
@@ -87,11 +86,11 @@ def test_two_files_of_one_clip_are_refused_with_both(base: Path) -> None:
     (base / "data/mine/old").mkdir()
     (base / "data/mine/old/a.BVH").write_text("")
     with pytest.raises(HobbleError, match=r"old/a\.BVH: a second file of clip a; the first is .*mine/a\.bvh"):
-        Project(base, {}).clips.entries("mine")
+        _ = Project(base, {}).dataset("mine").entries
     (base / "config/datasets/mine.yaml").write_text(DATASET + "clips: {a: , b: , c: }\n")
     with pytest.raises(HobbleError, match="a second file of clip a"):
-        Project(base, {}).clips.source("mine", "a")
-    assert Project(base, {}).clips.source("mine", "b").endswith("mine/b.bvh")
+        Project(base, {}).dataset("mine").source("a")
+    assert Project(base, {}).dataset("mine").source("b").endswith("mine/b.bvh")
 
 
 def test_a_clip_depends_on_the_skeleton_that_it_is_retargeted_from(complete: Path, root: Path) -> None:
@@ -102,11 +101,12 @@ def test_a_clip_depends_on_the_skeleton_that_it_is_retargeted_from(complete: Pat
     )
     (complete / "data/mine/b.bvh").write_text(header)
     project = Project(complete, {})
-    assert [Path(f).name for f in project.clips.clip_skeleton_files("mine", "b")] == ["mixamo55.yaml"]
-    assert project.clips.clip_skeleton_files("mine", "a") == []
-    shipped = Project(root, {}).clips
-    assert [Path(f).name for f in shipped.clip_skeleton_files("synthetic-ava", "walk-1")] == ["holden31.yaml"]
-    assert shipped.clip_skeleton_files("synthetic", "walk-1") == []
+    assert [Path(f).name for f in project.dataset("mine").clip_skeleton_files("b")] == ["mixamo55.yaml"]
+    assert project.dataset("mine").clip_skeleton_files("a") == []
+    shipped = Project(root, {})
+    (rig,) = shipped.dataset("synthetic-ava").clip_skeleton_files("walk-1")
+    assert rig.endswith("/holden31.yaml")
+    assert shipped.dataset("synthetic").clip_skeleton_files("walk-1") == []
 
 
 @pytest.mark.parametrize("name", ["a.bvh", "map.txt"])
@@ -116,14 +116,13 @@ def test_a_pipe_is_refused_as_a_clip(base: Path, name: str) -> None:
     (base / "config/datasets/mine.yaml").write_text(text)
     (base / f"data/mine/{name}").unlink(missing_ok=True)
     os.mkfifo(base / f"data/mine/{name}")
-    clips = Project(base, {}).clips
     with pytest.raises(HobbleError, match=f"mine/{name}: a device or a pipe, not a file"):
-        (clips.entries if name == "a.bvh" else clips.heightmap_files)("mine")
+        getattr(Project(base, {}).dataset("mine"), "entries" if name == "a.bvh" else "heightmap_files")
     listed = text + "clips: {a: , b: }\n"
     (base / "config/datasets/mine.yaml").write_text(listed)
     if name == "a.bvh":
         with pytest.raises(HobbleError, match=f"mine/{name}: a device or a pipe"):
-            Project(base, {}).clips.source("mine", "a")
+            Project(base, {}).dataset("mine").source("a")
 
 
 @pytest.mark.shared
@@ -132,7 +131,7 @@ def test_plan_and_job_use_the_same_skeleton_file(root: Path, shared: Path) -> No
     target = load_skeleton(root / "config/skeletons/holden31.yaml")
     options = ClipMotion()
     for clip in ("Injured_Ilde", "Injured_Walk_LLL", "Injured_Run_LLL_extended_converted"):
-        file = read_bvh(project.clips.source("ferre", clip))
+        file = read_bvh(project.dataset("ferre").source(clip))
         rig = load_source(file, target, root / "config/skeletons", options).match.rig
-        files = project.clips.clip_skeleton_files("ferre", clip)
+        files = project.dataset("ferre").clip_skeleton_files(clip)
         assert [Path(f).stem for f in files] == [rig] * (rig != "holden31")

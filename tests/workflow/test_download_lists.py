@@ -22,13 +22,13 @@ def test_missing_clips_are_downloaded(base: Path) -> None:
     (base / "config/datasets/far.yaml").write_text(FAR + "clips: {'2_1': , '2_2': , '2_3': }\n")
     (base / "config/datasets/far.sha256").write_text(f"{'a' * 64}  2_1.bvh\n{'B' * 64} *2_2.bvh\n\n")
     project = Project(base, {})
-    assert project.clips.source("far", "2_1") == str(base / "data/downloaded/far/2_1.bvh")
+    assert project.dataset("far").source("2_1") == str(base / "data/downloaded/far/2_1.bvh")
     assert (
-        project.clips.label_files("far", "2_1")
-        == project.datasets.channel_sources.files("far", "2_1", "injury")
+        project.dataset("far").label_files("2_1")
+        == project.dataset("far").channel_files("2_1", "injury")
         == []
     )
-    assert project.clips.download("far", "2_2") == {
+    assert project.dataset("far").download("2_2") == {
         "url": "https://host/002/2_2.bvh",
         "sha256": "b" * 64,
         "folder": str(base / "data/far"),
@@ -36,10 +36,10 @@ def test_missing_clips_are_downloaded(base: Path) -> None:
     with pytest.raises(
         HobbleError, match=r"far/2_3\.bvh: no such file, .*not in the download list .*far\.sha256"
     ):
-        project.clips.source("far", "2_3")
+        project.dataset("far").source("2_3")
     (base / "data/far").mkdir()
     (base / "data/far/2_1.bvh").write_text("")
-    assert Project(base, {}).clips.source("far", "2_1") == str(base / "data/far/2_1.bvh")
+    assert Project(base, {}).dataset("far").source("2_1") == str(base / "data/far/2_1.bvh")
 
 
 @pytest.mark.parametrize(
@@ -68,24 +68,23 @@ def test_a_bad_checksum_list_is_reported_with_its_line(base: Path) -> None:
     (base / "config/datasets/far.yaml").write_text(FAR + "clips: {'2_1': }\n")
     (base / "config/datasets/far.sha256").write_text(f"{'a' * 64}  2_1.bvh\n{'a' * 63}  2_2.bvh\n")
     with pytest.raises(HobbleError, match=r"far\.sha256, line 2: expected a SHA-256"):
-        Project(base, {}).clips.source("far", "2_1")
+        Project(base, {}).dataset("far").source("2_1")
 
 
 def test_every_clip_of_the_cmu_set_has_a_checksum_and_an_address(root: Path) -> None:
     project = Project(root, {"mocap": "nowhere"})
     check_targets(project, ["results/datasets/cmu/motion/02_01.npz"])
-    assert len(project.clips.listed_entries("cmu")) == 68
-    assert project.clips.download("cmu", "02_01")["url"].endswith("/cmu-mocap/master/data/002/02_01.bvh")
-    assert project.clips.download("cmu", "105_16")["url"].endswith("/105/105_16.bvh")
+    assert len(project.dataset("cmu").listed) == 68
+    assert project.dataset("cmu").download("02_01")["url"].endswith("/cmu-mocap/master/data/002/02_01.bvh")
+    assert project.dataset("cmu").download("105_16")["url"].endswith("/105/105_16.bvh")
     assert all(
-        len(project.clips.download("cmu", clip)["sha256"]) == 64
-        for clip in project.clips.listed_entries("cmu")
+        len(project.dataset("cmu").download(clip)["sha256"]) == 64 for clip in project.dataset("cmu").listed
     )
 
 
 @pytest.mark.shared
 def test_the_checksums_are_those_of_the_files(root: Path, shared: Path) -> None:
     project = Project(root, {})
-    for clip in project.clips.listed_entries("cmu"):
+    for clip in project.dataset("cmu").listed:
         data = (shared / f"mocap/cmu/{clip}.bvh").read_bytes()
-        assert project.clips.download("cmu", clip)["sha256"] == hashlib.sha256(data).hexdigest()
+        assert project.dataset("cmu").download(clip)["sha256"] == hashlib.sha256(data).hexdigest()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import subprocess
 from collections.abc import Iterator
@@ -9,102 +10,87 @@ from pathlib import Path
 
 import pytest
 
+from tests.checkout import Workflow
+
 pytestmark = pytest.mark.workflow
 
 # A figure of one bone, whatever its joints are called.
 STICK = (
-    """HIERARCHY
-ROOT Hips
-{
-OFFSET 0 0 0
-CHANNELS 6 Xposition Yposition Zposition Zrotation Xrotation Yrotation
-End Site
-{
-OFFSET 0 90 0
-}
-}
-MOTION
-Frames: 200
-Frame Time: 0.0083333
-"""
-    + "0 90 0 0 0 0\n" * 200
+    "HIERARCHY\nROOT Hips\n{\nOFFSET 0 0 0\n"
+    "CHANNELS 6 Xposition Yposition Zposition Zrotation Xrotation Yrotation\n"
+    "End Site\n{\nOFFSET 0 90 0\n}\n}\nMOTION\nFrames: 200\nFrame Time: 0.0083333\n" + "0 90 0 0 0 0\n" * 200
 )
-DATASET = "skeleton: holden31\nfolder: mine\n"
 
 
 @pytest.fixture
-def mine(clips: list[Path], workflow):
-    """A user's data set of those two clips."""
-    folder = workflow.folder / "mocap" / "mine"
+def mine(clips: list[Path], workflow: Workflow) -> Path:
+    """The folder of a user's data set with two clips: uneven-1 and walk-straight-1."""
+    folder = workflow.folder / "mocap/mine"
     folder.mkdir(parents=True)
     for path in clips:
         for file in path.parent.glob(f"{path.stem}[._]*"):
             (folder / file.name).write_bytes(file.read_bytes())
-    (workflow.folder / "config/datasets/mine.yaml").write_text(DATASET)
-    workflow.clip, workflow.other = (path.stem for path in clips)
-    workflow.mine = folder
-    return workflow
+    (workflow.folder / "config/datasets/mine.yaml").write_text("skeleton: holden31\nfolder: mine\n")
+    return folder
 
 
-def make(workflow, *targets: str, ok: bool) -> str:
-    files = [f"results/datasets/mine/{target}" for target in targets]
-    return workflow.run("-c2", *files, "--keep-going", "--config", "mocap=mocap", ok=ok)
+def on_a_terminal(workflow: Workflow, *arguments: str) -> tuple[int, str]:
+    """Exit status and output of a run in a pseudo-terminal, where the line of progress is overwritten."""
+    ours, theirs = os.openpty()
+    command = workflow.command(*arguments)
+    process = subprocess.Popen(command, **workflow.how(), stdout=theirs, stderr=theirs)
+    os.close(theirs)
+    said = b""
+    try:
+        while block := os.read(ours, 65536):
+            said += block
+    except OSError:
+        pass  # the other side is closed
+    return process.wait(), said.decode()
 
 
-def spoil(lines: list[str], how: str) -> str:
-    motion = lines.index("MOTION")
-    if how == "truncated":
-        return "\n".join(lines[: motion + 30])
-    if how == "nan":
-        lines[motion + 10] = "nan " + lines[motion + 10].split(" ", 1)[1]
-    if how == "skeleton":
-        return STICK
-    return "\n".join(lines)
+def test_each_bad_file_is_refused_with_its_place_and_the_others_are_made(
+    workflow: Workflow, mine: Path
+) -> None:
+    """One run with three bad clips, two bad status files and two good clips."""
+    good, status = (mine / "uneven-1.bvh").read_text(), (mine / "uneven-1_injuries.txt").read_text()
+    frames = status.splitlines()[0]
+    files = {
+        "torn.bvh": good[: len(good) // 2],
+        "stick.bvh": STICK,
+        "binary.bvh": "\0\1\2" * 999,
+        "wing.bvh": f"{good}\n",
+        "wing_injuries.txt": f"{frames}\n1-20 LeftWing-LeftTip[5];\n",
+        "back.bvh": f"{good}\n\n",
+        "back_injuries.txt": f"{frames}\n20-1 LeftUpLeg-LeftLeg[5];\n",
+    }
+    for name, text in files.items():
+        (mine / name).write_text(text)
+    asked = ["uneven-1", "walk-straight-1", *(Path(name).stem for name in files if name.endswith(".bvh"))]
+    targets = [f"results/datasets/mine/channels/injury/{name}.npz" for name in asked]
+    ended, said = on_a_terminal(workflow, "-c2", *targets, "--keep-going", "--config", "mocap=mocap")
+    assert ended == 1
+    assert "Traceback" not in said
+    lines = [line.rpartition("\x1b[K")[2] for line in said.splitlines()]
+    for start, piece in {
+        "motion_clips: .*torn.bvh": "line",
+        "motion_clips: .*stick.bvh": "",
+        "motion_clips: .*binary.bvh": "",
+        "channel_clips: .*wing_injuries.txt": "LeftWing-LeftTip",
+        "channel_clips: .*back_injuries.txt": "20-1",
+    }.items():
+        (message,) = [line for line in lines if re.match(start, line)]
+        assert piece in message, message
+    assert re.search(r"^\d+ of \d+ jobs done in .*, 5 failed:", "\n".join(lines), re.M)
+    made = {path.stem for path in (workflow.folder / "results/datasets/mine/channels/injury").glob("*.npz")}
+    assert made == {"uneven-1", "walk-straight-1"}
 
 
-BAD_CLIPS = {
-    "truncated": ("line",),
-    "nan": ("line", "frame 8"),
-    "skeleton": (),
-    "empty": ("empty",),
-    "binary": (),
-}
-BAD_STATUS = {
-    "wing": ("1-20 LeftWing-LeftTip[5];", ("line 2", "LeftWing-LeftTip")),
-    "eleven": ("1-20 LeftUpLeg-LeftLeg[11];", ("line 2", "11", "10")),
-    "back": ("20-1 LeftUpLeg-LeftLeg[5];", ("line 2", "20-1")),
-    "short": ("frames:7", ("line 1", "7")),
-}
-
-
-def test_each_bad_file_is_refused_with_its_place_and_the_others_are_made(mine) -> None:
-    """One run with five bad clips, four bad status files and two good clips."""
-    good: Path = mine.mine / f"{mine.clip}.bvh"
-    lines, frames = good.read_text().splitlines(), (mine.mine / f"{mine.clip}_injuries.txt").read_text()
-    for number, name in enumerate([*BAD_CLIPS, *BAD_STATUS]):
-        path = mine.mine / f"{name}.bvh"
-        path.write_text(spoil(list(lines), name) + "\n" * number)
-        if name == "empty":
-            path.write_bytes(b"")
-        elif name == "binary":
-            path.write_bytes(bytes(range(256)) * 20)
-    for name, (line, _) in BAD_STATUS.items():
-        text = f"{line}\n" if line.startswith("frames") else f"{frames.splitlines()[0]}\n{line}\n"
-        (mine.mine / f"{name}_injuries.txt").write_text(text)
-    asked = [mine.clip, mine.other, *BAD_CLIPS, *BAD_STATUS]
-    text = make(mine, *(f"channels/injury/{name}.npz" for name in asked), ok=False)
-    assert "Traceback" not in text
-    wanted = {f"motion_clips: .*{name}.bvh": pieces for name, pieces in BAD_CLIPS.items()}
-    wanted |= {f"channel_clips: .*{name}_injuries.txt": pieces for name, (_, pieces) in BAD_STATUS.items()}
-    for start, pieces in wanted.items():
-        (message,) = [line for line in text.splitlines() if re.match(start, line)]
-        assert all(piece in message for piece in pieces), message
-    made = {path.stem for path in (mine.folder / "results/datasets/mine/channels/injury").glob("*.npz")}
-    assert made == {mine.clip, mine.other}
-
-
-def test_a_missing_data_folder_is_named(mine) -> None:
-    text = mine.run("-n", "results/datasets/mine/motion/a.npz", "--config", "mocap=nowhere", ok=False)
+def test_a_plan_takes_few_lines_and_all_of_snakemakes_with_p(workflow: Workflow, mine: Path) -> None:
+    target = "results/datasets/tiny/channels/injury/walk-straight-1.npz"
+    assert len(workflow.run("-n", target).splitlines()) < 20
+    assert "rule synthetic_clips:" in workflow.run("-np", target)
+    text = workflow.run("-n", "results/datasets/mine/motion/a.npz", "--config", "mocap=nowhere", ok=False)
     assert "nowhere/mine: no such folder" in text
     assert "mocap=FOLDER" in text
 
@@ -114,7 +100,6 @@ def test_a_missing_data_folder_is_named(mine) -> None:
     [
         ("training={learning_rate: -1}", "training.learning_rate: input should be greater than 0"),
         ("trainnig={passes: 1}", "trainnig: there is no such key. Allowed here"),
-        ("dataset=nope", "nope.yaml: no such file. There are:"),
     ],
 )
 def test_a_bad_configuration_is_refused_before_planning(workflow, override: str, message: str) -> None:
@@ -125,7 +110,7 @@ def test_a_bad_configuration_is_refused_before_planning(workflow, override: str,
 
 
 @pytest.fixture
-def small_disk(workflow) -> Iterator[Path]:
+def small_disk(workflow: Workflow) -> Iterator[Path]:
     """The run's results on a small file system of their own. Snakemake's own files are elsewhere, because it
     adds a traceback to our message if it cannot write them.
     """

@@ -30,8 +30,7 @@ def test_a_module_makes_the_same_in_its_place(workflow, finished, tmp_path, plac
     for target in ("-n", motion):
         done = subprocess.run(
             workflow.command("-c2", target),
-            cwd=tmp_path,
-            env=workflow.environment(),
+            **{**workflow.how(), "cwd": tmp_path},
             capture_output=True,
             text=True,
         )

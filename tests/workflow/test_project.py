@@ -18,10 +18,10 @@ from tests.workflow.small_project import DATASET
 def test_mirrors_go_with_their_originals_and_hurt_clips_to_injured_networks(base: Path) -> None:
     project = Project(base, {})
     healthy = {"a": "train", "a_mirror": "train", "b": "held_out", "b_mirror": "held_out"}
-    assert project.configurations.splits("one") == healthy
-    assert project.configurations.splits("hurt") == {**healthy, "c": "train", "c_mirror": "train"}
-    assert project.configurations.database("one").endswith("mine/database/plain")
-    assert project.configurations.database("hurt").endswith("mine/database/injury")
+    assert project.configuration("one").splits == healthy
+    assert project.configuration("hurt").splits == {**healthy, "c": "train", "c_mirror": "train"}
+    assert project.configuration("one").database.endswith("mine/database/plain")
+    assert project.configuration("hurt").database.endswith("mine/database/injury")
 
 
 MOODS = """
@@ -37,22 +37,22 @@ def test_a_hurt_version_has_the_mood_of_its_clip(base: Path) -> None:
     (base / "config/mood.yaml").write_text("extends: one\nchannels: [mood]\n")
     (base / "config/both.yaml").write_text("extends: one\nchannels: [mood, injury]\n")
     project = Project(base, {})
-    values = project.datasets.channel_sources
-    assert [values.is_neutral("mine", clip, "mood") for clip in ("a_hurt1", "b_hurt1")] == [True, False]
-    source = channel("mood").make_source(values.source("mine", "b_hurt1", "mood"))
+    values = project.dataset("mine")
+    assert [values.is_neutral(clip, "mood") for clip in ("a_hurt1", "b_hurt1")] == [True, False]
+    source = channel("mood").make_source(values.channel_source("b_hurt1", "mood"))
     assert not channel("mood").is_neutral(source)
     plain, moods = ("a", "a_mirror"), ("a", "a_mirror", "b", "b_mirror")
     both = {*moods, *(f"{v}{m}" for v in ("a_hurt1", "b_hurt1", "c") for m in ("", "_mirror"))}
-    assert set(project.configurations.splits("one")) == set(plain)
-    assert set(project.configurations.splits("mood")) == set(moods)
-    assert set(project.configurations.splits("hurt")) == {c for c in both if c[0] != "b"}
-    assert set(project.configurations.splits("both")) == both
-    database = project.configurations.database("both")
+    assert set(project.configuration("one").splits) == set(plain)
+    assert set(project.configuration("mood").splits) == set(moods)
+    assert set(project.configuration("hurt").splits) == {c for c in both if c[0] != "b"}
+    assert set(project.configuration("both").splits) == both
+    database = project.configuration("both").database
     assert database.endswith("mine/database/injury+mood"), "in the order of the list of channels"
-    people = project.measurements.params("both", "manners")["people"]
+    people = project.configuration("both").measure_params("manners")["people"]
     assert {clip for clip, person in people.items() if person == "ann"} == {c for c in both if c[0] in "ac"}
     assert {person for clip, person in people.items() if clip[0] == "b"} == {"b"}
-    assert project.measurements.params("both", "accuracy")["people"] == {}
+    assert project.configuration("both").measure_params("accuracy")["people"] == {}
 
 
 def test_severities_of_0_count_as_healthy_and_an_entry_replaces_the_file(base: Path) -> None:
@@ -60,15 +60,15 @@ def test_severities_of_0_count_as_healthy_and_an_entry_replaces_the_file(base: P
         (base / f"data/mine/{clip}_injuries.txt").write_text(f"frames:9\n{text}\n")
 
     def healthy() -> list[bool]:
-        sources = Project(base, {}).datasets.channel_sources
-        return [sources.is_neutral("mine", clip, "injury") for clip in "abc"]
+        sources = Project(base, {}).dataset("mine")
+        return [sources.is_neutral(clip, "injury") for clip in "abc"]
 
     assert healthy() == [True, True, False]
     entry = "{channels: {injury: 'LeftLeg-LeftFoot[%s]'}}"
     text = f"{DATASET}clips: {{a: {entry % 2}, b: {entry % 0}, c: }}\n"
     (base / "config/datasets/mine.yaml").write_text(text)
     assert healthy() == [False, True, False]
-    assert Project(base, {}).datasets.channel_sources.files("mine", "a", "injury") == []
+    assert Project(base, {}).dataset("mine").channel_files("a", "injury") == []
 
 
 @pytest.mark.parametrize("name", ["Walk Forward", "walk, slow (2)", "gå+走"])
@@ -77,34 +77,29 @@ def test_a_clip_with_any_file_name_can_have_an_entry(base: Path, name: str) -> N
     text = f"{DATASET.replace('[b]', json.dumps([name]))}clips: {{a: , {json.dumps(name)}: {{gait: jog}}}}\n"
     (base / "config/datasets/mine.yaml").write_text(text)
     project = Project(base, {})
-    assert project.clips.entry("mine", name).gait == "jog"
-    assert project.configurations.splits("hurt")[name + "_mirror"] == "held_out"
-    assert project.clips.source("mine", name) == str(base / f"data/mine/{name}.bvh")
+    assert project.dataset("mine").entry(name).gait == "jog"
+    assert project.configuration("hurt").splits[name + "_mirror"] == "held_out"
+    assert project.dataset("mine").source(name) == str(base / f"data/mine/{name}.bvh")
 
 
 def test_network_of_reads_the_other_configurations_files(root: Path) -> None:
     project = Project(root, {})
-    assert project.configurations.network("ava-m", "weights.npz") == "results/ava/network/weights.npz"
-    assert project.configurations.start_checkpoint("holden-xt") == ["results/holden/network/checkpoint.npz"]
-    assert project.configurations.start_checkpoint("holden") == []
+    assert project.configuration("ava-m").network("weights.npz") == "results/ava/network/weights.npz"
+    assert project.configuration("holden-xt").start_checkpoint() == ["results/holden/network/checkpoint.npz"]
+    assert project.configuration("holden").start_checkpoint() == []
 
 
-def test_a_comparison_reads_the_files_of_its_configurations(complete: Path) -> None:
-    base = complete
-    project = Project(base, {"compare": ["one", "hurt"]})
+def test_a_comparison_has_its_configurations(complete: Path) -> None:
+    project = Project(complete, {"compare": ["one", "hurt"]})
     check_targets(project, ["results/compare/compare.json"])
-    assert project.comparison.input_files()["measurements"] == [
-        file for name in ("one", "hurt") for file in project.measurements.result_files(name)
-    ]
-    injuries = [f"results/{name}/evaluation/injury.json" for name in ("one", "hurt")]
-    made = [file in project.comparison.input_files()["measurements"] for file in injuries]
+    made = [each.result_file("injury") in each.result_files() for each in project.compared]
     assert made == [False, True], "only where the network has the channel"
-    assert Project(base, {"compare": "one,hurt"}).comparison.names() == ["one", "hurt"]
-    (base / "config/read.yaml").write_text("extends: one\nnetwork_of: one\n")
-    read = Project(base, {"compare": ["read"]}).comparison.input_files()
-    assert read["history"] == ["results/one/network/history.csv"]
+    assert [each.name for each in Project(complete, {"compare": "one,hurt"}).compared] == ["one", "hurt"]
+    (complete / "config/read.yaml").write_text("extends: one\nnetwork_of: one\n")
+    (read,) = Project(complete, {"compare": ["read"]}).compared
+    assert read.network("history.csv") == "results/one/network/history.csv"
     # The list of compared configurations belongs to none of them.
-    assert project.configurations.resolved("one") == Project(base, {}).configurations.resolved("one")
+    assert project.configuration("one").resolved() == Project(complete, {}).configuration("one").resolved()
 
 
 @pytest.mark.parametrize(
@@ -139,10 +134,10 @@ def test_names_of_results_folders_are_reserved(base: Path, name: str) -> None:
         Project(base, {})
 
 
-def test_motion_options_include_the_ground_of_the_clip(root):
-    datasets = Project(root, {}).datasets
-    assert datasets.motion_options("cmu", "03_01")["ground"] == "rocky"
-    assert datasets.motion_options("cmu", "02_01") == {**datasets.options("cmu", "motion"), "ground": "flat"}
+def test_motion_options_include_the_ground_of_the_clip(root: Path) -> None:
+    data = Project(root, {}).dataset("cmu")
+    assert data.motion_options("03_01")["ground"] == "rocky"
+    assert data.motion_options("02_01") == {**data.options("motion"), "ground": "flat"}
 
 
 @pytest.mark.parametrize("asked", [5, "", " ", ["a"], {"a": 1}, None, True])

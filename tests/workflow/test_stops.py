@@ -129,7 +129,7 @@ def test_a_kill_at_any_step_before_the_first_job_leaves_no_lock(workflow) -> Non
     while status == -signal.SIGKILL:
         step += 1 if step < 6 else 6
         command = [sys.executable, "-c", KILLED_AT, str(step), "-c1", target]
-        done = subprocess.run(command, cwd=workflow.folder, env=workflow.environment(), capture_output=True)
+        done = subprocess.run(command, **workflow.how(), capture_output=True)
         status = done.returncode
         lock = workflow.folder / ".snakemake/run.lock"
         if lock.exists():

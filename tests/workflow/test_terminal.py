@@ -4,9 +4,6 @@ from __future__ import annotations
 
 import io
 import logging
-import os
-import re
-import subprocess
 from pathlib import Path
 
 import pytest
@@ -163,43 +160,3 @@ def test_a_long_job_shows_its_share_its_errors_and_its_log_while_the_time_moves(
     run.clock += PROGRESS_SECONDS
     run.terminal.tick()
     assert len(run.lines) == 6, "nothing runs"
-
-
-@pytest.mark.workflow
-def test_a_whole_run_takes_few_lines(workflow) -> None:
-    target = "results/datasets/tiny/channels/injury/walk-straight-1.npz"
-    dry = workflow.run("-n", target)
-    assert len(dry.splitlines()) < 20
-    text = workflow.run("-c2", target)
-    lines = [line for line in text.splitlines() if not line.startswith("Using workflow specific profile")]
-    assert lines[0] == "4 jobs: 1 synthetic_clips, 1 motion_clips, 1 channel_clips, 1 clip_file"
-    assert re.fullmatch(r"4 of 4 jobs done in .*\.", lines[-1])
-    assert len([line for line in lines if not line.startswith(("0/4 ", "1/4 ", "2/4 ", "3/4 "))]) == 2
-    assert "Error in rule" not in text
-    assert "rule synthetic_clips:" in workflow.run("-np", "-F", target)
-
-
-@pytest.mark.workflow
-def test_on_a_terminal_a_failure_has_its_own_line(workflow) -> None:
-    """In a pseudo-terminal, on which the line of progress is overwritten."""
-    folder = workflow.folder / "data/mine"
-    folder.mkdir(parents=True)
-    (folder / "torn.bvh").write_text("HIERARCHY\n")
-    (workflow.folder / "config/datasets/mine.yaml").write_text("skeleton: holden31\nfolder: mine\n")
-    ours, theirs = os.openpty()
-    command = workflow.command("-c2", "results/datasets/mine/motion/torn.npz")
-    environment = workflow.environment()
-    process = subprocess.Popen(command, cwd=workflow.folder, env=environment, stdout=theirs, stderr=theirs)
-    os.close(theirs)
-    said = b""
-    try:
-        while block := os.read(ours, 65536):
-            said += block
-    except OSError:
-        pass  # the other side is closed
-    assert process.wait() == 1
-    shown = [line.rpartition("\x1b[K")[2] for line in said.decode().splitlines()]
-    assert len([line for line in shown if line.startswith("motion_clips: ") and "torn.bvh" in line]) == 1, (
-        shown
-    )
-    assert "0 of 2 jobs done in" in said.decode()

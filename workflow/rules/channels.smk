@@ -18,11 +18,11 @@ rule channel_clips:
             {
                 "clip": clip,
                 "channel": channel,
-                "source": datasets.channel_sources.source(w.dataset, clip, channel),
+                "source": dataset(w).channel_source(clip, channel),
                 "code": package.code("channel_clips", f"hobble.channels.{channel}"),
-                "files": {"files": channel_files(w.dataset, clip, channel)},
+                "files": {"files": dataset(w).channel_files(clip, channel)},
             }
-            for channel in batches.channels(batch_of(w))
+            for channel in batch_of(w).channels
             for clip in batch_of(w).clips
         ],
         contents=contents_of(channel_inputs),

@@ -1,15 +1,46 @@
 # What the rules share. In functions of rules, `w` holds the job's wildcards. `project` is made in the Snakefile.
 from hobble.channels import channel_packages, display_modules
-from hobble.measures.measure import all_measures
+from hobble.measures.measure import all_measures, measure_named
+from hobble.workflow import demands
 from hobble.workflow.clips import channels_of_folder
+from hobble.workflow.configurations import PUBLISHED
 from hobble.workflow.contents import Contents
-from hobble.workflow.demands import Demands
+from hobble.workflow.datasets import healthy_originals
+from hobble.workflow.fingerprint import Package
 
-catalogue, clips, datasets = project.catalogue, project.clips, project.datasets
-batches, demands, package = project.batches, Demands(project), project.package
-configurations, measurements = project.configurations, project.measurements
-comparison = project.comparison
-contents = Contents(project.base / "data" / "downloaded")
+package = Package(project.base)
+DOWNLOADED = project.base / "data" / "downloaded"
+contents = Contents(DOWNLOADED)
+SHOWN = [
+    one.module for one in all_measures()
+]  # modules that show and compare measurements
+# Templates and styles of the pages, and the published results that they show. A change makes only the pages again.
+PAGES = package.files(*(f"report/*.{kind}" for kind in ("j2", "css", "js", "yaml")))
+
+
+def dataset(w):
+    """The data set that a job's wildcards name."""
+    return project.dataset(w.dataset)
+
+
+def configuration(w):
+    """The configuration that a job's wildcards name."""
+    return project.configuration(w.configuration)
+
+
+def network_file(name):
+    """An input function: a file in the folder of the configuration's network."""
+    return lambda w: configuration(w).network(name)
+
+
+def section(name):
+    """A param function: a section of the configuration."""
+    return lambda w: configuration(w).section(name)
+
+
+def network_code(script, *modules):
+    """A param function: hash of a script's code, with that of the configuration's kind of network."""
+    return lambda w: package.code(script, configuration(w).model_package, *modules)
 
 
 def contents_of(files):
@@ -25,44 +56,42 @@ def local_files(files):
     return lambda w: keep_local(files(w))
 
 
+def motion_files(w, clip):
+    """The clip's BVH file, and the file of its rig if this is not the data set's skeleton."""
+    return {
+        "bvh": dataset(w).source(clip),
+        "rigs": dataset(w).clip_skeleton_files(clip),
+    }
+
+
 def motion_inputs(w):
     """The BVH files of a batch's clips, and the files of their rigs."""
-    return [
-        file
-        for clip in batch_of(w).clips
-        for file in [
-            clips.source(w.dataset, clip),
-            *clips.clip_skeleton_files(w.dataset, clip),
-        ]
-    ]
+    files = [motion_files(w, clip) for clip in batch_of(w).clips]
+    return [file for each in files for file in (each["bvh"], *each["rigs"])]
 
 
 def label_inputs(w):
     """The label files of a batch's clips."""
-    return [
-        file
-        for clip in batch_of(w).clips
-        for file in clips.label_files(w.dataset, clip)
-    ]
+    return [f for clip in batch_of(w).clips for f in dataset(w).label_files(clip)]
 
 
 def channel_inputs(w):
     """The files that a batch's channels read."""
     return [
         file
-        for channel in batches.channels(batch_of(w))
+        for channel in batch_of(w).channels
         for clip in batch_of(w).clips
-        for file in channel_files(w.dataset, clip, channel)
+        for file in dataset(w).channel_files(clip, channel)
     ]
 
 
 def heightmap_inputs(w):
     """The heightmaps of a data set that are files."""
-    return clips.heightmap_files(w.dataset)
+    return dataset(w).heightmap_files
 
 
 wildcard_constraints:
-    configuration="|".join(catalogue.names()),
+    configuration="|".join(project.catalogue.names()),
     dataset=r"[^/]+",
     clip=r"[^/]+",
     batch=r"[^/]+",
@@ -83,13 +112,13 @@ def keep_local(files):
 
 
 def batch_of(w):
-    """The clips or hurt versions that one job of a stage processes, see hobble.workflow.batches."""
-    return batches.named(w.dataset, w.batch)
+    """The clips or hurt versions that one job of a stage processes, see hobble.workflow.datasets."""
+    return dataset(w).batch(w.batch)
 
 
 def folders(*stages):
     """An input function: the folders with the files that earlier stages have made of the batch's clips."""
-    return lambda w: batches.folders(w.dataset, batch_of(w).clips, *stages)
+    return lambda w: dataset(w).folders(batch_of(w).clips, *stages)
 
 
 def memory(stage):
@@ -105,43 +134,41 @@ def minutes(stage):
 def request_of(stage, w, attempt):
     """What a job requests, from its stage and its wildcards."""
     if stage == "measure":
-        return demands.measure(w.configuration, w.measure, attempt)
+        return demands.measure_request(configuration(w), w.measure, attempt)
     if stage == "training":
-        return demands.training(w.configuration, attempt)
-    dataset = w.get("dataset") or configurations.dataset(w.configuration)
+        return demands.training_request(configuration(w), attempt)
+    data = dataset(w) if w.get("dataset") else configuration(w).dataset
     clip = w.get("clip")
     names = batch_of(w).clips if w.get("batch") else [clip] if clip else None
-    return demands.job(stage, dataset, names, attempt)
-
-
-def motion_files(dataset, clip):
-    """The clip's BVH file, and the file of its rig if this is not the data set's skeleton."""
-    return {
-        "bvh": clips.source(dataset, clip),
-        "rigs": clips.clip_skeleton_files(dataset, clip),
-    }
-
-
-def channel_files(dataset, clip, channel):
-    """The files that a channel reads for a clip."""
-    return datasets.channel_sources.files(dataset, clip, channel)
+    return demands.job_request(stage, data, names, attempt)
 
 
 def splits_of(w):
     """Clip -> "train" or "held_out", for the clips of a database."""
-    return datasets.splits(w.dataset, channels_of_folder(w.channels))
+    return dataset(w).splits(channels_of_folder(w.channels))
 
 
 def compared_clips(w):
     """The clips that are compared with the others, so that no motion is both trained on and held out."""
-    names = datasets.clips_to_compare(w.dataset, channels_of_folder(w.channels))
-    splits = splits_of(w)
-    return [name for name in names if name in splits]
+    return dataset(w).clips_to_compare(channels_of_folder(w.channels))
 
 
 def rows_and_compared(w):
     """The folders with the rows of a database's clips, and those with the motion that is compared."""
     return [
-        *batches.folders(w.dataset, splits_of(w), "database"),
-        *batches.folders(w.dataset, compared_clips(w), "motion"),
+        *dataset(w).folders(splits_of(w), "database"),
+        *dataset(w).folders(compared_clips(w), "motion"),
     ]
+
+
+def comparison_files():
+    """Kind of file -> paths for the compared configurations, in their order."""
+    compared = project.compared
+    return {
+        "configuration": [
+            f"results/{each.name}/configuration.yaml" for each in compared
+        ],
+        "pipeline": [f"results/{each.name}/pipeline.json" for each in compared],
+        "history": [each.network("history.csv") for each in compared],
+        "measurements": [file for each in compared for file in each.result_files()],
+    }

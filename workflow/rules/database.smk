@@ -16,11 +16,11 @@ rule database_clips:
         runtime=minutes("database"),
     params:
         clips=lambda w: [{"clip": name} for name in batch_of(w).names],
-        channels=lambda w: datasets.channel_sources.channels(w.dataset),
-        options=lambda w: datasets.options_of_class(w.dataset, "database", RowOptions),
+        channels=lambda w: dataset(w).channels,
+        options=lambda w: dataset(w).options_of("database", RowOptions),
         code=lambda w: package.code(
             "database_clips",
-            *channel_packages(datasets.channel_sources.channels(w.dataset)),
+            *channel_packages(dataset(w).channels),
         ),
     script:
         "../scripts/database_clips.py"
@@ -45,10 +45,10 @@ rule database_merge:
         compared=compared_clips,
         channels=lambda w: channels_of_folder(w.channels),
         # Hurt version -> the healthy clip from which it is made.
-        sources=lambda w: datasets.sources(splits_of(w)),
+        sources=lambda w: healthy_originals(splits_of(w)),
         # Training uses every n-th row of hurt versions; this is n.
-        hurt_every=lambda w: datasets.hurt_row_step(w.dataset),
-        options=lambda w: datasets.options_of_class(w.dataset, "database", Merging),
+        hurt_every=lambda w: dataset(w).hurt_row_step,
+        options=lambda w: dataset(w).options_of("database", Merging),
         code=lambda w: package.code(
             "database_merge", *channel_packages(channels_of_folder(w.channels))
         ),

@@ -1,7 +1,7 @@
 rule measure:
     """The results of one measurement of a network, as JSON and CSV tables. hobble.measures has the measurements."""
     input:
-        unpack(lambda w: keep_local(measurements.inputs(w.configuration, w.measure))),
+        unpack(lambda w: keep_local(configuration(w).measure_inputs(w.measure))),
     output:
         json="results/{configuration}/evaluation/{measure}.json",
         tables=directory("results/{configuration}/evaluation/{measure}"),
@@ -13,9 +13,11 @@ rule measure:
         mem_mb=memory("measure"),
         runtime=minutes("measure"),
     params:
-        measured=lambda w: measurements.params(w.configuration, w.measure),
-        code=lambda w: measurements.code(
-            w.measure, configurations.model_package(w.configuration)
+        measured=lambda w: configuration(w).measure_params(w.measure),
+        code=lambda w: package.code(
+            "measure",
+            measure_named(w.measure).run_module,
+            configuration(w).model_package,
         ),
     script:
         "../scripts/measure.py"
@@ -24,8 +26,8 @@ rule measure:
 rule compare:
     """The comparison of configurations with each other and with published results, as JSON and as CSV tables."""
     input:
-        unpack(lambda w: comparison.input_files()),
-        published=keep_local(package.published_file()),
+        unpack(lambda w: comparison_files()),
+        published=keep_local(str(project.base / PUBLISHED)),
     output:
         json="results/compare/compare.json",
         tables=directory("results/compare/tables"),
@@ -35,7 +37,7 @@ rule compare:
         mem_mb=1000,
         runtime=10,
     params:
-        configurations=lambda w: comparison.names(),
-        code=package.code("compare", *measurements.shown_modules()),
+        configurations=lambda w: [each.name for each in project.compared],
+        code=package.code("compare", *SHOWN),
     script:
         "../scripts/compare.py"

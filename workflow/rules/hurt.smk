@@ -4,9 +4,7 @@ from hobble.hurt.options import HURT_CHANNEL
 rule hurt_clips:
     """Hurt versions of healthy clips, with their labels and severities, and the mirrors of these versions."""
     input:
-        batches=lambda w: batches.folders(
-            w.dataset, batch_of(w).originals, "motion", "labels"
-        ),
+        batches=lambda w: dataset(w).folders(batch_of(w).originals, "motion", "labels"),
     output:
         batch=directory("results/datasets/{dataset}/batches/hurt/{batch}"),
     log:
@@ -21,12 +19,12 @@ rule hurt_clips:
             {
                 "clip": clip,
                 # The number of the version among all versions of the data set. It decides which links hurt first.
-                "turn": clips.hurt_versions(w.dataset)[clip],
-                "ground": clips.entry(w.dataset, clip).ground,
+                "turn": dataset(w).hurt_versions[clip],
+                "ground": dataset(w).entry(clip).ground,
                 # `every` is left out, because only the database depends on it.
-                "options": clips.hurt_options(w.dataset, clip).model_dump(
-                    mode="json", exclude={"every"}
-                ),
+                "options": dataset(w)
+                .hurt_options(clip)
+                .model_dump(mode="json", exclude={"every"}),
             }
             for clip in batch_of(w).clips
         ],

@@ -16,15 +16,15 @@ rule labels_clips:
         clips=lambda w: [
             {
                 "clip": clip,
-                "gait": clips.entry(w.dataset, clip).gait,
-                "ground": clips.entry(w.dataset, clip).ground,
-                "files": {"files": clips.label_files(w.dataset, clip)},
+                "gait": dataset(w).entry(clip).gait,
+                "ground": dataset(w).entry(clip).ground,
+                "files": {"files": dataset(w).label_files(clip)},
             }
             for clip in batch_of(w).clips
         ],
         contents=contents_of(label_inputs),
         mirrored=lambda w: batch_of(w).mirrored,
-        options=lambda w: datasets.options(w.dataset, "labels"),
+        options=lambda w: dataset(w).options("labels"),
         code=lambda w: package.code("labels_clips"),
     script:
         "../scripts/labels_clips.py"
@@ -35,8 +35,8 @@ rule look_page:
     input:
         # The page does not show channels. They are inputs so that a user who asks for the page learns of mistakes in
         # their files.
-        batches=lambda w: batches.folders(
-            w.dataset, clips.listed_entries(w.dataset), "motion", "labels", "channels"
+        batches=lambda w: dataset(w).folders(
+            dataset(w).listed, "motion", "labels", "channels"
         ),
     output:
         html=report(
@@ -52,7 +52,7 @@ rule look_page:
         runtime=minutes("look"),
     params:
         dataset=lambda w: w.dataset,
-        clips=lambda w: list(clips.listed_entries(w.dataset)),
+        clips=lambda w: list(dataset(w).listed),
         code=lambda w: package.code("look_page"),
     script:
         "../scripts/look_page.py"

@@ -2,7 +2,7 @@
 rule download_clip:
     """A clip that is not in the user's folder, downloaded from the data set's address."""
     output:
-        bvh=local(clips.download_path("{dataset}", "{clip}")),
+        bvh=local(str(DOWNLOADED / "{dataset}" / "{clip}.bvh")),
     log:
         "results/datasets/{dataset}/logs/motion/download_clip/{clip}.log",
     localrule: True
@@ -10,9 +10,9 @@ rule download_clip:
         mem_mb=500,
         runtime=10,
     params:
-        url=lambda w: clips.download(w.dataset, w.clip)["url"],
-        sha256=lambda w: clips.download(w.dataset, w.clip)["sha256"],
-        folder=lambda w: clips.download(w.dataset, w.clip)["folder"],
+        url=lambda w: dataset(w).download(w.clip)["url"],
+        sha256=lambda w: dataset(w).download(w.clip)["sha256"],
+        folder=lambda w: dataset(w).download(w.clip)["folder"],
     script:
         "../scripts/download_clip.py"
 
@@ -21,7 +21,7 @@ rule motion_clips:
     """Clips made from BVH files: checked, retargeted to the data set's skeleton, at 60 Hz. Also their mirrors."""
     input:
         files=local_files(motion_inputs),
-        skeleton=lambda w: keep_local(clips.skeleton_file(w.dataset)),
+        skeleton=lambda w: keep_local(dataset(w).skeleton_file),
     output:
         batch=directory("results/datasets/{dataset}/batches/motion/{batch}"),
     log:
@@ -35,16 +35,16 @@ rule motion_clips:
         clips=lambda w: [
             {
                 "clip": clip,
-                "options": datasets.motion_options(w.dataset, clip),
-                "files": motion_files(w.dataset, clip),
+                "options": dataset(w).motion_options(clip),
+                "files": motion_files(w, clip),
             }
             for clip in batch_of(w).clips
         ],
         contents=contents_of(motion_inputs),
         mirrored=lambda w: batch_of(w).mirrored,
-        skeleton_name=lambda w: catalogue.dataset(w.dataset).skeleton,
+        skeleton_name=lambda w: dataset(w).settings.skeleton,
         # The folder of skeleton files. They map the joints of one rig to those of another.
-        maps=clips.skeleton_folder,
+        maps=str(project.base / "config" / "skeletons"),
         code=lambda w: package.code("motion_clips"),
     script:
         "../scripts/motion_clips.py"
@@ -53,8 +53,7 @@ rule motion_clips:
 rule clip_file:
     """One file of a clip, for a user who asks for it by its name. (A job makes the files of a whole batch.)"""
     input:
-        batches=lambda w: batches.folders(
-            w.dataset,
+        batches=lambda w: dataset(w).folders(
             [w.clip],
             {"terrain/clips": "terrain"}.get(w.place, w.place.partition("/")[0]),
         ),

@@ -4,9 +4,9 @@ rule page_bundle:
     The packages are downloaded in the versions of the lock file, beside the bundle, unless they are there.
     """
     input:
-        packages=keep_local(package.web_files(".json")),
-        scripts=keep_local(package.web_files(".js")),
-        engine=keep_local(package.engine_files("examples/hobble.mjs")),
+        packages=keep_local(package.files("report/web/*.json")),
+        scripts=keep_local(package.files("report/web/*.js")),
+        engine=keep_local(package.files("engine/examples/hobble.mjs")),
         wasm=rules.engine_wasm.output.wasm,
     output:
         js="results/page/bundle.js",
@@ -35,7 +35,7 @@ rule configuration:
         name=lambda w: w.configuration,
         base=str(project.base),
         # A hash of all these keys, so that the rule runs again if one changes.
-        digest=lambda w: configurations.digest(w.configuration),
+        digest=lambda w: configuration(w).digest(),
         code=package.code("configuration"),
     script:
         "../scripts/configuration.py"
@@ -45,7 +45,7 @@ rule pipeline_summary:
     """The cost of each stage: seconds and memory from its benchmark files, bytes from its output files."""
     input:
         # The script does not read these inputs. They only make this rule run after the jobs whose costs it sums up.
-        lambda w: measurements.result_files(w.configuration),
+        lambda w: configuration(w).result_files(),
         rules.generate.output.scenarios,
     output:
         json="results/{configuration}/pipeline.json",
@@ -56,7 +56,7 @@ rule pipeline_summary:
         runtime=5,
     params:
         configuration=lambda w: w.configuration,
-        stages=lambda w: configurations.stages(w.configuration),
+        stages=lambda w: configuration(w).stages(),
         code=package.code("pipeline_summary"),
     script:
         "../scripts/pipeline_summary.py"
@@ -65,16 +65,16 @@ rule pipeline_summary:
 rule report:
     """The report of a configuration as one HTML file."""
     input:
-        measurements=lambda w: measurements.result_files(w.configuration),
+        measurements=lambda w: configuration(w).result_files(),
         pipeline=rules.pipeline_summary.output.json,
         scenarios=rules.generate.output.scenarios,
         configuration=rules.configuration.output.yaml,
-        weights=lambda w: configurations.network(w.configuration, "weights.npz"),
-        history=lambda w: configurations.network(w.configuration, "history.csv"),
-        batches=lambda w: configurations.batch_folders(
-            w.configuration, "motion", "labels", "channels", "terrain", "database"
+        weights=network_file("weights.npz"),
+        history=network_file("history.csv"),
+        batches=lambda w: configuration(w).folders(
+            "motion", "labels", "channels", "terrain", "database"
         ),
-        template=keep_local(package.template_files()),
+        template=keep_local(PAGES),
         bundle=rules.page_bundle.output.js,
     output:
         html=report(
@@ -92,18 +92,11 @@ rule report:
         runtime=minutes("report"),
     params:
         configuration=lambda w: w.configuration,
-        dataset=lambda w: configurations.dataset(w.configuration),
-        splits=lambda w: configurations.splits(w.configuration),
-        channels=lambda w: datasets.channel_sources.channels(
-            configurations.dataset(w.configuration)
-        ),
-        title=lambda w: catalogue.configuration(w.configuration).report.title,
-        code=lambda w: package.code(
-            "report",
-            configurations.model_package(w.configuration),
-            *measurements.shown_modules(),
-            *display_modules(),
-        ),
+        dataset=lambda w: configuration(w).dataset.name,
+        splits=lambda w: configuration(w).splits,
+        channels=lambda w: configuration(w).dataset.channels,
+        title=lambda w: configuration(w).settings.report.title,
+        code=network_code("report", *SHOWN, *display_modules()),
     script:
         "../scripts/report.py"
 
@@ -112,11 +105,9 @@ rule report_compare:
     """The page that compares configurations and shows the characters of two of them in the same world."""
     input:
         compared=rules.compare.output.json,
-        configuration=lambda w: comparison.input_files()["configuration"],
-        weights=lambda w: [
-            configurations.network(name, "weights.npz") for name in comparison.names()
-        ],
-        template=keep_local(package.template_files()),
+        configuration=lambda w: comparison_files()["configuration"],
+        weights=lambda w: [each.network("weights.npz") for each in project.compared],
+        template=keep_local(PAGES),
         bundle=rules.page_bundle.output.js,
     output:
         html=report(
@@ -130,8 +121,8 @@ rule report_compare:
         mem_mb=2000,
         runtime=10,
     params:
-        configurations=lambda w: comparison.names(),
-        code=package.code("report_compare", *measurements.shown_modules()),
+        configurations=lambda w: [each.name for each in project.compared],
+        code=package.code("report_compare", *SHOWN),
     script:
         "../scripts/report_compare.py"
 
@@ -139,7 +130,7 @@ rule report_compare:
 rule stimuli:
     """Short looping films of the character's walk for each channel."""
     input:
-        weights=lambda w: configurations.network(w.configuration, "weights.npz"),
+        weights=network_file("weights.npz"),
     output:
         folder=directory("results/{configuration}/stimuli"),
     log:
@@ -150,12 +141,8 @@ rule stimuli:
         mem_mb=1500,
         runtime=15,
     params:
-        runtime=lambda w: configurations.section(w.configuration, "runtime"),
-        code=lambda w: package.code(
-            "stimuli",
-            configurations.model_package(w.configuration),
-            *display_modules(),
-        ),
+        runtime=section("runtime"),
+        code=network_code("stimuli", *display_modules()),
     script:
         "../scripts/stimuli.py"
 
@@ -163,8 +150,8 @@ rule stimuli:
 rule questionnaire:
     """A page that shows thirteen films of the character and asks what hurts. The right answers are in films.json."""
     input:
-        weights=lambda w: configurations.network(w.configuration, "weights.npz"),
-        template=keep_local(package.template_files()),
+        weights=network_file("weights.npz"),
+        template=keep_local(PAGES),
     output:
         page="results/{configuration}/questionnaire/questionnaire.html",
         films="results/{configuration}/questionnaire/films.json",
@@ -178,13 +165,9 @@ rule questionnaire:
         runtime=30,
     params:
         configuration=lambda w: w.configuration,
-        parts=lambda w: catalogue.configuration(w.configuration).report.parts,
-        runtime=lambda w: configurations.section(w.configuration, "runtime"),
-        code=lambda w: package.code(
-            "questionnaire",
-            configurations.model_package(w.configuration),
-            *display_modules(),
-        ),
+        parts=lambda w: configuration(w).settings.report.parts,
+        runtime=section("runtime"),
+        code=network_code("questionnaire", *display_modules()),
     script:
         "../scripts/questionnaire.py"
 
@@ -192,12 +175,14 @@ rule questionnaire:
 rule export_web:
     """The character for other web pages: an ES module, its network, TypeScript types and an example page."""
     input:
-        weights=lambda w: configurations.network(w.configuration, "weights.npz"),
+        weights=network_file("weights.npz"),
         bundle=rules.page_bundle.output.js,
         scripts=rules.page_bundle.input.scripts,
         engine=rules.page_bundle.input.engine,
         wasm=rules.engine_wasm.output.wasm,
-        files=keep_local([*package.web_files(".ts"), *package.web_files(".html")]),
+        files=keep_local(
+            [*package.files("report/web/*.ts"), *package.files("report/web/*.html")]
+        ),
     output:
         folder=directory("results/{configuration}/export/web"),
     log:
@@ -208,10 +193,8 @@ rule export_web:
         mem_mb=1500,
         runtime=10,
     params:
-        runtime=lambda w: configurations.section(w.configuration, "runtime"),
-        code=lambda w: package.code(
-            "export_web", configurations.model_package(w.configuration)
-        ),
+        runtime=section("runtime"),
+        code=network_code("export_web"),
     script:
         "../scripts/export_web.py"
 
@@ -219,7 +202,7 @@ rule export_web:
 rule limp_picture:
     """A looping animation of the healthy and the hurt walk side by side, for the README."""
     input:
-        weights=lambda w: configurations.network(w.configuration, "weights.npz"),
+        weights=network_file("weights.npz"),
     output:
         picture=report(
             "results/{configuration}/limp.webp",
@@ -235,9 +218,7 @@ rule limp_picture:
         mem_mb=1500,
         runtime=10,
     params:
-        runtime=lambda w: configurations.section(w.configuration, "runtime"),
-        code=lambda w: package.code(
-            "limp_picture", configurations.model_package(w.configuration)
-        ),
+        runtime=section("runtime"),
+        code=network_code("limp_picture"),
     script:
         "../scripts/limp_picture.py"

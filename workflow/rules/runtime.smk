@@ -1,7 +1,7 @@
 rule generate:
     """Motion of the character in scripted scenarios (walk, jog, crouch, limp), as one npz file and as BVH files."""
     input:
-        weights=lambda w: configurations.network(w.configuration, "weights.npz"),
+        weights=network_file("weights.npz"),
     output:
         scenarios="results/{configuration}/runtime/scenarios.npz",
         bvh=directory("results/{configuration}/runtime/bvh"),
@@ -13,12 +13,8 @@ rule generate:
         mem_mb=1000,
         runtime=10,
     params:
-        runtime=lambda w: configurations.section(w.configuration, "runtime"),
-        code=lambda w: package.code(
-            "generate",
-            configurations.model_package(w.configuration),
-            *display_modules(),
-        ),
+        runtime=section("runtime"),
+        code=network_code("generate", *display_modules()),
     script:
         "../scripts/generate.py"
 
@@ -26,7 +22,7 @@ rule generate:
 rule export_onnx:
     """The network as an ONNX file, checked with onnxruntime. `mode`: how its weights are computed from the phase."""
     input:
-        weights=lambda w: configurations.network(w.configuration, "weights.npz"),
+        weights=network_file("weights.npz"),
     output:
         onnx="results/{configuration}/export/{mode}.onnx",
     log:
@@ -40,9 +36,7 @@ rule export_onnx:
         runtime=10,
     params:
         mode=lambda w: w.mode,
-        code=lambda w: package.code(
-            "export_onnx", configurations.model_package(w.configuration)
-        ),
+        code=network_code("export_onnx"),
     script:
         "../scripts/export_onnx.py"
 
@@ -50,7 +44,7 @@ rule export_onnx:
 rule export_release:
     """The network as .bin files like those of Holden et al. (2017), for their demo and its ports."""
     input:
-        weights=lambda w: configurations.network(w.configuration, "weights.npz"),
+        weights=network_file("weights.npz"),
     output:
         folder=directory("results/{configuration}/export/pfnn"),
     log:
@@ -61,9 +55,7 @@ rule export_release:
         mem_mb=1000,
         runtime=10,
     params:
-        code=lambda w: package.code(
-            "export_release", configurations.model_package(w.configuration)
-        ),
+        code=network_code("export_release"),
     script:
         "../scripts/export_release.py"
 
@@ -71,7 +63,7 @@ rule export_release:
 rule export_glb:
     """The character for a game engine as a glTF 2.0 file: body, skeleton, loops of each gait, the scripted scenarios."""
     input:
-        weights=lambda w: configurations.network(w.configuration, "weights.npz"),
+        weights=network_file("weights.npz"),
         scenarios=rules.generate.output.scenarios,
     output:
         glb="results/{configuration}/export/character.glb",
@@ -83,12 +75,8 @@ rule export_glb:
         mem_mb=1500,
         runtime=10,
     params:
-        runtime=lambda w: configurations.section(w.configuration, "runtime"),
-        code=lambda w: package.code(
-            "export_glb",
-            configurations.model_package(w.configuration),
-            *display_modules(),
-        ),
+        runtime=section("runtime"),
+        code=network_code("export_glb", *display_modules()),
     script:
         "../scripts/export_glb.py"
 
@@ -96,7 +84,7 @@ rule export_glb:
 rule engine_wasm:
     """The runtime in C as WebAssembly, compiled by zig. It is the same for all configurations."""
     input:
-        sources=keep_local(package.engine_files("c/*.[ch]")),
+        sources=keep_local(package.files("engine/c/*.[ch]")),
     output:
         wasm="results/page/engine.wasm",
     log:
@@ -113,8 +101,8 @@ rule engine_wasm:
 rule export_engine:
     """The character for any game engine: a runtime in C, character.hob, examples, and traces to check ports against."""
     input:
-        weights=lambda w: configurations.network(w.configuration, "weights.npz"),
-        sources=keep_local(package.engine_files()),
+        weights=network_file("weights.npz"),
+        sources=keep_local(package.files("engine/c/**/*", "engine/examples/**/*")),
         wasm=rules.engine_wasm.output.wasm,
     output:
         folder=directory("results/{configuration}/export/engine"),
@@ -126,12 +114,8 @@ rule export_engine:
         mem_mb=1000,
         runtime=10,
     params:
-        runtime=lambda w: configurations.section(w.configuration, "runtime"),
-        code=lambda w: package.code(
-            "export_engine",
-            configurations.model_package(w.configuration),
-            *display_modules(),
-        ),
+        runtime=section("runtime"),
+        code=network_code("export_engine", *display_modules()),
     script:
         "../scripts/export_engine.py"
 
@@ -161,7 +145,7 @@ rule blender_addon:
         libraries=rules.engine_libraries.output.folder,
         addon=keep_local(
             [
-                str(package.base / "workflow" / "blender" / "hobble_blender" / name)
+                str(project.base / "workflow" / "blender" / "hobble_blender" / name)
                 for name in ("__init__.py", "blender_manifest.toml")
             ]
         ),

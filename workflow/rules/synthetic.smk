@@ -1,7 +1,7 @@
 rule synthetic_clips:
     """A clip of a synthetic walker, as BVH and label files like those of a user."""
     input:
-        skeleton=lambda w: keep_local(clips.skeleton_file(w.dataset)),
+        skeleton=lambda w: keep_local(dataset(w).skeleton_file),
     output:
         bvh="results/datasets/{dataset}/synthetic/{clip}.bvh",
         footsteps="results/datasets/{dataset}/synthetic/{clip}_footsteps.txt",
@@ -15,9 +15,9 @@ rule synthetic_clips:
         runtime=minutes("synthetic"),
     params:
         clip=lambda w: w.clip,
-        frames=lambda w: datasets.frames(w.dataset, w.clip),
-        recipe=lambda w: clips.entry(w.dataset, w.clip).recipe,
-        options=lambda w: datasets.options(w.dataset, "synthetic"),
+        frames=lambda w: dataset(w).frames(w.clip),
+        recipe=lambda w: dataset(w).entry(w.clip).recipe,
+        options=lambda w: dataset(w).options("synthetic"),
         code=lambda w: package.code("synthetic_clips"),
     script:
         "../scripts/synthetic_clips.py"

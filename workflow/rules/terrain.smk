@@ -16,7 +16,7 @@ rule terrain_patches:
         runtime=10,
     params:
         contents=contents_of(heightmap_inputs),
-        options=lambda w: datasets.options_of_class(w.dataset, "terrain", PatchOptions),
+        options=lambda w: dataset(w).options_of("terrain", PatchOptions),
         code=lambda w: package.code("terrain_patches"),
     script:
         "../scripts/terrain_patches.py"
@@ -38,13 +38,11 @@ rule terrain_fits:
         runtime=minutes("terrain"),
     params:
         clips=lambda w: [
-            {"clip": name, "ground": clips.entry(w.dataset, name).ground}
+            {"clip": name, "ground": dataset(w).entry(name).ground}
             for name in batch_of(w).names
         ],
-        options=lambda w: datasets.options_of_class(w.dataset, "terrain", FitOptions),
-        sampling=lambda w: datasets.options_of_class(
-            w.dataset, "database", HeightSampling
-        ),
+        options=lambda w: dataset(w).options_of("terrain", FitOptions),
+        sampling=lambda w: dataset(w).options_of("database", HeightSampling),
         code=lambda w: package.code("terrain_fits"),
     script:
         "../scripts/terrain_fits.py"

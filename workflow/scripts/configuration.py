@@ -13,5 +13,5 @@ from hobble.workflow.project import Project
 
 with job(snakemake):
     project = Project(Path(snakemake.params.base), snakemake.config)
-    resolved = project.configurations.resolved(snakemake.params.name)
+    resolved = project.configuration(snakemake.params.name).resolved()
     write_text(snakemake.output.yaml, yaml.safe_dump(resolved, sort_keys=False))

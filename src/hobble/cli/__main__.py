@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import argparse
-import inspect
 import os
 import signal
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from importlib.metadata import version
 
-from hobble.cli import characters, clips, gait
-from hobble.cli.command import Command
+from hobble.cli import characters, clips, gait  # noqa: F401 - they add their commands
+from hobble.cli.command import COMMANDS, arg, command
 from hobble.core.errors import HobbleError, keep_traceback
 from hobble.measures import score
 
@@ -23,6 +22,10 @@ GROUPS = {
 }
 
 
+command("clips", score.add_arguments, name="score")(score.run)
+
+
+@command("shell", arg("shell", choices=("bash", "zsh", "fish")))
 def completion(options: argparse.Namespace) -> int:
     """Print a script that completes the command in a shell.
 
@@ -54,31 +57,17 @@ def _words_of(parser: argparse.ArgumentParser) -> str:
     return " ".join(map(str, words))
 
 
-def _completion_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("shell", choices=("bash", "zsh", "fish"))
-
-
-COMMANDS: Mapping[str, Command] = {
-    **clips.COMMANDS,
-    "score": Command("clips", score.add_arguments, score.run),
-    **gait.COMMANDS,
-    **characters.COMMANDS,
-    "completion": Command("shell", _completion_arguments, completion),
-}
-
-
 def _parsers(parent: argparse.ArgumentParser | None = None) -> dict[str, argparse.ArgumentParser]:
     """Name of each subcommand -> its parser, below `parent`."""
     parent = parent or argparse.ArgumentParser(prog="hobble")
     commands = parent.add_subparsers(dest="command", required=True, metavar="COMMAND", help=argparse.SUPPRESS)
     parsers = {}
-    for name, command in COMMANDS.items():
-        text = str(inspect.getdoc(command.run))
-        parser = commands.add_parser(
-            name, description=text, formatter_class=argparse.RawDescriptionHelpFormatter
-        )
-        command.add_arguments(parser)
-        parser.set_defaults(run=command.run)
+    for name, found in COMMANDS.items():
+        layout = argparse.RawDescriptionHelpFormatter
+        parser = commands.add_parser(name, description=found.text, formatter_class=layout)
+        for add in found.arguments:
+            add(parser)
+        parser.set_defaults(run=found.run)
         parsers[name] = parser
     return parsers
 
@@ -90,9 +79,9 @@ def _description() -> str:
     ]
     for group, title in GROUPS.items():
         lines += ["", f"{title}:"]
-        for name, command in COMMANDS.items():
-            if command.group == group:
-                lines.append(f"  {name:12}{str(inspect.getdoc(command.run)).splitlines()[0]}")
+        for name, found in COMMANDS.items():
+            if found.group == group:
+                lines.append(f"  {name:12}{found.text.splitlines()[0]}")
     return "\n".join(lines)
 
 

@@ -7,7 +7,7 @@ import webbrowser
 from pathlib import Path
 from typing import get_args
 
-from hobble.cli.command import Command
+from hobble.cli.command import arg, command
 from hobble.core.errors import HobbleError, InputError
 from hobble.core.section import PhaseMode
 from hobble.measures import study
@@ -16,6 +16,13 @@ from hobble.runtime.options import Runtime
 from hobble.runtime.scenarios import write_motions
 
 
+@command(
+    "characters",
+    arg(
+        "results", nargs="?", type=Path, help="results/<configuration>, or a report; default: the newest one"
+    ),
+    arg("--print", action="store_true", help="print the address, open no browser"),
+)
 def play(options: argparse.Namespace) -> int:
     """Open the page on which you control a trained character with the keyboard.
 
@@ -27,12 +34,6 @@ def play(options: argparse.Namespace) -> int:
     if not options.print and not webbrowser.open(address):
         print("No browser could be started. Open the address above in one.")
     return 0
-
-
-def _play_arguments(parser: argparse.ArgumentParser) -> None:
-    results = "results/<configuration>, or a report file; default: the newest report"
-    parser.add_argument("results", nargs="?", type=Path, help=results)
-    parser.add_argument("--print", action="store_true", help="print the address, open no browser")
 
 
 def find_report(results: Path | None) -> Path:
@@ -51,6 +52,21 @@ def find_report(results: Path | None) -> Path:
     return path
 
 
+TO = (
+    "onnx: one file, checked with onnxruntime; bin: .bin files as in the release of Holden et al.; bvh: some "
+    "walks that the network generates (straight, turning, ...), one BVH file each"
+)
+MODE = "how the network's weights are interpolated over the phase; cubic is exact"
+
+
+@command(
+    "characters",
+    arg("to", choices=("onnx", "bin", "bvh"), help=TO),
+    arg("network", help="weights.npz, the folder that holds it, or a folder of .bin files"),
+    arg("target", help="the file or folder to write"),
+    arg("--mode", choices=get_args(PhaseMode), default="cubic", help=MODE),
+    arg("--skeleton", help="a file of config/skeletons, for a network file that has no skeleton"),
+)
 def export(options: argparse.Namespace) -> int:
     """Export a network (onnx, bin), or motions that it generates (bvh).
 
@@ -69,29 +85,4 @@ def export(options: argparse.Namespace) -> int:
     return 0
 
 
-def _export_arguments(parser: argparse.ArgumentParser) -> None:
-    add = parser.add_argument
-    to = (
-        "onnx: one file, checked with onnxruntime; bin: .bin files as in the release of Holden et al.; "
-        "bvh: a few walks that the network generates (straight, turning, ...), one BVH file each"
-    )
-    add("to", choices=("onnx", "bin", "bvh"), help=to)
-    add("network", help="weights.npz, the folder that holds it, or a folder of .bin files")
-    add("target", help="the file or folder to write")
-    mode = "how the network's weights are interpolated over the phase; cubic is exact"
-    add("--mode", choices=get_args(PhaseMode), default="cubic", help=mode)
-    add("--skeleton", help="a file of config/skeletons, for a network file that has no skeleton")
-
-
-def run_study(options: argparse.Namespace) -> int:
-    """Run `hobble study`. (Its text is that of hobble.measures.study.)"""
-    return study.run(options)
-
-
-run_study.__doc__ = study.__doc__
-
-COMMANDS = {
-    "play": Command("characters", _play_arguments, play),
-    "export": Command("characters", _export_arguments, export),
-    "study": Command("characters", study.add_arguments, run_study),
-}
+command("characters", study.add_arguments, name="study", text=str(study.__doc__))(study.run)

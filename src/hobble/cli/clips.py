@@ -14,11 +14,13 @@ import numpy as np
 from hobble.channels.injury.status import FPS, InjurySpell, Status, parse_links, write_status
 from hobble.channels.injury.table import write_statuses
 from hobble.cli.command import (
-    Command,
+    FOLDER,
+    JSON,
+    Argument,
     Message,
-    add_folders,
-    add_json,
     add_motion_options,
+    arg,
+    command,
     motion_options,
     print_result,
     process_clips,
@@ -54,6 +56,32 @@ from hobble.motion.skeleton_file import (
 SKELETON = "holden31"
 
 
+def skeleton_argument(text: str) -> Argument:
+    """The option --skeleton."""
+    text = f"{text}: a name from config/skeletons, or a YAML file (default {SKELETON})"
+    return arg("--skeleton", default=SKELETON, help=text)
+
+
+def out(text: str) -> tuple[Argument, ...]:
+    """The arguments of a command that makes files from each clip of a folder. text: help of OUT."""
+    return FOLDER, arg("out", type=Path, help=text), JSON, add_motion_options
+
+
+PICTURE = (
+    "only if one file is given: the picture to write, which shows the motion before and after retargeting, "
+    "and in red the joint or limb that differs most"
+)
+
+
+@command(
+    "clips",
+    FOLDER,
+    skeleton_argument("skeleton to which the clips are retargeted"),
+    arg("--skeletons", type=Path, help="folder of the skeleton files (default config/skeletons)"),
+    arg("--picture", type=Path, metavar="SVG", help=PICTURE),
+    JSON,
+    add_motion_options,
+)
 def look(options: argparse.Namespace) -> int:
     """Try to read each clip of a folder, and print a line about each: rig, frame rate, steps, warnings.
 
@@ -70,20 +98,11 @@ def look(options: argparse.Namespace) -> int:
     return int(any(clip.refused for clip in summary.clips))
 
 
-def _look_arguments(parser: argparse.ArgumentParser) -> None:
-    add = parser.add_argument
-    add("folder", type=Path, help="a folder of BVH, glTF or FBX files, or one file")
-    _add_skeleton(parser, "skeleton to which the clips are retargeted")
-    add("--skeletons", type=Path, help="folder of the skeleton files (default config/skeletons)")
-    picture = (
-        "only if one file is given: the picture to write, which shows the motion before and after "
-        "retargeting, and in red the joint or limb that differs most"
-    )
-    add("--picture", type=Path, metavar="SVG", help=picture)
-    add_json(parser)
-    add_motion_options(parser)
-
-
+@command(
+    "clips",
+    arg("file", type=Path, help="a BVH file"),
+    arg("--to", type=Path, help="the file to write (default: print it)"),
+)
 def rig(options: argparse.Namespace) -> int:
     """Draft a skeleton file, which says which joint of a BVH file is which part of the body.
 
@@ -107,11 +126,15 @@ def skeleton_draft(file: Path) -> str:
     return draft_skeleton_file(skeleton, roles)
 
 
-def _rig_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("file", type=Path, help="a BVH file")
-    parser.add_argument("--to", type=Path, help="the file to write (default: print it)")
-
-
+@command(
+    "clips",
+    *out("the folder to write into; the clips keep their names"),
+    arg("--fps", type=float, default=60.0, help="frame rate to write (default 60)"),
+    arg("--skeleton", help="retarget to this skeleton: a name from config/skeletons, or a YAML file"),
+    arg("--mirror", action="store_true", help="also write each clip's mirror image, as CLIP_mirror.bvh"),
+    # The earlier name of `--defects refuse`.
+    arg("--refuse", dest="defects", action="store_const", const="refuse", help=argparse.SUPPRESS),
+)
 def motion(options: argparse.Namespace) -> int:
     """Turn a folder of BVH, glTF or FBX files into a folder of checked BVH files.
 
@@ -159,16 +182,12 @@ def report_messages(report: Mapping[str, Any]) -> list[Message]:
     return [(kind, sentence) for kind, key in kinds.items() for sentence in report[key]]
 
 
-def _motion_arguments(parser: argparse.ArgumentParser) -> None:
-    add_folders(parser, "the folder to write into; the clips keep their names")
-    add = parser.add_argument
-    add("--fps", type=float, default=60.0, help="frame rate to write (default 60)")
-    add("--skeleton", help="retarget to this skeleton: a name from config/skeletons, or a YAML file")
-    add("--mirror", action="store_true", help="also write each clip's mirror image, as CLIP_mirror.bvh")
-    # The earlier name of `--defects refuse`.
-    add("--refuse", dest="defects", action="store_const", const="refuse", help=argparse.SUPPRESS)
-
-
+@command(
+    "clips",
+    *out("the folder to write into; if it is FOLDER, label files lie beside the clips"),
+    arg("--gait", choices=GAITS, help="the main gait of the clips; used where the gait is unclear"),
+    arg("--overwrite", action="store_true", help="replace existing label files"),
+)
 def labels(options: argparse.Namespace) -> int:
     """Label a folder of BVH files and write label files that you can correct.
 
@@ -217,13 +236,11 @@ def _labelled(
     return clip, report, found, label_report.warnings
 
 
-def _labels_arguments(parser: argparse.ArgumentParser) -> None:
-    add_folders(parser, "the folder to write into; if it is FOLDER, label files lie beside the clips")
-    gait = "the main gait of the clips; used where the gait is unclear"
-    parser.add_argument("--gait", choices=GAITS, help=gait)
-    parser.add_argument("--overwrite", action="store_true", help="replace existing label files")
-
-
+@command(
+    "limps",
+    *out("the folder to write into: CLIP_limps.bvh and CLIP_limps_injuries.txt"),
+    arg("--injury", required=True, help="what hurts: Joint-Joint[severity];..."),
+)
 def hurt(options: argparse.Namespace) -> int:
     """Write clips as a body with these injuries walks them, with the status files of what hurts.
 
@@ -249,11 +266,15 @@ def hurt(options: argparse.Namespace) -> int:
     return process_clips(options, make)
 
 
-def _hurt_arguments(parser: argparse.ArgumentParser) -> None:
-    add_folders(parser, "the folder to write into: CLIP_limps.bvh and CLIP_limps_injuries.txt")
-    parser.add_argument("--injury", required=True, help="what hurts: Joint-Joint[severity];...")
-
-
+@command(
+    "limps",
+    arg("body", type=Path, help="the BVH file whose path, legs and trunk are kept"),
+    arg("other", type=Path, help="the BVH file from which a part of the body is taken"),
+    arg("out", type=Path, help="the BVH file to write"),
+    arg("--part", choices=list(PARTS), default="arms", help="what is taken (default arms)"),
+    JSON,
+    add_motion_options,
+)
 def combine(options: argparse.Namespace) -> int:
     """Combine two clips by parts of the body, such as the legs of one with the arms of another.
 
@@ -270,15 +291,13 @@ def combine(options: argparse.Namespace) -> int:
     return 0
 
 
-def _combine_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("body", type=Path, help="the BVH file whose path, legs and trunk are kept")
-    parser.add_argument("other", type=Path, help="the BVH file from which a part of the body is taken")
-    parser.add_argument("out", type=Path, help="the BVH file to write")
-    parser.add_argument("--part", choices=list(PARTS), default="arms", help="what is taken (default arms)")
-    add_json(parser)
-    add_motion_options(parser)
-
-
+@command(
+    "limps",
+    arg("table", type=Path, help="CSV with the columns clip, link, severity, from, to"),
+    arg("folder", type=Path, help="folder with the clips' BVH files"),
+    skeleton_argument("skeleton that lists the links"),
+    JSON,
+)
 def injury(options: argparse.Namespace) -> int:
     """Write status files from a table. A status file says which links hurt in a clip, when and how much.
 
@@ -293,26 +312,3 @@ def injury(options: argparse.Namespace) -> int:
     paths = [str(path) for path in write_statuses(options.table, options.folder, links)]
     print_result(options, paths, "\n".join(paths))
     return 0
-
-
-def _injury_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("table", type=Path, help="CSV with the columns clip, link, severity, from, to")
-    parser.add_argument("folder", type=Path, help="folder with the clips' BVH files")
-    _add_skeleton(parser, "skeleton that lists the links")
-    add_json(parser)
-
-
-def _add_skeleton(parser: argparse.ArgumentParser, text: str) -> None:
-    help_text = f"{text}: a name from config/skeletons, or a YAML file (default {SKELETON})"
-    parser.add_argument("--skeleton", default=SKELETON, help=help_text)
-
-
-COMMANDS = {
-    "look": Command("clips", _look_arguments, look),
-    "rig": Command("clips", _rig_arguments, rig),
-    "motion": Command("clips", _motion_arguments, motion),
-    "labels": Command("clips", _labels_arguments, labels),
-    "hurt": Command("limps", _hurt_arguments, hurt),
-    "combine": Command("limps", _combine_arguments, combine),
-    "injury": Command("limps", _injury_arguments, injury),
-}

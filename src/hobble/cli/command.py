@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import argparse
+import inspect
 import json
 import sys
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from tqdm import tqdm
 
@@ -24,22 +24,42 @@ Message = tuple[str, str]  # one of KINDS, and a sentence
 KINDS = ("warning", "doubt", "repair", "found", "note")  # of messages about clips, the worst first
 
 
-@dataclass(frozen=True)
-class Command:
-    """A subcommand. Its help text is the docstring of `run`.
+Argument = Callable[[argparse.ArgumentParser], Any]  # adds one argument or several to a parser
 
-    group: the heading under which `hobble --help` lists it. add_arguments: adds its arguments to a parser.
-    run: runs it with the parsed arguments and returns the exit status.
+
+class Command(NamedTuple):
+    """A subcommand.
+
+    group: the heading under which `hobble --help` lists it. run: runs it with the parsed arguments and
+    returns the exit status. text: its help.
     """
 
     group: str
-    add_arguments: Callable[[argparse.ArgumentParser], None]
     run: Callable[[argparse.Namespace], int]
+    arguments: tuple[Argument, ...]
+    text: str
 
 
-def add_json(parser: argparse.ArgumentParser) -> None:
-    """Add the option for output that a program reads."""
-    parser.add_argument("--json", action="store_true", help="print the result as JSON, for a program")
+COMMANDS: dict[str, Command] = {}  # filled by `command`
+
+
+def command(group: str, *arguments: Argument, name: str = "", text: str = "") -> Callable:
+    """A decorator that makes a function a subcommand: its name and docstring are those of the subcommand."""
+
+    def register(run: Callable[[argparse.Namespace], int]) -> Callable[[argparse.Namespace], int]:
+        COMMANDS[name or run.__name__] = Command(group, run, arguments, text or str(inspect.getdoc(run)))
+        return run
+
+    return register
+
+
+def arg(*names: str, **how: Any) -> Argument:
+    """An argument of a subcommand. names, how: as for `ArgumentParser.add_argument`."""
+    return lambda parser: parser.add_argument(*names, **how)
+
+
+JSON = arg("--json", action="store_true", help="print the result as JSON, for a program")
+FOLDER = arg("folder", type=Path, help="a folder of BVH, glTF or FBX files, or one file")
 
 
 def print_result(options: argparse.Namespace, data: Any, text: str) -> None:
@@ -63,14 +83,6 @@ def motion_options(options: argparse.Namespace) -> ClipMotion:
     """The values of the options of `add_motion_options`. Raises HobbleError for a bad value."""
     given = {name: getattr(options, name, None) for name in MOTION_KEYS}
     return validate(ClipMotion, {name: value for name, value in given.items() if value is not None}, "hobble")
-
-
-def add_folders(parser: argparse.ArgumentParser, out: str) -> None:
-    """Add the arguments of a command that makes files from each clip of a folder. out: help text of OUT."""
-    parser.add_argument("folder", type=Path, help="a folder of BVH, glTF or FBX files, or one file")
-    parser.add_argument("out", type=Path, help=out)
-    add_json(parser)
-    add_motion_options(parser)
 
 
 def process_clips(options: argparse.Namespace, process: Callable[[str, Path], list[Message]]) -> int:

@@ -7,7 +7,15 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from hobble.cli.command import Command, add_json, add_motion_options, motion_options, print_result, progress
+from hobble.cli.command import (
+    JSON,
+    add_motion_options,
+    arg,
+    command,
+    motion_options,
+    print_result,
+    progress,
+)
 from hobble.core.clip import Clip
 from hobble.core.errors import HobbleError, InputError
 from hobble.gait.cycles import measure_clip
@@ -25,6 +33,21 @@ NO_HEALTHY = (
 )
 
 
+HEALTHY = "clips of healthy walks of the same person"
+SIDE = "the hurt side; default: the side that is recognised, else right"
+WINDOW = "length of a window in seconds. The whole clip is recognised, and also each window on its own"
+
+
+@command(
+    "limps",
+    arg("clips", nargs="+", type=Path, metavar="CLIP.bvh", help="clips of walks to recognise and measure"),
+    arg("--healthy", nargs="+", type=Path, default=[], metavar="CLIP.bvh", help=HEALTHY),
+    arg("--side", choices=("right", "left"), help=SIDE),
+    arg("--window", type=float, default=4.0, help=WINDOW),
+    arg("--skeletons", type=Path, help="folder of the skeleton files (default config/skeletons)"),
+    JSON,
+    add_motion_options,
+)
 def gait(options: argparse.Namespace) -> int:
     """Recognise the limp of a walk, and measure how it differs from a healthy walk.
 
@@ -42,20 +65,6 @@ def gait(options: argparse.Namespace) -> int:
     data = [{"clip": path.stem, **as_data(each)} for path, each in compared.items()]
     print_result(options, data, "\n".join([*texts, *([] if options.healthy else [NO_HEALTHY])]))
     return 0
-
-
-def _gait_arguments(parser: argparse.ArgumentParser) -> None:
-    add = parser.add_argument
-    add("clips", nargs="+", type=Path, metavar="CLIP.bvh", help="clips of walks to recognise and measure")
-    healthy = "clips of healthy walks of the same person"
-    add("--healthy", nargs="+", type=Path, default=[], metavar="CLIP.bvh", help=healthy)
-    side = "the hurt side; default: the side that is recognised, else right"
-    add("--side", choices=("right", "left"), help=side)
-    window = "length of a window in seconds. The whole clip is recognised, and also each window on its own"
-    add("--window", type=float, default=4.0, help=window)
-    add("--skeletons", type=Path, help="folder of the skeleton files (default config/skeletons)")
-    add_json(parser)
-    add_motion_options(parser)
 
 
 def read_clip(
@@ -145,6 +154,3 @@ def _in_words(shares: Mapping[str, float]) -> str:
     """shares: an answer, such as "antalgic right" -> share of the windows with this answer."""
     said = ", ".join(f"{name} {share:.2f}" for name, share in shares.items())
     return said or "none, because no window has enough cycles"
-
-
-COMMANDS = {"gait": Command("limps", _gait_arguments, gait)}

@@ -26,6 +26,20 @@ CLIP_NAME_RULE = (
 )
 # Bytes. Systems allow 255 bytes; the files that Hobble makes of a clip add up to 50 bytes to its name.
 LONGEST_CLIP_NAME = 200
+# The mirror image of a clip, and a hurt version of it, in which some links of the body are injured, have its
+# name with an ending. It is their original.
+MIRROR_SUFFIX = "_mirror"
+HURT_SUFFIX = re.compile(r"_hurt([1-9])$")
+
+
+def original(clip: str) -> str:
+    """The clip from which a mirror or a hurt version is made; for other clips the clip itself."""
+    return HURT_SUFFIX.sub("", clip.removesuffix(MIRROR_SUFFIX))
+
+
+def is_hurt_version(clip: str) -> bool:
+    """Whether a clip is a hurt version, or the mirror of one."""
+    return HURT_SUFFIX.search(clip.removesuffix(MIRROR_SUFFIX)) is not None
 
 
 def is_valid_clip_name(clip: str) -> bool:

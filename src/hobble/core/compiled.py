@@ -33,36 +33,25 @@ def njit(function: Callable | None = None, **options: Any) -> Any:
         except (RuntimeError, OSError) as error:  # numba found no folder that it may write to
             _warn(error)
         else:
-            dispatcher._cache = ForgivingCache(dispatcher._cache)
+            for method in ("load_overload", "save_overload"):
+                setattr(dispatcher._cache, method, _forgiving(getattr(dispatcher._cache, method)))
     return dispatcher
 
 
-class ForgivingCache:
-    """Wraps the numba cache of a function. If the cache fails, the function counts as not cached.
+def _forgiving(method: Callable) -> Callable:
+    """A method of numba's cache that warns and returns None, as for an unknown function, if it fails.
 
-    All methods but those below are numba's.
+    numba unpickles files, and a damaged one can raise anything.
     """
 
-    def __init__(self, cache: Any) -> None:
-        self._cache = cache
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self._cache, name)
-
-    def load_overload(self, signature: Any, target_context: Any) -> Any:
-        """The compiled function; None if the cache does not have it or cannot be read."""
+    def call(*arguments: Any) -> Any:
         try:
-            return self._cache.load_overload(signature, target_context)
-        except Exception as error:  # numba unpickles the file; a damaged one can raise anything
+            return method(*arguments)
+        except Exception as error:
             _warn(error)
             return None
 
-    def save_overload(self, signature: Any, data: Any) -> None:
-        """Store the compiled function. If this fails, only warn."""
-        try:
-            self._cache.save_overload(signature, data)
-        except Exception as error:  # numba first reads the cache's index, which may be damaged
-            _warn(error)
+    return call
 
 
 @functools.cache

@@ -259,13 +259,47 @@ def _check_sizes(path: str | Path, archive: zipfile.ZipFile) -> None:
 def _read_array(archive: zipfile.ZipFile, member: str) -> np.ndarray:
     """Read the array in the archive's file `member`. First check that the array's header fits its size."""
     info = archive.getinfo(member)
-    # The archive's list of files begins at `start_dir`, behind all arrays.
-    if not info.compress_type and info.header_offset + info.file_size > archive.start_dir:
-        raise EOFError(f"{member} does not fit into the file")
+    _check_place(archive, info)
     with archive.open(info) as file:
         check_header(file, info.file_size)
     with archive.open(info) as file:
         return np.lib.format.read_array(file, allow_pickle=False)
+
+
+def _check_place(archive: zipfile.ZipFile, info: zipfile.ZipInfo) -> None:
+    """Raise EOFError if an array reaches into the archive's list of files, which is behind all arrays."""
+    if not info.compress_type and info.header_offset + info.file_size > archive.start_dir:
+        raise EOFError(f"{info.filename} does not fit into the file")
+
+
+def map_npz(path: str | Path) -> Arrays:
+    """The arrays of an npz that `save_npz` wrote, of which only those parts are read that are used.
+
+    Unlike `load_npz` it does not compare checksums, because it would have to read whole arrays for that.
+    Raises InputError if the file is missing or damaged.
+    """
+    with reading(path, "damaged or not an npz file", DELETE_IT), zipfile.ZipFile(path) as archive:
+        check_archive(path, archive)
+        with open(path, "rb") as file:
+            arrays = [(each.filename, _map_array(file, archive, each)) for each in archive.infolist()]
+        return Arrays(path, [(name.removesuffix(".npy"), array) for name, array in arrays])
+    raise AssertionError("not reached")
+
+
+def _map_array(file: IO[bytes], archive: zipfile.ZipFile, info: zipfile.ZipInfo) -> np.ndarray:
+    """The array of an archive's entry as a part of the open file."""
+    _check_place(archive, info)
+    # Before each entry there are 30 bytes, of which the last four hold the lengths of the entry's name and of
+    # an extra field, and then these two.
+    file.seek(info.header_offset)
+    start = info.header_offset + 30 + sum(struct.unpack("<26xHH", file.read(30)))
+    file.seek(start)
+    shape, by_columns, dtype = check_header(file, start + info.file_size)
+    if info.compress_type or (by_columns and len(shape) > 1):
+        raise ValueError(f"{info.filename} is compressed, or stored column by column")
+    if not all(shape):
+        return np.zeros(shape, dtype)  # an empty array cannot be mapped
+    return np.memmap(file, dtype, "r", file.tell(), shape)
 
 
 def load_npy(path: str | Path) -> np.ndarray:
@@ -280,14 +314,15 @@ def load_npy(path: str | Path) -> np.ndarray:
     raise AssertionError("not reached")
 
 
-def check_header(file: IO[bytes], size: int) -> None:
-    """Raise ValueError if an array's header is damaged or does not match the `size` bytes of the array.
+def check_header(file: IO[bytes], size: int) -> tuple[tuple[int, ...], bool, np.dtype]:
+    """An array's shape, whether it is stored by columns, and its type.
 
-    file: open at the start of the header. NumPy parses the header as a Python expression, so a damaged header
-    can raise almost any error.
+    file: open at the start of the array's header. size: where the array ends in it. Raises ValueError if the
+    header is damaged or the array has another size. NumPy parses the header as a Python expression, so a
+    damaged header can raise almost any error.
     """
     try:
-        shape, _, dtype = HEADER_READERS[np.lib.format.read_magic(file)](file)
+        shape, by_columns, dtype = HEADER_READERS[np.lib.format.read_magic(file)](file)
     except OSError:
         raise
     except (Exception, MemoryError):  # Python raises MemoryError for a header that is nested too deeply
@@ -297,6 +332,7 @@ def check_header(file: IO[bytes], size: int) -> None:
         count *= length
     if dtype.hasobject or min(shape, default=0) < 0 or count * dtype.itemsize != size - file.tell():
         raise ValueError("an array has another size than its header says, or holds Python objects")
+    return shape, by_columns, dtype
 
 
 def data_frame(rows: Sequence[Mapping[str, Any]]) -> pandas.DataFrame:

@@ -112,7 +112,7 @@ def _check_events(path: str | Path, events: Iterable[yaml.Event]) -> None:
 
     depth = 0
     for number, event in enumerate(events):
-        line = event.start_mark.line + 1
+        line = event.start_mark.line + 1 if event.start_mark else None
         depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
         if depth > MAX_YAML_DEPTH:
             raise InputError(path, f"nested deeper than {MAX_YAML_DEPTH} levels", line=line)

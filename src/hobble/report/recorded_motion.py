@@ -8,8 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from hobble.core.array_parts import ArrayParts
-from hobble.core.files import load_npz, to_base64
+from hobble.core.files import load_npz, map_npz, to_base64
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 from hobble.figure.mesh import body_mesh, mesh_key
@@ -160,7 +159,7 @@ def longest_stretch(path: str | Path) -> tuple[int, int]:
 
     The stretch is cut to LONGEST frames. Both numbers are 0 if the clip has no rows.
     """
-    stretches = unbroken_stretches(ArrayParts(path).read_whole("frame"))
+    stretches = unbroken_stretches(load_npz(path, ["frame"])["frame"])
     if not stretches:
         return 0, 0
     longest = max(stretches, key=len)[:LONGEST]
@@ -216,10 +215,10 @@ def ground_pictures(paths: Iterable[str | Path], skeleton: Mapping[str, Any]) ->
     for path in paths:
         if len(pictures) == MOST_VIEWS:
             break
-        file = ArrayParts(path)
-        count = int(file.read_whole("pictures")) if "pictures" in file else 0
+        file = map_npz(path)
+        count = int(file["pictures"]) if "pictures" in file else 0
         for i in range(min(count, MOST_VIEWS - len(pictures))):
-            view = {array: file.read_whole(f"picture{i}_{array}") for array in ARRAYS}
+            view = {array: np.array(file[f"picture{i}_{array}"]) for array in ARRAYS}
             if view["pose"].shape[1] == len(figure.joints):
                 name = f"{Path(path).stem}, cycle {int(view['cycle']) + 1}"
                 turns = fitted_rotations(figure, np.asarray(view["pose"], float))[:, drawn_joints]

@@ -6,8 +6,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from hobble.core.array_parts import ArrayParts
 from hobble.core.errors import InputError
+from hobble.core.files import load_npz
 from hobble.report.gather import ReportMaterial
 from hobble.report.parts import (
     Chart,
@@ -136,9 +136,8 @@ def fit_table(paths: Iterable[str | Path]) -> Table | None:
     rows: list[list[Any]] = []
     for path in paths:
         try:
-            file = ArrayParts(path)
             # (C, K, 2) mean and largest distance of a foot in contact, cm; (C, K) fitting error, cm².
-            feet, error = file.read_whole("foot_error"), file.read_whole("error")
+            feet, error = load_npz(path, ("foot_error", "error")).values()
             if error.shape[1] > 1 and len(error):
                 distances = float(feet[:, :, 0].mean()), float(feet[:, :, 1].max())
                 errors = float(error[:, 0].mean()), float(error[:, -1].mean())

@@ -17,10 +17,9 @@ from typing import Annotated, Any, Literal, NamedTuple
 import numpy as np
 from pydantic import Field
 
-from hobble.core.array_parts import ArrayParts
 from hobble.core.declared import ArrayOf, check_arrays, read_declared
 from hobble.core.errors import InputError
-from hobble.core.files import DELETE_IT, load_npz, read_json, save_npz, write_json
+from hobble.core.files import DELETE_IT, load_npz, map_npz, read_json, save_npz, write_json
 from hobble.core.quat import Array
 from hobble.core.section import Finite
 from hobble.core.skeleton import skeleton_from_data
@@ -211,8 +210,8 @@ def load_clip_rows(path: str | Path, part: tuple[int, int] | None = None) -> Cli
     part: (first, stop), to read the rows from `first` up to `stop`, which is not included; None reads all
     rows. The file's checksums are checked only if all rows are read.
     """
-    data: dict[str, Any] = load_npz(path) if part is None else _read_part(ArrayParts(path), *part)
     try:
+        data: dict[str, Any] = load_npz(path) if part is None else _read_part(map_npz(path), *part)
         data["clip"] = str(data["clip"])
         data["layout"] = RowLayout.from_dict(json.loads(str(data["layout"])))
         skeleton_from_data(path, str(data["skeleton"]), fix=DELETE_IT)
@@ -222,7 +221,7 @@ def load_clip_rows(path: str | Path, part: tuple[int, int] | None = None) -> Cli
         channel_keys = [key for key in data if key.startswith(CHANNEL_PREFIX)]
         data["channels"] = {key.removeprefix(CHANNEL_PREFIX): data.pop(key) for key in channel_keys}
         rows = ClipRows(**data)
-    except (AttributeError, KeyError, TypeError, ValueError) as error:
+    except (AttributeError, IndexError, KeyError, TypeError, ValueError) as error:
         raise InputError(path, printable(f"not a file of rows ({error})"), fix=DELETE_IT) from error
     rows.check(path)
     return rows
@@ -230,17 +229,17 @@ def load_clip_rows(path: str | Path, part: tuple[int, int] | None = None) -> Cli
 
 def row_count(path: str | Path) -> int:
     """Number of rows in a file of rows. Does not read the rows."""
-    return ArrayParts(path).shape("p")[0]
+    return len(map_npz(path)["p"])
 
 
-def _read_part(file: ArrayParts, first: int, stop: int) -> dict[str, Any]:
+def _read_part(file: Mapping[str, Array], first: int, stop: int) -> dict[str, Any]:
     """Read all arrays of a file, but only for the rows from `first` up to `stop`, which is not included."""
     of_fits = ("heights", "mean")
-    whole = {name: file.read_whole(name) for name in ("clip", "layout", "skeleton", "visits")}
-    rows = {name: file.read_rows(name, first, stop) for name in file.names if name not in (*whole, *of_fits)}
-    first_fit = int(file.read_rows("fits", 0, first).sum())  # number of fits of the rows before `first`
-    stop_fit = first_fit + int(rows["fits"].sum())
-    return {**whole, **rows, **{name: file.read_rows(name, first_fit, stop_fit) for name in of_fits}}
+    whole = {name: np.array(file[name]) for name in ("clip", "layout", "skeleton", "visits")}
+    rows = {n: np.array(file[n][first:stop]) for n in file if n not in (*whole, *of_fits)}
+    first_fit = int(file["fits"][:first].sum())  # number of fits of the rows before `first`
+    fits = slice(first_fit, first_fit + int(rows["fits"].sum()))
+    return {**whole, **rows, **{name: np.array(file[name][fits]) for name in of_fits}}
 
 
 # Cuts clips into excerpts, from which a sample of a large data set is drawn.

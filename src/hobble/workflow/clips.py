@@ -1,4 +1,4 @@
-"""Finds the clips of each data set, the files that they come from, and the values of their channels.
+"""Finds the clips of a data set, the files that they come from, and the values of their channels.
 
 Besides the clips that the user gives, a data set can have two kinds of clips that Hobble makes from them. A
 mirror is the mirror image of a clip. A hurt version is a copy of a healthy clip in which some links of the
@@ -12,7 +12,8 @@ import functools
 import math
 import os
 import re
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
@@ -22,8 +23,12 @@ from hobble.config.load_configuration import Catalogue
 from hobble.config.models import ClipEntry
 from hobble.core.clip_files import (
     CLIP_NAME_RULE,
+    HURT_SUFFIX,
+    MIRROR_SUFFIX,
     find_clips,
+    is_hurt_version,
     is_valid_clip_name,
+    original,
     require_single_file,
     unused_file_notes,
 )
@@ -32,10 +37,14 @@ from hobble.core.untrusted import check_regular, read_text
 from hobble.hurt.options import HURT_CHANNEL, Hurt
 from hobble.synthetic.options import WRITTEN_LABEL_SUFFIXES
 
+DATASETS = "results/datasets"
+LABEL_SUFFIXES = (".phase", ".gait", "_footsteps.txt", "_gait.txt")  # of hand-made files <clip><suffix>
+MAX_NOTES = 10  # at most this many notes are shown for a folder
 HEADER_BYTES = 1 << 18  # enough for the joints of a BVH file; 191 joints take 40 kB
 # The line of a joint in a BVH file, with its name. The `{` that should follow may be on the same line.
 JOINT = re.compile(r"^\s*(?:ROOT|JOINT)\s+(.*?)\s*\{?\s*$", re.MULTILINE | re.IGNORECASE)
 CHECKSUM_LINE = re.compile(r"([0-9a-fA-F]{64}) [ *](\S+)\.bvh")
+NO_CHANNEL = "plain"  # name of the folder of a database without channels
 
 
 def joint_names(path: Path) -> set[str]:
@@ -54,11 +63,9 @@ def nearest_rig(joints: set[str], known: Mapping[str, Collection[str]], target: 
     joints: names of a clip's joints. known: name of a skeleton -> names of its joints. target: name of the
     data set's skeleton.
     """
-    most, nearest = len(joints & set(known[target])), None
-    for name in sorted(known):
-        if len(joints & set(known[name])) > most:
-            most, nearest = len(joints & set(known[name])), name
-    return nearest
+    shared = {name: len(joints & set(known[name])) for name in sorted(known)}
+    nearest = max(shared, key=lambda name: shared[name])
+    return nearest if shared[nearest] > shared[target] else None
 
 
 def read_checksums(path: Path) -> dict[str, str]:
@@ -68,86 +75,62 @@ def read_checksums(path: Path) -> dict[str, str]:
     """
     checksums: dict[str, str] = {}
     for number, line in enumerate(read_text(path).splitlines(), 1):
-        if not line.strip():
-            continue
         match = CHECKSUM_LINE.fullmatch(line.strip())
-        if match is None:
+        if match is not None:
+            checksums[match[2]] = match[1].lower()
+        elif line.strip():
             raise InputError(path, "expected a SHA-256, two spaces and the name of a .bvh file", line=number)
-        checksums[match[2]] = match[1].lower()
     return checksums
 
 
-DATASETS = "results/datasets"
-MIRROR_SUFFIX = "_mirror"
-HURT_SUFFIX = re.compile(r"_hurt([1-9])$")  # at the end of the name of a hurt version
-MAX_NOTES = 10  # at most this many notes are shown for a folder
-LABEL_SUFFIXES = (".phase", ".gait", "_footsteps.txt", "_gait.txt")  # of hand-made files <clip><suffix>
-
-
-def original(clip: str) -> str:
-    """The clip from which a mirror or a hurt version is made; for other clips the clip itself."""
-    return HURT_SUFFIX.sub("", clip.removesuffix(MIRROR_SUFFIX))
-
-
 class Clips:
-    """The clips of all data sets, and their files.
+    """The clips of one data set, their files, and the values of their channels.
 
-    base: the folder of the checkout of Hobble. mocap: the folder with the user's clips. catalogue: reads the
-    files of the data sets.
+    name: that of the data set. base: the folder of the checkout of Hobble. mocap: the folder with the user's
+    clips. catalogue: reads the files of the data sets.
     """
 
-    def __init__(self, base: Path, mocap: Path, catalogue: Catalogue) -> None:
-        self.base, self.mocap, self.catalogue = base, mocap, catalogue
-        self.channel_sources = ChannelSources(catalogue, self)
+    def __init__(self, name: str, base: Path, mocap: Path, catalogue: Catalogue) -> None:
+        self.name, self.base, self.mocap, self.catalogue = name, base, mocap, catalogue
+        self.settings = catalogue.dataset(name)
+        self.source_name = self.settings.source or name  # the data set that generates or downloads the files
+        self.root = f"{DATASETS}/{name}"
 
-    @functools.cache  # noqa: B019 - one project lives as long as the process
-    def entries(self, dataset: str) -> dict[str, ClipEntry]:
-        """Name -> entry of the clips and hurt versions of a data set, without mirrors.
+    @cached_property
+    def entries(self) -> dict[str, ClipEntry]:
+        """Name -> entry of the clips and hurt versions, without mirrors.
 
         Raises HobbleError if a name is reserved, InputError if there are no clips.
         """
-        entries = self.listed_entries(dataset)
-        return {**entries, **{version: entries[original(version)] for version in self.hurt_versions(dataset)}}
+        return {**self.listed, **{version: self.entry(version) for version in self.hurt_versions}}
 
-    @functools.cache  # noqa: B019
-    def listed_entries(self, dataset: str) -> dict[str, ClipEntry]:
-        """Name -> entry of the data set's listed clips or, if it lists none, of those in its folder."""
-        listed = self.catalogue.dataset(dataset).clips or dict.fromkeys(self._scanned(dataset))
+    @cached_property
+    def listed(self) -> dict[str, ClipEntry]:
+        """Name -> entry of the listed clips or, if the data set lists none, of those in its folder."""
+        listed = self.settings.clips or dict.fromkeys(self._scanned())
         if reserved := [name for name in listed if name.endswith(MIRROR_SUFFIX)]:
             raise HobbleError(
-                f"data set {dataset}: {', '.join(reserved)}: names that end in _mirror are reserved for "
+                f"data set {self.name}: {', '.join(reserved)}: names that end in _mirror are reserved for "
                 "mirrors, which `mirror: true` makes. List the original clip instead, or rename the file."
             )
         if reserved := [name for name in listed if HURT_SUFFIX.search(name)]:
             raise HobbleError(
-                f"data set {dataset}: {', '.join(reserved)}: names that end in _hurt1 to _hurt9 are reserved "
-                "for the hurt versions that `hurt` makes. Take the clip out, or rename its file."
+                f"data set {self.name}: {', '.join(reserved)}: names that end in _hurt1 to _hurt9 are "
+                "reserved for the hurt versions that `hurt` makes. Take the clip out, or rename its file."
             )
         return {name: entry or ClipEntry() for name, entry in listed.items()}
 
-    @staticmethod
-    def is_hurt_version(clip: str) -> bool:
-        """Whether a clip is a hurt version, or the mirror of one."""
-        return HURT_SUFFIX.search(clip.removesuffix(MIRROR_SUFFIX)) is not None
-
-    @functools.cache  # noqa: B019
-    def hurt_versions(self, dataset: str) -> dict[str, int]:
+    @cached_property
+    def hurt_versions(self) -> dict[str, int]:
         """Name of each hurt version -> its number among all hurt versions of the data set, from 0.
 
         The numbers go first through the first versions of all clips, then through their second versions, ...
         Only clips in which the values of the channel HURT_CHANNEL are 0 get hurt versions.
         """
-        options = self.catalogue.dataset(dataset).hurt
-        healthy = (
-            [
-                clip
-                for clip in self.listed_entries(dataset)
-                if self.channel_sources.is_neutral(dataset, clip, HURT_CHANNEL)
-            ]
-            if options
-            else []
-        )
-        counts = {clip: self.hurt_options(dataset, clip).versions for clip in healthy}
+        if self.settings.hurt is None:
+            return {}
+        healthy = [clip for clip in self.listed if self.is_neutral(clip, HURT_CHANNEL)]
+        counts = {clip: self.hurt_options(clip).versions for clip in healthy}
         names = [
             f"{clip}_hurt{version + 1}"
             for version in range(max(counts.values(), default=0))
@@ -156,9 +139,9 @@ class Clips:
         ]
         return {name: number for number, name in enumerate(names)}
 
-    def hurt_options(self, dataset: str, clip: str) -> Hurt:
-        """Options of a clip's hurt versions: the data set's section `hurt`, changed by the clip's entry."""
-        options, amount = self.catalogue.dataset(dataset).hurt, self.entry(dataset, clip).hurt
+    def hurt_options(self, clip: str) -> Hurt:
+        """Options of a clip's hurt versions: the section `hurt`, changed by the clip's entry."""
+        options, amount = self.settings.hurt, self.entry(clip).hurt
         assert options is not None
         if amount is None:
             return options
@@ -167,276 +150,231 @@ class Clips:
         versions = math.ceil(amount)
         return options.model_copy(update={"versions": versions, "longest": amount / max(versions, 1)})
 
-    def entry(self, dataset: str, clip: str) -> ClipEntry:
+    def entry(self, clip: str) -> ClipEntry:
         """The entry of a clip. For a mirror or a hurt version it is the entry of its original."""
-        clips = self.listed_entries(dataset)
         name = original(clip)
-        if name not in clips:
-            raise HobbleError(f"data set {dataset} has no clip {name!r}; it has: {', '.join(clips)}")
-        return clips[name]
+        if name not in self.listed:
+            raise HobbleError(f"data set {self.name} has no clip {name!r}; it has: {', '.join(self.listed)}")
+        return self.listed[name]
 
-    def folder(self, dataset: str) -> Path:
+    @property
+    def folder(self) -> Path:
         """The folder of the data set's BVH files.
 
         Raises InputError if the user's folder cannot be read. A missing folder is an error only if its clips
         cannot be downloaded.
         """
-        settings = self.catalogue.dataset(dataset)
-        if settings.synthetic is not None:
-            return Path(DATASETS, settings.source or dataset, "synthetic")
-        path = self.mocap / (settings.folder or "")
-        if settings.download is not None and not path.exists():
+        if self.settings.synthetic is not None:
+            return Path(DATASETS, self.source_name, "synthetic")
+        path = self.mocap / (self.settings.folder or "")
+        if self.settings.download is not None and not path.exists():
             return path
         if not path.is_dir():
-            raise InputError(
-                path,
-                f"no such folder, but data set {dataset} reads its clips from it",
-                fix="Put the clips there, or give the folder that contains it with --config mocap=FOLDER.",
-            )
+            problem = f"no such folder, but data set {self.name} reads its clips from it"
+            fix = "Put the clips there, or give the folder that contains it with --config mocap=FOLDER."
+            raise InputError(path, problem, fix=fix)
         if not os.access(path, os.R_OK | os.X_OK):
             raise InputError(path, "no permission to read this folder", fix="Check who owns it.")
         return path
 
-    def source(self, dataset: str, clip: str) -> str:
+    def source(self, clip: str) -> str:
         """Path of the clip's BVH file. Raises HobbleError if there is no such clip or no file."""
-        name = self.entry(dataset, clip).file or clip  # raises HobbleError for an unknown clip
-        settings = self.catalogue.dataset(dataset)
-        if settings.synthetic is not None:
-            return str(self.folder(dataset) / f"{clip}.bvh")
-        if name in (files := self._files(dataset)):
-            return str(require_single_file(name, files[name]))
-        if name in (downloads := self._checksums(dataset)):
-            return self.download_path(settings.source or dataset, name)
-        path = self.folder(dataset) / f"{name}.bvh"
-        nor = f", and it is not in the download list {self._download_list(dataset)}" if downloads else ""
+        name = self.entry(clip).file or clip
+        if self.settings.synthetic is not None:
+            return str(self.folder / f"{clip}.bvh")
+        if name in self._files:
+            return str(require_single_file(name, self._files[name]))
+        if name in self._checksums:
+            return str(self.base / "data" / "downloaded" / self.source_name / f"{name}.bvh")
+        nor = f", and it is not in the download list {self._download_list}" if self._checksums else ""
         raise InputError(
-            path,
-            f"no such file, but data set {dataset} lists this clip{nor}",
+            self.folder / f"{name}.bvh",
+            f"no such file, but data set {self.name} lists this clip{nor}",
             fix="Put the file there, or take the clip out of the data set.",
         )
 
-    def download_path(self, dataset: str, clip: str) -> str:
-        """Path to which a clip is downloaded."""
-        return str(self.base / "data" / "downloaded" / dataset / f"{clip}.bvh")
-
-    def download(self, dataset: str, clip: str) -> dict[str, str]:
+    def download(self, clip: str) -> dict[str, str]:
         """How to download a clip, as a mapping with three keys.
 
         url: the address of its BVH file. sha256: the checksum of this file. folder: the user's folder, which
         does not hold this clip.
         """
-        settings = self.catalogue.dataset(dataset)
-        if settings.download is None or clip not in self._checksums(dataset):
-            raise HobbleError(
-                f"data set {dataset}: clip {clip} cannot be downloaded, because it is not in a download list"
-            )
+        if self.settings.download is None or clip not in self._checksums:
+            why = "because it is not in a download list"
+            raise HobbleError(f"data set {self.name}: clip {clip} cannot be downloaded, {why}")
+        address = self.settings.download.url
         return {
-            "url": settings.download.url.format(clip=quote(clip), subject=quote(clip.partition("_")[0])),
-            "sha256": self._checksums(dataset)[clip],
-            "folder": str(self.mocap / (settings.folder or "")),
+            "url": address.format(clip=quote(clip), subject=quote(clip.partition("_")[0])),
+            "sha256": self._checksums[clip],
+            "folder": str(self.mocap / (self.settings.folder or "")),
         }
 
-    @functools.cache  # noqa: B019
-    def label_files(self, dataset: str, clip: str) -> list[str]:
+    @functools.cache  # noqa: B019 - a data set lives as long as the process
+    def label_files(self, clip: str) -> list[str]:
         """Paths of the label files beside the clip: hand-made files, or the files of a synthetic clip."""
-        if self.catalogue.dataset(dataset).synthetic is not None:
-            return self.side_files(dataset, clip, ("_footsteps.txt", "_gait.txt"))
-        reads = self.catalogue.dataset(dataset).labels.files
-        return self.side_files(dataset, clip, LABEL_SUFFIXES) if reads else []
+        if self.settings.synthetic is not None:
+            return self._side_files(clip, *WRITTEN_LABEL_SUFFIXES)
+        return self._side_files(clip, *LABEL_SUFFIXES) if self.settings.labels.files else []
 
-    def side_files(self, dataset: str, clip: str, suffixes: Iterable[str]) -> list[str]:
+    def _side_files(self, clip: str, *suffixes: str) -> list[str]:
         """Paths of the existing files <clip><suffix> beside a clip, for the given suffixes.
 
         Files of a synthetic clip need not exist yet, because a rule makes them.
         """
-        synthetic = self.catalogue.dataset(dataset).synthetic is not None
-        if synthetic:
-            suffixes = [suffix for suffix in suffixes if suffix in WRITTEN_LABEL_SUFFIXES]
-        stem = self.folder(dataset) / clip  # the path without suffix
-        if not synthetic and clip in (files := self._files(dataset)):
-            stem = files[clip][0].with_suffix("")
-        files_of_clip = (f"{stem}{suffix}" for suffix in suffixes)
-        return [file for file in files_of_clip if synthetic or Path(file).is_file()]
+        if self.settings.synthetic is not None:
+            return [f"{self.folder / clip}{end}" for end in suffixes if end in WRITTEN_LABEL_SUFFIXES]
+        stem = self._files[clip][0].with_suffix("") if clip in self._files else self.folder / clip
+        return [file for file in (f"{stem}{end}" for end in suffixes) if Path(file).is_file()]
 
-    def heightmap_files(self, dataset: str) -> list[str]:
+    @property
+    def heightmap_files(self) -> list[str]:
         """Paths of the heightmaps of kind `file`, in the order of the data set."""
-        maps = self.catalogue.dataset(dataset).terrain.heightmaps
-        files = [self.mocap / m.path for m in maps if m.path]
+        files = [self.mocap / each.path for each in self.settings.terrain.heightmaps if each.path]
         for file in filter(Path.exists, files):
             check_regular(file)
         return [str(file) for file in files]
 
-    def skeleton_file(self, dataset: str) -> str:
+    @property
+    def skeleton_file(self) -> str:
         """Path of the data set's skeleton."""
-        return self._skeleton(self.catalogue.dataset(dataset).skeleton)
+        return self._skeleton(self.settings.skeleton)
 
     @functools.cache  # noqa: B019
-    def clip_skeleton_files(self, dataset: str, clip: str) -> list[str]:
+    def clip_skeleton_files(self, clip: str) -> list[str]:
         """The file of the clip's own skeleton, in a list; [] if this is the data set's skeleton.
 
         A clip's own skeleton (its rig) is the known one that has the most joints of the clip's BVH file.
         """
-        settings = self.catalogue.dataset(dataset)
-        if settings.synthetic is not None:
-            name: str | None = self.catalogue.dataset(settings.source or dataset).skeleton
+        if self.settings.synthetic is not None:
+            name: str | None = self.catalogue.dataset(self.source_name).skeleton
         else:
-            rigs = sorted(path.stem for path in Path(self.skeleton_folder).glob("*.yaml"))
+            rigs = [path.stem for path in (self.base / "config/skeletons").glob("*.yaml")]
             known = {rig: self.catalogue.skeleton(rig).joints for rig in rigs}
-            name = nearest_rig(joint_names(Path(self.source(dataset, clip))), known, settings.skeleton)
-        return [self._skeleton(name)] if name is not None and name != settings.skeleton else []
-
-    @property
-    def skeleton_folder(self) -> str:
-        """The folder of the skeletons."""
-        return str(self.base / "config" / "skeletons")
+            name = nearest_rig(joint_names(Path(self.source(clip))), known, self.settings.skeleton)
+        return [self._skeleton(name)] if name is not None and name != self.settings.skeleton else []
 
     def _skeleton(self, name: str) -> str:
-        return str(Path(self.skeleton_folder) / f"{name}.yaml")
+        return str(self.base / "config" / "skeletons" / f"{name}.yaml")
 
-    def _scanned(self, dataset: str) -> list[str]:
+    def _scanned(self) -> list[str]:
         """The names of the clips in the user's folder.
 
         A mirror is left out if its original is in the folder. Raises InputError if there are no clips, or if
         a clip has a bad name or two files.
         """
-        folder, files = self.folder(dataset), self._files(dataset)
-        for name in sorted(files):
+        for name in sorted(self._files):
             if not is_valid_clip_name(name):
                 fix = f"Rename it. Allowed: {CLIP_NAME_RULE}."
-                raise InputError(folder, f"a clip is called {name!a:.80}", fix=fix)
-            require_single_file(name, files[name])
-        if not files:
-            raise InputError(folder, "no .bvh files here", fix="Put clips there.")
-        return sorted(set(files) - set(self._mirrors(dataset)))
+                raise InputError(self.folder, f"a clip is called {name!a:.80}", fix=fix)
+            require_single_file(name, self._files[name])
+        if not self._files:
+            raise InputError(self.folder, "no .bvh files here", fix="Put clips there.")
+        return sorted(set(self._files) - set(self._mirrors()))
 
-    def _mirrors(self, dataset: str) -> list[str]:
+    def _mirrors(self) -> list[str]:
         """Names of files NAME_mirror.bvh for which there is a NAME.bvh."""
-        files = self._files(dataset)
-        return sorted(name + MIRROR_SUFFIX for name in files if name + MIRROR_SUFFIX in files)
+        return sorted(name + MIRROR_SUFFIX for name in self._files if name + MIRROR_SUFFIX in self._files)
 
-    def notes_on_unused_files(self, dataset: str) -> list[str]:
+    def notes_on_unused_files(self) -> list[str]:
         """Sentences that say which files in the user's folder are not used, and why."""
-        settings = self.catalogue.dataset(dataset)
-        if settings.synthetic is not None or not (folder := self.folder(dataset)).is_dir():
+        if self.settings.synthetic is not None or not self.folder.is_dir():
             return []
-        notes = unused_file_notes(folder, {*self._files(dataset), *self._checksums(dataset)})
-        mirrors = [] if settings.clips or settings.mirror else self._mirrors(dataset)
+        notes = unused_file_notes(self.folder, {*self._files, *self._checksums})
+        mirrors = [] if self.settings.clips or self.settings.mirror else self._mirrors()
         if mirrors:
-            notes.insert(
-                0,
-                f"{len(mirrors)} files in {folder} are not used, because they are mirrors of other clips "
-                f"({mirrors[0]}.bvh, ...). With `mirror: true` Hobble makes mirrors of all clips, with "
-                "labels.",
-            )
-        not_shown = len(notes) - MAX_NOTES
-        last = [f"{not_shown} more files belong to no clip."] if not_shown > 0 else []
-        return [*notes[:MAX_NOTES], *last]
+            what = f"they are mirrors of other clips ({mirrors[0]}.bvh, ...)"
+            fix = "With `mirror: true` Hobble makes mirrors of all clips, with labels."
+            notes.insert(0, f"{len(mirrors)} files in {self.folder} are not used, because {what}. {fix}")
+        more = [f"{len(notes) - MAX_NOTES} more files belong to no clip."] if len(notes) > MAX_NOTES else []
+        return [*notes[:MAX_NOTES], *more]
 
-    def _download_list(self, dataset: str) -> Path:
+    @property
+    def _download_list(self) -> Path:
         """Path of the data set's download list."""
-        options = self.catalogue.dataset(dataset).download
-        return self.base / "config" / "datasets" / ((options and options.checksums) or f"{dataset}.yaml")
+        options = self.settings.download
+        return self.base / "config" / "datasets" / ((options and options.checksums) or f"{self.name}.yaml")
 
-    @functools.cache  # noqa: B019
-    def _checksums(self, dataset: str) -> dict[str, str]:
+    @cached_property
+    def _checksums(self) -> dict[str, str]:
         """Clip -> SHA-256 from the download list; {} if the data set has no downloads.
 
         Without a list, all clips of the data set can be downloaded, and their sums are "".
         """
-        settings = self.catalogue.dataset(dataset)
-        if settings.download is None:
+        if self.settings.download is None:
             return {}
-        if settings.download.checksums is None:
-            return dict.fromkeys(
-                (entry.file or clip if entry else clip for clip, entry in settings.clips.items()), ""
-            )
-        return read_checksums(self._download_list(dataset))
+        if self.settings.download.checksums is not None:
+            return read_checksums(self._download_list)
+        return {entry.file or clip if entry else clip: "" for clip, entry in self.settings.clips.items()}
 
-    @functools.cache  # noqa: B019
-    def _files(self, dataset: str) -> dict[str, list[Path]]:
+    @cached_property
+    def _files(self) -> dict[str, list[Path]]:
         """Clip -> its BVH files in the user's folder."""
-        folder = self.folder(dataset)
-        return find_clips(folder) if folder.is_dir() else {}
+        return find_clips(self.folder) if self.folder.is_dir() else {}
 
+    # The channels, and the sources of their values.
 
-NO_CHANNEL = "plain"  # name of the folder of a database without channels
-
-
-class ChannelSources:
-    """The channels of a project's data sets, and the sources of their values."""
-
-    def __init__(self, catalogue: Catalogue, clips: Clips) -> None:
-        self.catalogue, self.clips = catalogue, clips
-
-    def channels(self, dataset: str) -> tuple[str, ...]:
-        """The channels of a data set: those with a section in its file, and those that need no section."""
-        sections = self.catalogue.dataset(dataset).channels
+    @cached_property
+    def channels(self) -> tuple[str, ...]:
+        """The channels of the data set: those with a section in its file, and those that need no section."""
+        sections = self.settings.channels
         return tuple(name for name in CHANNEL_NAMES if name in sections or channel(name).Options is None)
 
-    def files(self, dataset: str, clip: str, name: str) -> list[str]:
+    def channel_files(self, clip: str, name: str) -> list[str]:
         """The files that channel `name` reads for a clip.
 
         They are the file beside the clip, and the tables of all clips that the channel's options name. The
         file beside the clip is left out if the clip's entry in the data set has a value for the channel.
         """
-        suffix, has_value = channel(name).suffix, self._value(dataset, clip, name) is not None
-        files = self.clips.side_files(dataset, clip, (suffix,)) if suffix and not has_value else []
-        return [*files, *self._tables(dataset, name)]
+        suffix, value = channel(name).suffix, self.entry(clip).channels.get(name)
+        files = self._side_files(clip, suffix) if suffix and value is None else []
+        return [*files, *self._tables(name)]
 
-    def source(self, dataset: str, clip: str, name: str) -> dict[str, Any]:
+    def channel_source(self, clip: str, name: str) -> dict[str, Any]:
         """What the data set says about the values of channel `name` in a clip, as plain data.
 
         The keys are the fields of `hobble.channels.channel.ClipSource`, without `files`.
         """
+        entry = self.entry(clip)
         return {
             "clip": original(clip),
-            "entry": self.clips.entry(dataset, clip).model_dump(
-                mode="json", exclude={"channels", "hurt", "person"}
-            ),
-            "value": self._value(dataset, clip, name),
-            "options": self.catalogue.dataset(dataset).channels.get(name, {}),
+            "entry": entry.model_dump(mode="json", exclude={"channels", "hurt", "person"}),
+            "value": entry.channels.get(name),
+            "options": self.settings.channels.get(name, {}),
         }
 
-    @functools.cache  # noqa: B019 - one project lives as long as the process
-    def is_neutral(self, dataset: str, clip: str, name: str) -> bool:
+    @functools.cache  # noqa: B019
+    def is_neutral(self, clip: str, name: str) -> bool:
         """Whether all values of channel `name` are 0 in a clip."""
-        if self.clips.is_hurt_version(clip) and name == HURT_CHANNEL:
+        if is_hurt_version(clip) and name == HURT_CHANNEL:
             return False
         # The file beside a synthetic clip is not read, because it need not exist yet.
-        synthetic = self.catalogue.dataset(dataset).synthetic is not None
-        files = self._tables(dataset, name) if synthetic else self.files(dataset, clip, name)
+        files = self._tables(name) if self.settings.synthetic is not None else self.channel_files(clip, name)
         definition = channel(name)
-        return definition.is_neutral(definition.make_source(self.source(dataset, clip, name), files))
+        return definition.is_neutral(definition.make_source(self.channel_source(clip, name), files))
 
-    def check(self, dataset: str) -> None:
-        """Raise HobbleError if the data set's clip entries or options are wrong about channels."""
-        settings = self.catalogue.dataset(dataset)
-        rig = self.catalogue.skeleton(settings.skeleton)
-        for clip, entry in self.clips.listed_entries(dataset).items():
-            if unknown := set(entry.channels) - set(self.channels(dataset)):
+    def check_channels(self) -> None:
+        """Raise HobbleError if the clips' entries or the options are wrong about channels."""
+        rig = self.catalogue.skeleton(self.settings.skeleton)
+        for clip, entry in self.listed.items():
+            if unknown := set(entry.channels) - set(self.channels):
                 raise HobbleError(
-                    f"data set {dataset}: clips.{clip}.channels: the data set has no channel "
-                    f"{', '.join(sorted(unknown))}; it has {', '.join(self.channels(dataset)) or 'none'}"
+                    f"data set {self.name}: clips.{clip}.channels: the data set has no channel "
+                    f"{', '.join(sorted(unknown))}; it has {', '.join(self.channels) or 'none'}"
                 )
-            for name in self.channels(dataset):
+            for name in self.channels:
                 # Error messages show "clip", so it names the place in the data set's file.
-                fields = self.source(dataset, clip, name) | {"clip": f"data set {dataset}: clips.{clip}"}
+                fields = {**self.channel_source(clip, name), "clip": f"data set {self.name}: clips.{clip}"}
                 definition = channel(name)
-                definition.check(definition.make_source(fields, self._tables(dataset, name)), rig)
+                definition.check(definition.make_source(fields, self._tables(name)), rig)
 
-    def _value(self, dataset: str, clip: str, name: str) -> Any:
-        """The value of channel `name` in the clip's entry, or None."""
-        return self.clips.entry(dataset, clip).channels.get(name)
-
-    def _tables(self, dataset: str, name: str) -> list[str]:
+    def _tables(self, name: str) -> list[str]:
         """Paths of the tables in the options of channel `name`. Raises InputError if a table is missing."""
-        definition, section = channel(name), self.catalogue.dataset(dataset).channels.get(name, {})
-        tables = definition.table_files(definition.options_of(section))
-        files = [self.clips.mocap / file for file in tables]
-        for file in files:
+        definition = channel(name)
+        tables = definition.table_files(definition.options_of(self.settings.channels.get(name, {})))
+        for file in (files := [self.mocap / file for file in tables]):
             if not file.is_file():
                 fix = "Put it there, or name the folder that holds it with --config mocap=FOLDER."
-                raise InputError(file, f"no such file, but data set {dataset} reads it", fix=fix)
+                raise InputError(file, f"no such file, but data set {self.name} reads it", fix=fix)
         return [str(file) for file in files]
 
 
@@ -451,9 +389,7 @@ def channels_of_folder(folder_name: str) -> tuple[str, ...]:
     Raises HobbleError for a name that no database can have.
     """
     names = () if folder_name == NO_CHANNEL else tuple(folder_name.split("+"))
-    if any(name not in CHANNEL_NAMES for name in names) or list(names) != sorted(
-        set(names), key=CHANNEL_NAMES.index
-    ):
+    if names != tuple(name for name in CHANNEL_NAMES if name in names):
         raise HobbleError(
             f"no database can be called {folder_name}. A database without channels is called `{NO_CHANNEL}`. "
             f"Any other is called by its channels with + between them, in the order "

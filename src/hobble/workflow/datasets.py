@@ -1,55 +1,141 @@
-"""Tells Snakemake's rules about data sets: their options, their clips, and which clips are for training."""
+"""Tells the rules about a data set: its options, its batches of clips, and which clips are for training.
+
+Each stage of the workflow (motion, labels, ...) has one job for each batch instead of one for each clip,
+because a job takes time to start. A data set of up to LEAST_BATCHES clips has a batch for each clip. A larger
+data set has LEAST_BATCHES batches, and this number is doubled until a batch holds at most
+MOST_CLIPS_OF_A_BATCH clips on average. A hash of a clip's name decides its batch. So a new clip changes only
+one batch if the number of batches stays the same. The hurt versions of a batch's clips are a batch, too.
+
+The output of a job is a folder, results/datasets/<dataset>/batches/<stage>/<batch>/. Snakemake plans 500
+folders in seconds; listing the 25,000 files in them took five times as long.
+"""
 
 from __future__ import annotations
 
+import hashlib
+from collections import defaultdict
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
-from hobble.config.load_configuration import Catalogue
+from hobble.core.clip_files import MIRROR_SUFFIX, is_hurt_version, original
 from hobble.core.errors import HobbleError
 from hobble.core.section import Section
-from hobble.workflow.clips import MIRROR_SUFFIX, Clips, original
+from hobble.hurt.options import HURT_CHANNEL
+from hobble.workflow.clips import Clips
+
+LEAST_BATCHES = 12  # a data set with more clips than this has at least this many batches
+MOST_CLIPS_OF_A_BATCH = 32  # a batch holds at most this many clips on average
 
 
-class Datasets:
-    """The data sets of a project. Most methods have the name of a data set as first argument."""
+@dataclass(frozen=True)
+class ClipBatch:
+    """Some clips of a data set, or hurt versions of clips, that one job processes one after another.
 
-    def __init__(self, catalogue: Catalogue, clips: Clips) -> None:
-        self.catalogue, self.clips, self.channel_sources = catalogue, clips, clips.channel_sources
+    name: the clip's name if each clip has a batch of its own, else a number; with `_hurt` for hurt versions.
+    mirrored: whether each clip has a mirror. channels: those whose values the stage `channels` reads.
+    """
 
-    def options(self, dataset: str, section: str, *keys: str) -> dict[str, Any]:
-        """Key -> value of one section of a data set as plain data, for `keys` or for all keys."""
-        values = getattr(self.catalogue.dataset(dataset), section).model_dump(mode="json")
+    name: str
+    clips: tuple[str, ...]
+    mirrored: bool
+    channels: tuple[str, ...]
+    hurt: bool = False
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the clips, then of their mirrors, if there are any."""
+        return (*self.clips, *(clip + MIRROR_SUFFIX for clip in self.clips if self.mirrored))
+
+    @property
+    def originals(self) -> tuple[str, ...]:
+        """The clips from which these hurt versions are made, each once."""
+        return tuple(dict.fromkeys(map(original, self.clips)))
+
+
+class NamedDataset(Clips):
+    """What the rules ask about one data set."""
+
+    def options(self, section: str, *keys: str) -> dict[str, Any]:
+        """Key -> value of one section as plain data, for `keys` or for all keys."""
+        values = getattr(self.settings, section).model_dump(mode="json")
         return {key: values[key] for key in keys} if keys else values
 
-    def options_of_class(self, dataset: str, section: str, options_class: type[Section]) -> dict[str, Any]:
+    def options_of(self, section: str, options_class: type[Section]) -> dict[str, Any]:
         """Key -> value of a section as plain data, only for keys that are fields of `options_class`."""
-        return self.options(dataset, section, *options_class.model_fields)
+        return self.options(section, *options_class.model_fields)
 
-    def motion_options(self, dataset: str, clip: str) -> dict[str, Any]:
+    def motion_options(self, clip: str) -> dict[str, Any]:
         """The section `motion`, changed by the values in the clip's entry, and with the entry's `ground`."""
         keys = {"source_fps", "loops", "heading", "ground", "frames"}
-        entry = self.clips.entry(dataset, clip).model_dump(mode="json", include=keys, exclude_none=True)
-        return {**self.options(dataset, "motion"), **entry}
+        return {
+            **self.options("motion"),
+            **self.entry(clip).model_dump(mode="json", include=keys, exclude_none=True),
+        }
 
-    def frames(self, dataset: str, clip: str) -> int:
+    def frames(self, clip: str) -> int:
         """Number of frames, at 60 Hz, of a synthetic clip: its share of the frames of the data set."""
-        synthetic = self.catalogue.dataset(dataset).synthetic
-        assert synthetic is not None
-        all_shares = sum(entry.share for entry in self.clips.listed_entries(dataset).values())
-        return round(synthetic.frames * self.clips.entry(dataset, clip).share / all_shares)
+        assert self.settings.synthetic is not None
+        all_shares = sum(entry.share for entry in self.listed.values())
+        return round(self.settings.synthetic.frames * self.entry(clip).share / all_shares)
 
-    def walkers(self, names: Iterable[str]) -> list[str]:
-        """The data sets whose walkers make the synthetic clips of the data sets `names`.
+    @cached_property
+    def batches(self) -> dict[str, ClipBatch]:
+        """Name -> batch: first the batches of clips, then those of their hurt versions."""
+        count = batch_count(len(self.listed))
+        digits = len(str(count - 1))  # all numbers get as many, such as 03 in 00 to 11
+        members: dict[str, list[str]] = defaultdict(list)
+        for clip in self.listed:
+            own = count == len(self.listed)
+            members[clip if own else f"{batch_of(clip, count):0{digits}}"].append(clip)
+        versions = defaultdict(list)
+        for version in self.hurt_versions:
+            versions[original(version)].append(version)
+        names = list(members) if count == len(self.listed) else sorted(members)
+        mirrored, channels = self.settings.mirror, self.channels
+        batches = [ClipBatch(name, tuple(members[name]), mirrored, channels) for name in names]
+        # The stage `hurt` makes the severities of hurt versions.
+        others = tuple(name for name in channels if name != HURT_CHANNEL)
+        for batch in list(batches):
+            if hurt := tuple(version for clip in batch.clips for version in versions[clip]):
+                batches.append(ClipBatch(f"{batch.name}_hurt", hurt, mirrored, others, hurt=True))
+        return {batch.name: batch for batch in batches}
 
-        A walker computes the motion of synthetic clips. A data set uses the walker of its `source`, or its
-        own if it has no `source`.
+    def batch(self, name: str) -> ClipBatch:
+        """One batch. Raises HobbleError if the data set has no batch with this name."""
+        if name not in self.batches:
+            there = ", ".join(self.batches)
+            raise HobbleError(f"data set {self.name} has no batch {name:.80}; it has {there}")
+        return self.batches[name]
+
+    def folders(self, names: Iterable[str], *stages: str) -> list[str]:
+        """The folders with the files that some stages make of some clips.
+
+        names: of clips, mirrors and hurt versions. The stage `hurt` makes the motion, labels and severities
+        of hurt versions.
         """
-        settings = {name: self.catalogue.dataset(name) for name in names}
-        walkers = [each.source or name for name, each in settings.items() if each.synthetic is not None]
-        return list(dict.fromkeys(walkers))
+        clips = [clip.removesuffix(MIRROR_SUFFIX) for clip in names]
+        if unknown := [clip for clip in clips if clip not in self._batch_of_clip]:
+            raise HobbleError(f"data set {self.name} has no clip {unknown[0]!r:.80}")
+        found: dict[str, None] = {}
+        for batch in dict.fromkeys(self._batch_of_clip[clip] for clip in clips):
+            for stage in stages:
+                of_hurt = batch.hurt and stage in ("motion", "labels", "channels")
+                made_by = ["hurt"] if of_hurt else []
+                if stage == "channels":
+                    made_by += [stage] if batch.channels else []
+                elif not of_hurt:
+                    made_by.append(stage)
+                found.update(dict.fromkeys(f"{self.root}/batches/{each}/{batch.name}" for each in made_by))
+        return list(found)
 
-    def splits(self, dataset: str, channels: Sequence[str]) -> dict[str, str]:
+    @cached_property
+    def _batch_of_clip(self) -> dict[str, ClipBatch]:
+        """Clip or hurt version -> its batch."""
+        return {clip: batch for batch in self.batches.values() for clip in batch.clips}
+
+    def splits(self, channels: Sequence[str]) -> dict[str, str]:
         """Clip -> "train" or "held_out", for the clips that a network can learn from.
 
         channels: the channels of the network. If the network lacks a channel of the data set, it cannot learn
@@ -57,62 +143,65 @@ class Datasets:
         original. Raises HobbleError if the data set lacks one of `channels`, if `held_out` names a clip that
         does not exist, or if no clip is left for training.
         """
-        available = self.channel_sources.channels(dataset)
-        if lacking := [name for name in channels if name not in available]:
+        if lacking := [name for name in channels if name not in self.channels]:
             raise HobbleError(
-                f"data set {dataset} has no channel {', '.join(lacking)}. Give it a section "
+                f"data set {self.name} has no channel {', '.join(lacking)}. Give it a section "
                 f"`channels: {{{lacking[0]}: ...}}`, or use another data set"
             )
-        unused = [name for name in available if name not in channels]
-        settings, clips = self.catalogue.dataset(dataset), self.clips.entries(dataset)
-        held_out = set(settings.held_out)
-        if missing := held_out - set(self.clips.listed_entries(dataset)):
-            missing_names = ", ".join(sorted(missing))
+        held_out = set(self.settings.held_out)
+        if missing := held_out - set(self.listed):
             raise HobbleError(
-                f"data set {dataset}: held_out names clips that do not exist: {missing_names}. Correct the "
-                "names, or take them out of held_out"
+                f"data set {self.name}: held_out names clips that do not exist: "
+                f"{', '.join(sorted(missing))}. Correct the names, or take them out of held_out"
             )
-        splits = {}
-        for clip in clips:
-            if not all(self.channel_sources.is_neutral(dataset, clip, name) for name in unused):
-                continue
-            for name in (clip, clip + MIRROR_SUFFIX) if settings.mirror else (clip,):
+        splits, without = {}, set()
+        for clip in self.entries:
+            unknown = [n for n in self.channels if n not in channels and not self.is_neutral(clip, n)]
+            without |= set(unknown)
+            for name in () if unknown else (clip, clip + MIRROR_SUFFIX)[: 1 + self.settings.mirror]:
                 splits[name] = "held_out" if original(clip) in held_out else "train"
         if "train" not in splits.values():
-            leave_out = [
-                name
-                for name in unused
-                if not all(self.channel_sources.is_neutral(dataset, clip, name) for clip in clips)
-            ]
-            without = f" without {' or '.join(leave_out)}" if leave_out else ""
+            suited = f" without {' or '.join(sorted(without))}" if without else ""
             raise HobbleError(
-                f"data set {dataset}: no clip{without} is left to train on. Add clips, or shorten held_out"
+                f"data set {self.name}: no clip{suited} is left to train on. Add clips, or shorten held_out"
             )
         return splits
 
-    def clips_to_compare(self, dataset: str, channels: Sequence[str]) -> list[str]:
+    def clips_to_compare(self, channels: Sequence[str]) -> list[str]:
         """The clips that a job compares to find copies, so that no motion is both trained on and held out.
 
         Mirrors and hurt versions are not compared. The list is empty if no clip is held out, or if the clips
         are synthetic.
         """
-        if self.catalogue.dataset(dataset).synthetic is not None:
-            return []
-        splits = self.splits(dataset, channels)
-        if len(set(splits.values())) < 2:
+        splits = self.splits(channels)
+        if self.settings.synthetic is not None or len(set(splits.values())) < 2:
             return []
         return [clip for clip in splits if clip == original(clip)]
 
-    def hurt_row_step(self, dataset: str) -> int:
+    @property
+    def hurt_row_step(self) -> int:
         """The number n such that training uses every n-th row of the hurt versions."""
-        hurt = self.catalogue.dataset(dataset).hurt
-        return hurt.every if hurt else 1
+        return self.settings.hurt.every if self.settings.hurt else 1
 
-    def sources(self, chosen: Iterable[str]) -> dict[str, str]:
-        """Hurt version -> its healthy original, for the hurt versions among the chosen clips.
 
-        The mirror of a hurt version gets the mirror of the original.
-        """
-        chosen = list(chosen)
-        suffixes = {clip: MIRROR_SUFFIX if clip.endswith(MIRROR_SUFFIX) else "" for clip in chosen}
-        return {clip: original(clip) + suffixes[clip] for clip in chosen if self.clips.is_hurt_version(clip)}
+def healthy_originals(clips: Iterable[str]) -> dict[str, str]:
+    """Hurt version -> its healthy original, for the hurt versions among some clips.
+
+    The mirror of a hurt version gets the mirror of the original.
+    """
+    ends = {clip: MIRROR_SUFFIX if clip.endswith(MIRROR_SUFFIX) else "" for clip in clips}
+    return {clip: original(clip) + end for clip, end in ends.items() if is_hurt_version(clip)}
+
+
+def batch_count(clips: int) -> int:
+    """The number of batches of a data set with this number of clips; see the module's docstring."""
+    count = min(clips, LEAST_BATCHES)
+    while clips > count * MOST_CLIPS_OF_A_BATCH:
+        count *= 2
+    return count
+
+
+def batch_of(clip: str, count: int) -> int:
+    """The number of the clip's batch, from 0 to `count` - 1. It does not depend on other clips."""
+    digest = hashlib.sha256(clip.encode(errors="surrogateescape")).digest()
+    return int.from_bytes(digest[:8], "big") % count

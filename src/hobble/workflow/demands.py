@@ -1,4 +1,4 @@
-"""Computes the memory and time that jobs request from a cluster.
+"""Computes the memory and time that jobs request from a cluster, and how long trainings take.
 
 Memory and time grow with the length of the clips and the number of joints. Requests are made before any job
 has run, so the lengths are estimated from the configuration and the sizes of the user's files. The rates were
@@ -8,20 +8,26 @@ with what a finished run used.
 
 from __future__ import annotations
 
+import contextlib
+import csv
 import functools
 import math
 import os
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import NamedTuple
+from statistics import median
+from typing import Any, NamedTuple
 
 from hobble.channels import channel
+from hobble.core.clip_files import is_hurt_version, original
+from hobble.core.errors import HobbleError
 from hobble.measures.measure import Cost, measure_named
 from hobble.models.model import TrainedOptions
 from hobble.rows.layout import RowLayout
 from hobble.training.options import Machines
-from hobble.workflow.clips import original
+from hobble.workflow.configurations import NamedConfiguration
+from hobble.workflow.datasets import NamedDataset
 from hobble.workflow.project import Project
 
 # Memory of Snakemake itself, which runs twice in a cluster job (for SLURM's step and for the script), and of
@@ -75,139 +81,140 @@ def request(megabytes: float, seconds: float, attempt: int, least: int) -> Reque
     )
 
 
-class Demands:
-    """Computes what a project's jobs request. dataset, configuration: names. attempt: see `request`."""
+def job_request(
+    stage: str, dataset: NamedDataset, clips: Iterable[str] | None = None, attempt: int = 1
+) -> Request:
+    """The request of a job that holds one clip at a time.
 
-    def __init__(self, project: Project) -> None:
-        self.project, self.configurations = project, project.configurations
+    stage: a key of RATES. clips: None for all. attempt: see `request`.
+    """
+    rate = RATES[stage]
+    sizes = [thousands_of_frames(dataset, clip) for clip in clips or dataset.entries]
+    times = 1 + (stage in WITH_MIRRORS and dataset.settings.mirror)
+    if stage == "channels":
+        times = len(dataset.channels)
+    kept = KEPT_MB * times * sum(sizes) if stage in KEEPING else 0.0
+    seconds = times * rate.seconds_per_1000_frames * sum(sizes) + CLIP_SECONDS * len(sizes)
+    return request(rate.mb_per_1000_frames * max(sizes) + kept, seconds, attempt, rate.least_minutes)
 
-    def job(self, stage: str, dataset: str, clips: Iterable[str] | None = None, attempt: int = 1) -> Request:
-        """The request of a job that holds one clip at a time. stage: a key of RATES. clips: None for all."""
-        rate = RATES[stage]
-        sizes = [self.thousands_of_frames(dataset, clip) for clip in clips or self.all_clips(dataset)]
-        times = 1 + (stage in WITH_MIRRORS and self.project.catalogue.dataset(dataset).mirror)
-        if stage == "channels":
-            times = len(self.project.datasets.channel_sources.channels(dataset))
-        kept = KEPT_MB * times * sum(sizes) if stage in KEEPING else 0.0
-        seconds = times * rate.seconds_per_1000_frames * sum(sizes) + CLIP_SECONDS * len(sizes)
-        return request(rate.mb_per_1000_frames * max(sizes) + kept, seconds, attempt, rate.least_minutes)
 
-    def measure(self, configuration: str, name: str, attempt: int = 1) -> Request:
-        """The request of the measurement `name`. Some measurements read only a sample of the frames."""
-        measure, dataset = measure_named(name), self.configurations.dataset(configuration)
-        frames = self.all_thousands_of_frames(dataset)
-        longest = max(self.thousands_of_frames(dataset, clip) for clip in self.all_clips(dataset))
-        if "sample_frames" in measure.options.model_fields:
-            sample = self.configurations.section(configuration, "evaluation")["sample_frames"] / 1e3
-            sample *= self._joints(dataset) / MEASURED_JOINTS
-            if sample < frames:
-                frames, longest = sample, EXCERPT_THOUSANDS
-        cost = measure.cost
-        megabytes = cost.memory_mb + cost.mb_per_1000_frames * longest
-        return request(megabytes, cost.seconds_per_1000_frames * frames, attempt, cost.least_minutes)
+def measure_request(configuration: NamedConfiguration, name: str, attempt: int = 1) -> Request:
+    """The request of the measurement `name`. Some measurements read only a sample of the frames."""
+    measure, dataset = measure_named(name), configuration.dataset
+    frames = all_thousands_of_frames(dataset)
+    longest = max(thousands_of_frames(dataset, clip) for clip in dataset.entries)
+    if "sample_frames" in measure.options.model_fields:
+        sample = configuration.section("evaluation")["sample_frames"] / 1e3
+        sample *= _joints(dataset) / MEASURED_JOINTS
+        if sample < frames:
+            frames, longest = sample, EXCERPT_THOUSANDS
+    cost = measure.cost
+    megabytes = cost.memory_mb + cost.mb_per_1000_frames * longest
+    return request(megabytes, cost.seconds_per_1000_frames * frames, attempt, cost.least_minutes)
 
-    def training(self, configuration: str, attempt: int = 1) -> Request:
-        """The request of a training, on each of its machines.
 
-        Each process holds PyTorch (500 MB), its part of the database, the weights and the optimiser's state
-        (32 bytes for each parameter). A network that is built from the rows and not trained, such as motion
-        matching, also has up to three copies of all rows, with 4 bytes for each number.
+def training_request(configuration: NamedConfiguration, attempt: int = 1) -> Request:
+    """The request of a training, on each of its machines.
 
-        A process multiplies by 6.4e9 weights per second: two cores train a PFNN with layers of 342, 512, 512
-        and 311 units on 10,700 samples per second. A PFNN has four parameters for each weight. A training
-        that is killed continues from its last checkpoint.
-        """
-        options = self.project.catalogue.configuration(configuration).training
-        parameters, machines = self.parameter_count(configuration), self.machines(configuration)
-        needed = 500 + options.memory_mb + 32e-6 * parameters
-        if self.configurations.is_built(configuration):
-            layout, dataset = self.layout(configuration), self.configurations.dataset(configuration)
-            needed += 3 * 4e-3 * (layout.x_size + layout.y_size) * self.all_thousands_of_frames(dataset)
-        seconds = self.training_samples(configuration, options.passes) * parameters / 4 / 6.4e9
-        return request(machines.processes_per_node * needed, seconds / machines.count, attempt, 60)
+    Each process holds PyTorch (500 MB), its part of the database, the weights and the optimiser's state
+    (32 bytes for each parameter). A network that is built from the rows and not trained, such as motion
+    matching, also has up to three copies of all rows, with 4 bytes for each number. A training that is killed
+    continues from its last checkpoint.
+    """
+    options, machines = configuration.settings.training, machines_of(configuration)
+    needed = 500 + options.memory_mb + 32e-6 * parameter_count(configuration)
+    if configuration.is_built:
+        layout = layout_of(configuration)
+        needed += 12e-3 * (layout.x_size + layout.y_size) * all_thousands_of_frames(configuration.dataset)
+    seconds = expected_seconds(configuration, options.model_dump()) / machines.count
+    return request(machines.processes_per_node * needed, seconds, attempt, 60)
 
-    def training_samples(self, configuration: str, passes: float) -> float:
-        """About how many samples a training sees in a number of passes."""
-        dataset = self.configurations.dataset(configuration)
-        every = self.project.datasets.hurt_row_step(dataset)  # of the rows of hurt versions
-        frames = sum(
-            self._frames(dataset, original(clip)) / (every if self.project.clips.is_hurt_version(clip) else 1)
-            for clip, split in self.configurations.splits(configuration).items()
-            if split == "train"
-        )
-        return frames * VISITS_PER_PASS * passes
 
-    def machines(self, configuration: str) -> Machines:
-        """The machines on which a configuration trains; one process if its network is built, not trained."""
-        built = self.configurations.is_built(configuration)
-        return Machines() if built else self.project.catalogue.configuration(configuration).training
+def training_samples(configuration: NamedConfiguration, passes: float) -> float:
+    """About how many samples a training sees in a number of passes."""
+    dataset = configuration.dataset
+    frames = sum(
+        _frames(dataset, original(clip)) / (dataset.hurt_row_step if is_hurt_version(clip) else 1)
+        for clip, split in configuration.splits.items()
+        if split == "train"
+    )
+    return frames * VISITS_PER_PASS * passes
 
-    def training_threads(self, configuration: str) -> int:
-        """Threads of a training job: one for each process, at least 2.
 
-        With GPUs there are 2 threads. SLURM counts threads per GPU, so there each GPU gets 2.
-        """
-        machines = self.machines(configuration)
-        return 2 if machines.gpus else max(2, machines.processes)
+def machines_of(configuration: NamedConfiguration) -> Machines:
+    """The machines on which a configuration trains; one process if its network is built, not trained."""
+    return Machines() if configuration.is_built else configuration.settings.training
 
-    def gpus(self, configuration: str) -> int:
-        """GPUs that a training requests: the option `gpus`, or 1 for `device: cuda`.
 
-        0 if several machines request GPUs, because `gres` then requests them. With `device: auto`, a training
-        may use a GPU, but it does not request one.
-        """
-        machines = self.machines(configuration)
-        if machines.gpus:
-            return machines.gpus if machines.nodes == 1 else 0
-        return int(self.project.catalogue.configuration(configuration).training.device == "cuda")
+def training_threads(configuration: NamedConfiguration) -> int:
+    """Threads of a training job: one for each process, at least 2.
 
-    def gres(self, configuration: str) -> str:
-        """SLURM's option `gres`, such as "gpu:8", for the GPUs of each of several machines; else ""."""
-        machines = self.machines(configuration)
-        return f"gpu:{machines.gpus}" if machines.gpus and machines.nodes > 1 else ""
+    With GPUs there are 2 threads. SLURM counts threads per GPU, so there each GPU gets 2.
+    """
+    machines = machines_of(configuration)
+    return 2 if machines.gpus else max(2, machines.processes)
 
-    def parameter_count(self, configuration: str) -> float:
-        """Number of trained parameters of a configuration's network; 0 if it is not trained."""
-        chosen, layout = self.project.catalogue.configuration(configuration), self.layout(configuration)
-        if isinstance(chosen.network, TrainedOptions):
-            return chosen.network.parameter_count(layout.x_size, layout.y_size)
-        return 0
 
-    def layout(self, configuration: str) -> RowLayout:
-        """The columns of a configuration's rows."""
-        chosen = self.project.catalogue.configuration(configuration)
-        skeleton = self.project.catalogue.skeleton(self.project.catalogue.dataset(chosen.dataset).skeleton)
-        row_options = self.project.datasets.options(chosen.dataset, "database", "window", "step")
-        channels = tuple((name, len(channel(name).columns(skeleton))) for name in chosen.channels)
-        return RowLayout(joints=len(skeleton.joints), channels=channels, **row_options)
+def gpus(configuration: NamedConfiguration) -> int:
+    """GPUs that a training requests: the option `gpus`, or 1 for `device: cuda`.
 
-    def all_clips(self, dataset: str) -> list[str]:
-        """All clips and hurt versions of a data set, without mirrors."""
-        return list(self.project.clips.entries(dataset))
+    0 if several machines request GPUs, because `gres` then requests them. With `device: auto`, a training
+    may use a GPU, but it does not request one.
+    """
+    machines = machines_of(configuration)
+    if machines.gpus:
+        return machines.gpus if machines.nodes == 1 else 0
+    return int(configuration.settings.training.device == "cuda")
 
-    def thousands_of_frames(self, dataset: str, clip: str) -> float:
-        """Thousands of frames of a clip, multiplied by (its number of joints / MEASURED_JOINTS)."""
-        return self._frames(dataset, original(clip)) / 1e3 * self._joints(dataset) / MEASURED_JOINTS
 
-    @functools.cache  # noqa: B019 - one project lives as long as the process
-    def all_thousands_of_frames(self, dataset: str) -> float:
-        """Thousands of frames of all clips and mirrors, scaled like `thousands_of_frames`."""
-        frames = sum(self.thousands_of_frames(dataset, clip) for clip in self.all_clips(dataset))
-        return frames * (1 + self.project.catalogue.dataset(dataset).mirror)
+def gres(configuration: NamedConfiguration) -> str:
+    """SLURM's option `gres`, such as "gpu:8", for the GPUs of each of several machines; else ""."""
+    machines = machines_of(configuration)
+    return f"gpu:{machines.gpus}" if machines.gpus and machines.nodes > 1 else ""
 
-    @functools.cache  # noqa: B019
-    def _joints(self, dataset: str) -> int:
-        """Number of joints of the data set's skeleton."""
-        return len(self.project.catalogue.skeleton(self.project.catalogue.dataset(dataset).skeleton).joints)
 
-    @functools.cache  # noqa: B019
-    def _frames(self, dataset: str, clip: str) -> float:
-        """Estimated number of frames of a clip, after it is resampled to the data set's frame rate."""
-        if self.project.catalogue.dataset(dataset).synthetic is not None:
-            return self.project.datasets.frames(dataset, clip)
-        seconds = bvh_seconds(Path(self.project.clips.source(dataset, clip)))
-        rate = self.project.catalogue.dataset(dataset).motion.fps
-        return ASSUMED_FRAMES if seconds is None else seconds * rate
+def parameter_count(configuration: NamedConfiguration) -> float:
+    """Number of trained parameters of a configuration's network; 0 if it is not trained."""
+    network, layout = configuration.settings.network, layout_of(configuration)
+    if isinstance(network, TrainedOptions):
+        return network.parameter_count(layout.x_size, layout.y_size)
+    return 0
+
+
+def layout_of(configuration: NamedConfiguration) -> RowLayout:
+    """The columns of a configuration's rows."""
+    dataset = configuration.dataset
+    skeleton = dataset.catalogue.skeleton(dataset.settings.skeleton)
+    channels = tuple((name, len(channel(name).columns(skeleton))) for name in configuration.channels)
+    row_options = dataset.options("database", "window", "step")
+    return RowLayout(joints=len(skeleton.joints), channels=channels, **row_options)
+
+
+def thousands_of_frames(dataset: NamedDataset, clip: str) -> float:
+    """Thousands of frames of a clip, multiplied by (its number of joints / MEASURED_JOINTS)."""
+    return _frames(dataset, original(clip)) / 1e3 * _joints(dataset) / MEASURED_JOINTS
+
+
+@functools.cache
+def all_thousands_of_frames(dataset: NamedDataset) -> float:
+    """Thousands of frames of all clips and mirrors, scaled like `thousands_of_frames`."""
+    frames = sum(thousands_of_frames(dataset, clip) for clip in dataset.entries)
+    return frames * (1 + dataset.settings.mirror)
+
+
+@functools.cache
+def _joints(dataset: NamedDataset) -> int:
+    """Number of joints of the data set's skeleton."""
+    return len(dataset.catalogue.skeleton(dataset.settings.skeleton).joints)
+
+
+@functools.cache
+def _frames(dataset: NamedDataset, clip: str) -> float:
+    """Estimated number of frames of a clip, after it is resampled to the data set's frame rate."""
+    if dataset.settings.synthetic is not None:
+        return dataset.frames(clip)
+    seconds = bvh_seconds(Path(dataset.source(clip)))
+    return ASSUMED_FRAMES if seconds is None else seconds * dataset.settings.motion.fps
 
 
 def bvh_seconds(path: Path) -> float | None:
@@ -228,3 +235,76 @@ def bvh_seconds(path: Path) -> float | None:
     except ValueError:
         return None
     return frame_time * (size - found.start(2)) / len(found[2]) if found and frame_time > 0 else None
+
+
+# How long trainings take, for the plan that a user sees before the first job.
+
+# Seconds of a step of training for each parameter of a network, and for each sample and parameter, on two
+# quiet cores of an AMD EPYC 9005: 10,200 samples a second at a batch of 32, 35,600 at 256, 2.4 million
+# parameters (docs/training.md).
+STEP_SECONDS, SAMPLE_SECONDS = 1.07e-9, 7.6e-12
+# Two quiet cores of a Zen 4 machine took 2.7 times as long, and two cores of a Zen 3 machine, which lacks
+# AVX-512, 11 times as long at a batch of 256 beside some tests.
+SLOWEST = 11.0
+FAST = "fast"  # the configuration with the recipe that is named if it is much faster
+LONG_SECONDS = 300.0  # for a training that takes longer than this
+SHORT_SECONDS = 10.0  # a shorter training is mostly start, checks and saving: it tells nothing of the machine
+
+
+def sentences_about_plan(project: Project, jobs: Sequence[tuple[str, Mapping[str, str]]]) -> list[str]:
+    """How long the trainings of a plan take, a sentence each, with a faster recipe for a long one.
+
+    jobs: rule and wildcards of each job.
+    """
+    names = [wildcards["configuration"] for rule, wildcards in jobs if rule == "training"]
+    if not names:
+        return []
+    measured, sentences = slowness(project), []
+    fast = FAST in project.catalogue.names() and project.catalogue.configuration(FAST).training.model_dump()
+    for configuration in map(project.configuration, names):
+        training = configuration.settings.training
+        if gpus(configuration) or not parameter_count(configuration):
+            continue
+        seconds = expected_seconds(configuration, training.model_dump()) / training.count
+        sentence = f"training {configuration.name}: {_range(seconds, measured)}"
+        if fast and seconds * (measured or SLOWEST) > LONG_SECONDS:
+            faster = expected_seconds(configuration, fast) / training.count
+            if faster < seconds / 2:
+                sentence += f"; with --config training={FAST} {_range(faster, measured)} (docs/training.md)"
+        sentences.append(f"{sentence}.")
+    return sentences
+
+
+def expected_seconds(configuration: NamedConfiguration, training: Mapping[str, Any]) -> float:
+    """Seconds of a training on the machine of STEP_SECONDS. training: the keys `passes` and `batch`."""
+    samples = training_samples(configuration, training["passes"])
+    step = STEP_SECONDS + SAMPLE_SECONDS * training["batch"]
+    return samples / training["batch"] * step * parameter_count(configuration)
+
+
+def slowness(project: Project) -> float | None:
+    """How many times as long as expected the trainings took whose results are here; None without any."""
+    ratios = []
+    for name in project.catalogue.names():
+        with contextlib.suppress(OSError, ValueError, KeyError, IndexError, HobbleError):
+            with open(Path("results", name, "network", "history.csv"), newline="", encoding="utf-8") as file:
+                last = list(csv.DictReader(file))[-1]
+            configuration = project.configuration(name)
+            training = configuration.settings.training.model_dump()
+            expected = expected_seconds(configuration, training)
+            samples = training_samples(configuration, training["passes"])
+            if expected >= SHORT_SECONDS:
+                ratios.append(float(last["seconds"]) / float(last["samples"]) * samples / expected)
+    return median(ratios) if ratios else None
+
+
+def _range(seconds: float, measured: float | None) -> str:
+    """A time as text: for a machine that has trained before, or from the fastest to the slowest known one."""
+    if measured:
+        return f"about {_minutes(seconds * measured)} min"
+    fastest, slowest = _minutes(seconds), _minutes(seconds * SLOWEST)
+    return f"{fastest} min" if fastest == slowest else f"{fastest} to {slowest} min on two quiet cores"
+
+
+def _minutes(seconds: float) -> int:
+    return max(1, round(seconds / 60))

@@ -1,8 +1,8 @@
 """Computes a hash of a rule's code: its script and every project module that the script imports.
 
 Snakemake runs a rule's jobs again if the hash changes. So the hash ignores what cannot change a result:
-comments, docstrings, annotations of functions, the text of errors and log messages, descriptions of options,
-and the modules of `INFRASTRUCTURE`. It also ignores the fields of configuration sections, because their
+comments, docstrings, annotations of functions, the text of errors and log messages, and the modules of
+`INFRASTRUCTURE`. It also ignores the fields of configuration sections, because their
 values are params of the rules, and Snakemake compares these itself.
 """
 
@@ -83,11 +83,8 @@ class _Remover(ast.NodeTransformer):
         return self.generic_visit(node)
 
     def visit_Call(self, node: ast.Call) -> ast.AST:
-        name = _last_name(node.func)
-        if name.endswith("Error"):
+        if _last_name(node.func).endswith("Error"):
             return ast.Call(node.func, [], [])  # without the message
-        if name == "Field":
-            node.keywords = [keyword for keyword in node.keywords if keyword.arg != "description"]
         return self.generic_visit(node)
 
     def visit_Assert(self, node: ast.Assert) -> ast.AST:
@@ -167,26 +164,7 @@ class Package:
         path = self.base / "workflow" / "scripts" / f"{script}.py"
         return fingerprint(path, self.base / "src", modules)
 
-    def template_files(self) -> list[str]:
-        """Paths of the HTML pages' templates and styles, and of the published results that the pages show.
-
-        If one of these files changes, only the pages are made again.
-        """
-        kinds = {".j2", ".css", ".js", ".yaml"}
-        files = [str(path) for path in (self.folder / "report").iterdir() if path.suffix in kinds]
-        return sorted(files)
-
-    def web_files(self, suffix: str) -> list[str]:
-        """Paths of the report's files with a suffix: ".js" for scripts, ".json" for lists of npm packages."""
-        files = sorted((self.folder / "report" / "web").iterdir())
-        return [str(path) for path in files if path.suffix == suffix]
-
-    def engine_files(self, *patterns: str) -> list[str]:
-        """Paths of the runtime for game engines that match patterns, such as "c/*.[ch]"; by default all."""
-        patterns = patterns or ("c/**/*", "examples/**/*")
-        files = [path for pattern in patterns for path in (self.folder / "engine").glob(pattern)]
-        return sorted(str(path) for path in files if path.is_file() and "__pycache__" not in path.parts)
-
-    def published_file(self) -> str:
-        """Path of the published results, such as errors and times, with which the report compares ours."""
-        return str(self.folder / "report" / "published.yaml")
+    def files(self, *patterns: str) -> list[str]:
+        """Paths of the package's files that match patterns, such as "report/web/*.js", in a fixed order."""
+        files = [path for pattern in patterns for path in self.folder.glob(pattern) if path.is_file()]
+        return sorted(str(path) for path in files if "__pycache__" not in path.parts)

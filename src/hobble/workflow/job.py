@@ -8,7 +8,6 @@ from __future__ import annotations
 import contextlib
 import errno
 import hashlib
-import importlib
 import json
 import logging
 import os
@@ -20,17 +19,13 @@ import zlib
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from hobble.core.clip_files import MIRROR_SUFFIX, original
 from hobble.core.errors import HobbleError, InputError, unforeseen
 from hobble.core.files import failed_write_error, write_text
-from hobble.workflow.clips import MIRROR_SUFFIX, original
 from hobble.workflow.contents import stamp
 from hobble.workflow.lifetime import ends_with_run
-
-if TYPE_CHECKING:
-    from hobble.core.section import Section
-    from hobble.measures.measure import Measure, MeasureInputs
 
 # The disk is full, a quota is used up, or the disk is read-only. Every other clip would fail, too.
 DISK_ERRORS = (errno.ENOSPC, errno.EDQUOT, errno.EROFS)
@@ -87,30 +82,6 @@ class Inputs:
     def each(self, name: str, clips: Iterable[str]) -> dict[str, str]:
         """Clip -> path of its file. name: contains {clip}."""
         return {clip: self(name.replace("{clip}", clip)) for clip in clips}
-
-
-def measure_of(snakemake: Any) -> tuple[Measure, Section, MeasureInputs]:
-    """The measurement of a job, its options and its inputs.
-
-    Only this measurement's module is imported. A job runs again if code that its script imports changes. So
-    if the script imported all measurements, each new one would make all others run again.
-    """
-    from hobble.measures.measure import MeasureInputs
-    from hobble.runtime.options import Runtime
-
-    params, files = snakemake.params.measured, dict(snakemake.input.items())
-    measure: Measure = importlib.import_module(params["module"]).MEASURE
-    find = Inputs(files.pop("batches", ()))
-    inputs = MeasureInputs(
-        params["configuration"],
-        {name: Path(file) for name, file in files.items()},
-        {clip: Path(find(f"database/clips/{clip}.npz")) for clip in params["splits"]},
-        params["splits"],
-        params["people"],
-        [Path(find(f"database/clips/{clip}.json")) for clip in params["summaries"]],
-        Runtime.model_validate(params["runtime"]),
-    )
-    return measure, measure.options.model_validate(params["options"]), inputs
 
 
 @dataclass(frozen=True)
@@ -328,12 +299,15 @@ class _Log:
 
     def __init__(self, path: str, rule: str, inputs: list[str]) -> None:
         self.path, self.inputs = path, inputs
-        with contextlib.suppress(OSError):
+        # Messages reach the terminal even if the log cannot be written, as on a full disk.
+        logging.raiseExceptions = False
+        try:
             os.makedirs(os.path.dirname(path) or ".", exist_ok=True)
-            open(path, "w").close()  # empty the log of an earlier try
+            file_handler: logging.Handler = logging.FileHandler(path, "w", encoding="utf-8")
+        except OSError:
+            file_handler = logging.NullHandler()
         self.logger = logging.getLogger("hobble")
         self.logger.setLevel(logging.INFO)
-        file_handler = _LogFile(path, encoding="utf-8", delay=True)
         file_handler.setFormatter(logging.Formatter("%(asctime)s %(levelname)s %(message)s"))
         self.terminal = logging.StreamHandler(sys.stderr)
         self.terminal.setLevel(logging.WARNING)
@@ -378,18 +352,3 @@ def with_true_advice(error: HobbleError, inputs: Iterable[str]) -> HobbleError:
         return error
     fix = f"Delete {made[0]}; the same command makes it again." if made else "Replace it by a good copy."
     return InputError(error.path, error.problem, line=error.line, frame=error.frame, fix=fix)
-
-
-class _LogFile(logging.FileHandler):
-    """A log file that ignores failed writes, so that messages reach the terminal even if the disk is full."""
-
-    def emit(self, record: logging.LogRecord) -> None:
-        with contextlib.suppress(OSError):
-            super().emit(record)
-
-    def handleError(self, record: logging.LogRecord) -> None:
-        pass
-
-    def close(self) -> None:
-        with contextlib.suppress(OSError):
-            super().close()

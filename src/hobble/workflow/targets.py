@@ -7,7 +7,7 @@ results/datasets/<data set>/... or results/compare/...
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
 
@@ -15,11 +15,12 @@ from hobble.channels import all_channels
 from hobble.core.errors import HobbleError, InputError
 from hobble.core.section import PhaseMode
 from hobble.workflow import lifetime
-from hobble.workflow.configurations import COMPARE
-from hobble.workflow.project import Project
+from hobble.workflow.configurations import NamedConfiguration
+from hobble.workflow.datasets import NamedDataset
+from hobble.workflow.project import COMPARE, Project
 
 if TYPE_CHECKING:
-    from hobble.config.models import Configuration, SkeletonFile
+    from hobble.config.models import SkeletonFile
 
 PAGE = "page"  # the folder in results/ with the files that all reports share
 
@@ -46,7 +47,7 @@ def open_project(workflow: Any, config: Mapping[str, Any], words: Sequence[str],
                 f"results/{Path(files[0]).stem}/report.html. For single keys, use --config."
             )
         for dataset in check_targets(project, [word for word in words if word.startswith("results/")]):
-            for sentence in project.clips.notes_on_unused_files(dataset):
+            for sentence in project.dataset(dataset).notes_on_unused_files():
                 note(f"data set {dataset}: {sentence}")
     return project
 
@@ -58,123 +59,108 @@ def check_targets(project: Project, targets: Iterable[str]) -> list[str]:
     Raises HobbleError for the first mistake that is found.
     """
     datasets: list[str] = []
-    seen: set[str] = set()  # configurations
+    configurations: dict[str, NamedConfiguration] = {}
     for target in list(targets) or ["results/holden/report.html"]:
         _, name, folder, file, *_ = (*Path(target).parts, "", "", "")
         if name == "datasets":
             datasets.append(folder)
         elif name == COMPARE:
-            for compared in project.comparison.names():
-                datasets += _check_configuration(project, compared, seen)
+            for compared in project.compared:
+                _check_configuration(project, compared.name, configurations)
         elif name and name != PAGE:
-            datasets += _check_configuration(project, name, seen)
-            _check_target_possible(project, name, folder, file)
-    datasets = list(dict.fromkeys(datasets))
+            _check_configuration(project, name, configurations)
+            _check_target_possible(configurations[name], project, folder, file)
+    used = [configuration.dataset.name for configuration in configurations.values()]
+    datasets = list(dict.fromkeys([*datasets, *used]))
     for dataset in datasets:
-        _check_dataset(project, dataset)
-    for name in seen:
-        project.configurations.splits(name)  # raises HobbleError for unusable clips
+        _check_dataset(project, project.dataset(dataset))
+    for configuration in configurations.values():
+        _ = configuration.splits  # raises HobbleError for unusable clips
     return datasets
 
 
-def _check_configuration(project: Project, name: str, seen: set[str]) -> Iterator[str]:
-    """Check a configuration, and those that it names. Yields the names of their data sets.
-
-    seen: the configurations that are checked; this one is added.
-    """
+def _check_configuration(project: Project, name: str, seen: dict[str, NamedConfiguration]) -> None:
+    """Check a configuration, and those that it names. seen: those that are checked; this one is added."""
     if name in seen:
         return
-    seen.add(name)
-    configuration = project.catalogue.configuration(name)
-    for other in filter(None, (configuration.network_of, configuration.training.continues)):
+    configuration = seen[name] = project.configuration(name)
+    settings = configuration.settings
+    for other in filter(None, (settings.network_of, settings.training.continues)):
         if other == name:
             raise HobbleError(
                 f"configuration {name} names itself in `network_of` or `training.continues`. "
                 "Name another configuration there"
             )
-        yield from _check_configuration(project, other, seen)
-    if configuration.training.continues:
-        _check_continues(project, name, configuration)
-    if configuration.training.symmetric and not configuration.network_of:
-        _check_symmetric(project, name, configuration)
-    yield configuration.dataset
+        _check_configuration(project, other, seen)
+    if settings.training.continues:
+        _check_continues(configuration, seen[settings.training.continues])
+    if settings.training.symmetric and not settings.network_of:
+        _check_symmetric(configuration)
 
 
-def _check_symmetric(project: Project, name: str, configuration: Configuration) -> None:
+def _check_symmetric(configuration: NamedConfiguration) -> None:
     """Check that the network can be symmetric and that the data set has mirrored clips."""
-    if configuration.network.why_not_symmetric:
+    where = f"configuration {configuration.name}: training.symmetric"
+    if why := configuration.settings.network.why_not_symmetric:
+        raise HobbleError(f"{where}: {why}. Write `symmetric: false`.")
+    if not configuration.dataset.settings.mirror:
         raise HobbleError(
-            f"configuration {name}: training.symmetric: {configuration.network.why_not_symmetric}. "
-            "Write `symmetric: false`."
-        )
-    dataset = configuration.dataset
-    if not project.catalogue.dataset(dataset).mirror:
-        raise HobbleError(
-            f"configuration {name}: training.symmetric: data set {dataset} has no mirrored clips, so its "
-            "left and right may differ. Write `mirror: true` in the data set, or `symmetric: false`."
+            f"{where}: data set {configuration.dataset.name} has no mirrored clips, so its left and right "
+            "may differ. Write `mirror: true` in the data set, or `symmetric: false`."
         )
 
 
-def _check_continues(project: Project, name: str, configuration: Configuration) -> None:
-    """Check that a training can continue from the training of another configuration.
+def _check_continues(later: NamedConfiguration, earlier: NamedConfiguration) -> None:
+    """Check that a training can continue from that of another configuration.
 
     Both must have the same channels, network and number of sections (parts of a pass). The later training
-    must not have fewer passes. name, configuration: those of the later training.
+    must not have fewer passes.
     """
-    earlier = configuration.training.continues
-    if project.configurations.is_built(name):
-        kind = configuration.network.kind
+    where = f"configuration {later.name} continues from {earlier.name}"
+    new, old = later.settings, earlier.settings
+    if later.is_built:
         raise HobbleError(
-            f"configuration {name} continues from {earlier}, but {kind} is built and not trained. "
-            "Remove `training.continues`"
+            f"{where}, but {new.network.kind} is built and not trained. Remove `training.continues`"
         )
-    assert earlier is not None
-    start = project.catalogue.configuration(earlier)
-    for key, value, start_value in (
-        ("channels", list(configuration.channels), list(start.channels)),
-        ("network", configuration.network.model_dump(), start.network.model_dump()),
-        ("training.sections", configuration.training.sections, start.training.sections),
+    for key, value, wanted in (
+        ("channels", list(new.channels), list(old.channels)),
+        ("network", new.network.model_dump(), old.network.model_dump()),
+        ("training.sections", new.training.sections, old.training.sections),
     ):
-        if value != start_value:
-            raise HobbleError(
-                f"configuration {name} continues from {earlier}, so its {key} must be {start_value}, "
-                f"not {value}"
-            )
-    if configuration.training.passes < start.training.passes:
+        if value != wanted:
+            raise HobbleError(f"{where}, so its {key} must be {wanted}, not {value}")
+    if new.training.passes < old.training.passes:
         raise HobbleError(
-            f"configuration {name} continues from {earlier}, which has training.passes: "
-            f"{start.training.passes}. Write at least this number, not {configuration.training.passes}"
+            f"{where}, which has training.passes: {old.training.passes}. Write at least this number, not "
+            f"{new.training.passes}"
         )
 
 
-def _check_dataset(project: Project, name: str) -> None:
+def _check_dataset(project: Project, dataset: NamedDataset) -> None:
     """Check a data set, its clips and its skeleton."""
-    dataset = project.catalogue.dataset(name)
-    skeleton = project.catalogue.skeleton(dataset.skeleton)
-    for clip, entry in project.clips.listed_entries(name).items():
-        project.clips.clip_skeleton_files(name, clip)  # raises InputError if the clip has no file
+    settings, where = dataset.settings, f"data set {dataset.name}"
+    skeleton = project.catalogue.skeleton(settings.skeleton)
+    for clip, entry in dataset.listed.items():
+        dataset.clip_skeleton_files(clip)  # raises InputError if the clip has no file
         if entry.recipe is not None:  # what the synthetic walker does
             from hobble.synthetic.plan import RECIPES  # imports numpy, which takes longer than all checks
 
             if entry.recipe not in RECIPES:
-                where, fix = f"data set {name}: clips.{clip}.recipe", f"There are {', '.join(RECIPES)}."
-                raise InputError(where, f"no such recipe: {entry.recipe:.80}", fix=fix)
+                place, fix = f"{where}: clips.{clip}.recipe", f"There are {', '.join(RECIPES)}."
+                raise InputError(place, f"no such recipe: {entry.recipe:.80}", fix=fix)
     links = [f"{a}-{b}" for a, b in skeleton.links]
-    if dataset.hurt is not None and project.clips.hurt_versions(name):
+    if settings.hurt is not None and dataset.hurt_versions:
         if not links:
             raise HobbleError(
-                f"data set {name}: hurt: skeleton {dataset.skeleton} has no `links`. Add them to its file."
+                f"{where}: hurt: skeleton {settings.skeleton} has no `links`. Add them to its file."
             )
-        if unknown := [link for link in dataset.hurt.links if link not in links]:
+        if unknown := [link for link in settings.hurt.links if link not in links]:
             there = ", ".join(links)
-            raise HobbleError(
-                f"data set {name}: hurt.links: no such link: {', '.join(unknown)}. There are {there}."
-            )
-    project.datasets.channel_sources.check(name)
-    # Raises HobbleError if `held_out` is wrong, or if no clip is left for training.
-    project.datasets.splits(name, project.datasets.channel_sources.channels(name))
-    if dataset.mirror:
-        _check_mirror(dataset.skeleton, skeleton)
+            raise HobbleError(f"{where}: hurt.links: no such link: {', '.join(unknown)}. There are {there}.")
+    dataset.check_channels()
+    dataset.splits(dataset.channels)  # raises HobbleError if `held_out` is wrong, or leaves no clip
+    if settings.mirror:
+        _check_mirror(settings.skeleton, skeleton)
 
 
 def _check_mirror(name: str, skeleton_file: SkeletonFile) -> None:
@@ -187,16 +173,19 @@ def _check_mirror(name: str, skeleton_file: SkeletonFile) -> None:
     _ = skeleton.mirror_links  # raises HobbleError if a link has no counterpart on the other side
 
 
-def _check_target_possible(project: Project, name: str, folder: str, file: str) -> None:
-    """Raise HobbleError if the configuration `name` cannot make the target results/<name>/<folder>/<file>."""
-    owner = project.catalogue.configuration(name).network_of or name
-    if folder == "stimuli" and not project.catalogue.configuration(owner).channels:
+def _check_target_possible(
+    configuration: NamedConfiguration, project: Project, folder: str, file: str
+) -> None:
+    """Raise HobbleError if a configuration cannot make the target results/<name>/<folder>/<file>."""
+    name, owner = configuration.name, configuration.network_owner
+    channels = project.catalogue.configuration(owner).channels
+    if folder == "stimuli" and not channels:
         raise HobbleError(
             f"results/{name}/stimuli: configuration {owner} has no `channels`, so it has only one walk to "
             "show. Use a configuration with channels."
         )
     for channel in all_channels():
-        if folder in channel.targets and channel.name not in project.catalogue.configuration(owner).channels:
+        if folder in channel.targets and channel.name not in channels:
             raise HobbleError(
                 f"results/{name}/{folder}: the network of configuration {owner} has no channel "
                 f"{channel.name}. Use a configuration with `channels: [{channel.name}]`."
