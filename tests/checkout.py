@@ -38,7 +38,7 @@ class Workflow:
     def run(self, *arguments: str, ok: bool = True) -> str:
         """Run snakemake and return stdout and stderr. Fails the test if its success is not `ok`."""
         done = subprocess.run(
-            self.command(*arguments), **self.how(), capture_output=True, text=True, timeout=600
+            self.command(*arguments), **self.how(), capture_output=True, text=True, timeout=3600
         )
         text = done.stdout + done.stderr
         assert (done.returncode == 0) is ok, text

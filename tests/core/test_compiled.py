@@ -7,8 +7,6 @@ import subprocess
 import sys
 from pathlib import Path
 
-import pytest
-
 MODULE = """
 import warnings, sys
 from hobble.core.compiled import njit
@@ -40,13 +38,19 @@ def cached(folder: Path) -> list[Path]:
     return sorted(folder.rglob("*.nb[ic]"))
 
 
-def test_compiled_code_is_cached(tmp_path):
-    first = run(tmp_path, NUMBA_CACHE_DIR=str(tmp_path / "cache"))
+def test_compiled_code_is_cached_and_damaged_files_are_compiled_again(tmp_path):
+    cache = str(tmp_path / "cache")
+    first = run(tmp_path, NUMBA_CACHE_DIR=cache)
     assert (first.stdout, first.stderr) == ("8 12.0\n", "")
     files = {path: path.stat().st_mtime_ns for path in cached(tmp_path)}
     assert len(files) == 4
-    assert run(tmp_path, NUMBA_CACHE_DIR=str(tmp_path / "cache")).stdout == "8 12.0\n"
+    assert run(tmp_path, NUMBA_CACHE_DIR=cache).stdout == "8 12.0\n"
     assert {path: path.stat().st_mtime_ns for path in cached(tmp_path)} == files
+    for path, content in zip(files, (b"", b"rubbish", b"\x80\x04.", b""), strict=True):
+        path.write_bytes(content)
+    result = run(tmp_path, NUMBA_CACHE_DIR=cache)
+    assert result.stdout == "8 12.0\n"
+    assert result.stderr.count("RuntimeWarning") == 1
 
 
 def test_no_writable_folder_gives_one_warning(tmp_path):
@@ -58,17 +62,6 @@ def test_no_writable_folder_gives_one_warning(tmp_path):
     assert result.stdout == "8 12.0\n", result.stderr
     assert result.stderr.count("RuntimeWarning: compiled functions are not kept") == 1
     assert "NUMBA_CACHE_DIR" in result.stderr
-
-
-@pytest.mark.parametrize("content", [b"", b"rubbish", b"\x80\x04."])
-def test_damaged_cache_files_are_compiled_again(tmp_path, content):
-    cache = str(tmp_path / "cache")
-    run(tmp_path, NUMBA_CACHE_DIR=cache)
-    for path in cached(tmp_path):
-        path.write_bytes(content)
-    result = run(tmp_path, NUMBA_CACHE_DIR=cache)
-    assert result.stdout == "8 12.0\n", result.stderr
-    assert result.stderr.count("RuntimeWarning") == 1
 
 
 def test_every_compiled_function_works_without_its_cache():

@@ -9,7 +9,7 @@ import subprocess
 import numpy as np
 import pytest
 
-from hobble.core import files
+from hobble.core import files, untrusted
 from hobble.core.clip import Clip, load_clip, save_clip
 from hobble.core.errors import HobbleError, InputError
 from hobble.core.files import atomic_path, load_npz, map_npz, read_json, save_npz, write_json, write_text
@@ -67,6 +67,16 @@ def test_bad_json_is_named_with_its_line(tmp_path):
     (tmp_path / "a.json").write_text('{"a": 1,\n "b": }\n')
     with pytest.raises(InputError, match=r"a\.json, line 2: not valid JSON"):
         read_json(tmp_path / "a.json")
+
+
+@pytest.mark.parametrize("size_before", [2, 6])
+def test_a_file_whose_size_changes_while_it_is_read_is_refused(tmp_path, monkeypatch, size_before):
+    before, now = tmp_path / "before", tmp_path / "now"
+    before.write_bytes(b"x" * size_before)
+    now.write_bytes(b"x" * 4)
+    monkeypatch.setattr(untrusted, "check_regular", lambda path: path.with_name("before").stat())
+    with pytest.raises(InputError, match="now: its size changed while it was read"):
+        untrusted.read_bytes(now, 10)
 
 
 def test_damaged_arrays_are_found(tmp_path):

@@ -112,12 +112,3 @@ def test_continuous_only_flips_signs():
 def test_yaw_turns_forward_to_the_left():
     np.testing.assert_allclose(quat.rotate(quat.yaw(np.pi / 2), np.array([0.0, 0, 1])), [1, 0, 0], atol=1e-12)
     np.testing.assert_allclose(quat.yaw(0.7), quat.from_axis_angle(np.array([0, 1.0, 0]), 0.7), atol=1e-15)
-
-
-def test_functions_take_one_pose_or_a_whole_clip():
-    rng = np.random.default_rng(2)
-    a, b = quat.normalize(rng.normal(size=(5, 7, 4))), quat.normalize(rng.normal(size=(7, 4)))
-    v = rng.normal(size=(7, 3))
-    np.testing.assert_allclose(quat.mul(a, b)[3, 2], quat.mul(a[3, 2], b[2]))
-    np.testing.assert_allclose(quat.rotate(a, v)[4, 6], quat.rotate(a[4, 6], v[6]))
-    np.testing.assert_allclose(quat.log(a)[1, 1], quat.log(a[1, 1]))

@@ -5,6 +5,8 @@ from __future__ import annotations
 import io
 import json
 import os
+import pickle
+import re
 import struct
 import zipfile
 import zlib
@@ -28,7 +30,7 @@ from hobble.core.declared import ArrayOf
 from hobble.core.errors import InputError
 from hobble.core.files import load_npz, read_json
 from hobble.core.untrusted import read_bytes, read_yaml
-from hobble.labels.label_files import SourceTime, read_phase
+from hobble.labels.label_files import SourceTime, read_gait_keys, read_phase
 from hobble.measures.study import FilmAnswer, ShownFilm, Study, read_answers, read_study
 from hobble.models.load import load_network, read_arrays
 from hobble.motion.make import make_clip
@@ -384,3 +386,42 @@ def test_hostile_yaml_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     ):
         refused(read, "a.yaml", YAML[what][1])
     assert not (tmp_path / "pwned").exists()
+
+
+class Payload:
+    """An object that writes a file when it is unpickled."""
+
+    def __reduce__(self) -> Any:
+        return os.mkdir, ("pwned",)
+
+
+def test_nothing_is_unpickled(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    objects = np.array([Payload(), 1], dtype=object)
+    np.savez(tmp_path / "a.npz", heights=objects, rotations=objects, W0=objects)
+    np.save(tmp_path / "a.npy", objects)
+    for name in ("bare.npz", "bare.npy", "bare.json", "bare.yaml", "bare.bvh", "bare.txt"):
+        write(tmp_path / name, pickle.dumps(Payload()))
+    readers: dict[str, list[Callable[[Path], Any]]] = {
+        ".npz": [load_npz, load_clip, load_network, read_heights],
+        ".npy": [read_heights],
+        ".json": [read_json],
+        ".yaml": [read_yaml, load_skeleton],
+        ".bvh": [read_bvh],
+        ".txt": [
+            read_heights,
+            lambda path: read_status(path, LINKS),
+            lambda path: read_gait_keys(path, SourceTime(9, 60.0), 9),
+        ],
+    }
+    for path in sorted(tmp_path.glob("*.*")):
+        for read in readers[path.suffix]:
+            with pytest.raises(InputError, match=re.escape(path.name)):
+                read(path)
+    assert not (tmp_path / "pwned").exists()
+
+
+def test_rules_run_scripts_and_nothing_else(root: Path) -> None:
+    """No name ever reaches a shell. (ruff forbids what could run a file's content in the source.)"""
+    rules = [path.read_text() for path in sorted((root / "workflow").rglob("*.smk"))]
+    assert not [text for text in rules if re.search(r"^\s*(shell|run)\s*:", text, re.M)]

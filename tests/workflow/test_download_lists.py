@@ -42,31 +42,28 @@ def test_missing_clips_are_downloaded(base: Path) -> None:
     assert Project(base, {}).dataset("far").source("2_1") == str(base / "data/far/2_1.bvh")
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "message"),
-    [
-        ("https://host/", "ftp://host/", r"download: url: must be an address like"),
-        ("{clip}", "{name}", r"download: url: must contain \{clip\}; only"),
-        ("{clip}", "a", r"download: url: must contain \{clip\}"),
-        ("{clip}", "{clip.x}", "download: url: "),
-        ("{clip}", "{clip:a>400000000}", "padding to a width of up to 99"),
-        ("{clip}", "{clip:{subject}}", "padding to a width of up to 99"),
-        ("{clip}", "{clip!r}", "padding to a width of up to 99"),
-        ("https://host/", "https://host/\u202e", "must be an address like"),
-        ("{clip}", "{clip", "download: url: "),
-        ("far.sha256", "../far.sha256", "checksums: must be a relative path"),
-        ("clips: {'2_1': }\n", "", "needs a list of its `clips` and a `folder`"),
-    ],
+BAD = (
+    ("https://host/", "ftp://host/", r"download: url: must be an address like"),
+    ("{clip}", "{name}", r"download: url: must contain \{clip\}; only"),
+    ("{clip}", "{clip.x}", "download: url: "),
+    ("{clip}", "{clip:a>400000000}", "padding to a width of up to 99"),
+    ("{clip}", "{clip:{subject}}", "padding to a width of up to 99"),
+    ("{clip}", "{clip!r}", "padding to a width of up to 99"),
+    ("https://host/", "https://host/\u202e", "must be an address like"),
+    ("{clip}", "{clip", "download: url: "),
+    ("far.sha256", "../far.sha256", "checksums: must be a relative path"),
+    ("clips: {'2_1': }\n", "", "needs a list of its `clips` and a `folder`"),
 )
-def test_a_bad_address_is_reported(base: Path, old: str, new: str, message: str) -> None:
-    (base / "config/datasets/far.yaml").write_text((FAR + "clips: {'2_1': }\n").replace(old, new))
-    with pytest.raises(HobbleError, match=message):
-        Project(base, {}).catalogue.dataset("far")
 
 
-def test_a_bad_checksum_list_is_reported_with_its_line(base: Path) -> None:
-    (base / "config/datasets/far.yaml").write_text(FAR + "clips: {'2_1': }\n")
-    (base / "config/datasets/far.sha256").write_text(f"{'a' * 64}  2_1.bvh\n{'a' * 63}  2_2.bvh\n")
+def test_a_bad_address_or_checksum_is_reported(base: Path) -> None:
+    file = base / "config/datasets/far.yaml"
+    for old, new, message in BAD:
+        file.write_text((FAR + "clips: {'2_1': }\n").replace(old, new))
+        with pytest.raises(HobbleError, match=message):
+            Project(base, {}).catalogue.dataset("far")
+    file.write_text(FAR + "clips: {'2_1': }\n")
+    file.with_suffix(".sha256").write_text(f"{'a' * 64}  2_1.bvh\n{'a' * 63}  2_2.bvh\n")
     with pytest.raises(HobbleError, match=r"far\.sha256, line 2: expected a SHA-256"):
         Project(base, {}).dataset("far").source("2_1")
 

@@ -18,7 +18,6 @@ import pytest
 pytestmark = pytest.mark.workflow
 
 WEIGHTS = "results/test/network/weights.npz"
-DATABASE = "results/datasets/tiny/database"
 LIMIT = 120  # seconds within which a job must have begun
 
 
@@ -60,8 +59,9 @@ def same_network(one: Path, other: Path) -> bool:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("to_all", [False, True], ids=["snakemake", "snakemake and its jobs"])
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
+@pytest.mark.parametrize(
+    ("number", "to_all"), [(signal.SIGINT, True), (signal.SIGTERM, False), (signal.SIGKILL, False)]
+)
 def test_jobs_end_with_their_run_and_the_same_command_gives_the_same_bits(
     finished, copied, number: signal.Signals, to_all: bool
 ) -> None:
@@ -89,19 +89,6 @@ def test_ctrl_c_ends_all_jobs_at_once_and_leaves_no_lock(workflow) -> None:
     assert process.wait(timeout=20) == 1  # jobs that ignore signals are killed
     assert not running(jobs)
     assert workflow.planned(target) == {"terrain_patches": 1}
-
-
-@pytest.mark.slow
-def test_after_a_kill_in_the_merge_the_same_command_continues(finished, copied) -> None:
-    shutil.rmtree(copied.folder / DATABASE)
-    there = copied.folder / DATABASE / "injury"
-    process = started(copied, "-c2", f"{DATABASE}/injury", until=there.exists)
-    os.killpg(process.pid, signal.SIGKILL)
-    process.wait()
-    assert list(copied.folder.glob(".snakemake/incomplete/*"))
-    copied.run("-c2", f"{DATABASE}/injury")
-    manifests = [(w.folder / DATABASE / "injury/manifest.json").read_bytes() for w in (finished, copied)]
-    assert manifests[0] == manifests[1]
 
 
 KILLED_AT = """
