@@ -35,7 +35,7 @@ test-slow: env browser
 	$(BIN)/python -m pytest -n $(CORES) --dist loadfile --durations=10 -m slow
 
 faults: env      ## test the workflow with N random faults (make faults N=200 SEED=7), see docs/faults.md
-	$(BIN)/python -m tests.faults --rounds $(or $(N),100) $(if $(SEED),--seed $(SEED))
+	N=$(or $(N),100) SEED=$(SEED) $(BIN)/python -m pytest -n 0 -q -s tests/faults/test_throws.py -k random
 
 cluster-test: env ## run the test configuration on a SLURM cluster of one node (needs root on Debian)
 	tests/cluster/run.sh

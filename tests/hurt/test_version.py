@@ -77,14 +77,14 @@ def seconds_hurt(skeleton, versions, frames, options):
 def test_hurt_versions_of_the_synthetic_clips_hurt_all_thirty_links(root, holden31) -> None:
     project = Project(root, {})
     held_out = project.catalogue.dataset("synthetic").held_out
-    clips = project.clips
-    frames = {clip: project.datasets.frames("synthetic", clip) for clip in clips.listed_entries("synthetic")}
+    clips = project.dataset("synthetic")
+    frames = {clip: clips.frames(clip) for clip in clips.listed}
     versions = {
         name: turn
-        for name, turn in clips.hurt_versions("synthetic").items()
+        for name, turn in clips.hurt_versions.items()
         if name.rpartition("_hurt")[0] not in held_out
     }
-    seconds = seconds_hurt(holden31, versions, frames, lambda clip: clips.hurt_options("synthetic", clip))
+    seconds = seconds_hurt(holden31, versions, frames, clips.hurt_options)
     seconds = seconds + seconds[list(holden31.mirror_links)]  # the data set has mirrors
     assert seconds.min() > 2
     legs = [

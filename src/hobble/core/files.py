@@ -7,10 +7,12 @@ from __future__ import annotations
 
 import base64
 import contextlib
+import csv
 import errno
 import glob
 import io
 import json
+import math
 import os
 import platform
 import struct
@@ -18,15 +20,12 @@ import zipfile
 import zlib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import IO, TYPE_CHECKING, Any, NoReturn
+from typing import IO, Any, NoReturn
 
 import numpy as np
 
 from hobble.core.errors import HobbleError, InputError
 from hobble.core.untrusted import check_regular, printable, read_text
-
-if TYPE_CHECKING:
-    import pandas
 
 Json = Mapping[str, Any]  # what a JSON file holds
 
@@ -335,25 +334,18 @@ def check_header(file: IO[bytes], size: int) -> tuple[tuple[int, ...], bool, np.
     return shape, by_columns, dtype
 
 
-def data_frame(rows: Sequence[Mapping[str, Any]]) -> pandas.DataFrame:
-    """A data frame with a row for each mapping of `rows`. Columns are in the order in which they first occur.
-
-    Values keep their types. An integer does not become a float if its column has no value in another row.
-    """
-    import pandas  # here, because the import takes 0.3 s and most jobs write no table
-
-    columns = list(dict.fromkeys(key for row in rows for key in row))
-    return pandas.DataFrame(
-        [[row.get(key) for key in columns] for row in rows], columns=columns, dtype=object
-    )
-
-
 def write_csv(path: str | Path, rows: Sequence[Mapping[str, Any]]) -> None:
     """Write a CSV file with a header and a line for each row. Without rows, the file is empty.
 
-    A field is empty if its value is missing, None or NaN.
+    Columns are in the order in which they first occur. A field is empty if its value is missing, None or NaN.
     """
-    write_text(path, data_frame(rows).to_csv(index=False, lineterminator="\n") if rows else "")
+    out = io.StringIO()
+    writer = csv.writer(out, lineterminator="\n")
+    columns = list(dict.fromkeys(key for row in rows for key in row))
+    writer.writerows([columns] if columns else [])
+    for values in ([row.get(key) for key in columns] for row in rows):
+        writer.writerow(["" if value is None or value != value else value for value in values])
+    write_text(path, out.getvalue())
 
 
 def write_tables(folder: str | Path, tables: Mapping[str, Sequence[Mapping[str, Any]]]) -> None:
@@ -366,32 +358,24 @@ def write_tables(folder: str | Path, tables: Mapping[str, Sequence[Mapping[str, 
 def read_numbers(path: str | Path) -> dict[str, list[float | None]]:
     """Read a CSV file of numbers, such as history.csv, as column -> values.
 
-    The value of an empty, NaN or infinite cell is None. Raises InputError, which names the column and quotes
-    the cell, if a cell is not a number.
+    The value of an empty, NaN or infinite cell is None. Raises InputError, which quotes the cell, if one is
+    not a number.
     """
-    import pandas
-
     try:
-        table = pandas.read_csv(
-            io.StringIO(read_text(path)), dtype=str, keep_default_na=False, index_col=False
-        )
-    except (pandas.errors.EmptyDataError, pandas.errors.ParserError) as error:
-        raise InputError(
-            path, f"not a table of numbers ({error})", fix="Delete the file and run again."
-        ) from None
-    return {str(name): [_number(path, str(name), text) for text in table[name]] for name in table.columns}
-
-
-def _number(path: str | Path, column: str, text: Any) -> float | None:
-    """The number in a cell; None if it is empty, NaN or infinite. text: NaN if the line has too few cells."""
-    if not isinstance(text, str) or not text.strip():
-        return None
-    try:
-        value = float(text)
-    except ValueError:
-        problem = f"column {column} holds {text!r:.80}, which is not a number"
+        reader = csv.DictReader(io.StringIO(read_text(path)))
+        rows, columns = list(reader), list(reader.fieldnames or ())
+        if not columns or any(None in row for row in rows):
+            raise ValueError("a line has more cells than the first" if columns else "it is empty")
+        return {name: [_number(row[name]) for row in rows] for name in columns}
+    except (ValueError, csv.Error) as error:
+        problem = f"not a table of numbers ({printable(error)})"
         raise InputError(path, problem, fix="Delete the file and run again.") from None
-    return value if abs(value) < float("inf") else None
+
+
+def _number(text: str | None) -> float | None:
+    """The number in a cell; None if it is empty, NaN or infinite, or if the line has too few cells."""
+    value = float(text) if text and text.strip() else math.nan
+    return value if math.isfinite(value) else None
 
 
 def to_base64(array: np.ndarray) -> str:
