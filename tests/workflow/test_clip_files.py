@@ -24,37 +24,24 @@ def test_a_listed_clip_without_a_file_is_reported(base: Path) -> None:
         Project(base, {}).dataset("mine").source("gone")
 
 
-def test_clips_are_found_in_subfolders_and_whatever_the_case_of_their_suffix(base: Path) -> None:
-    below = base / "data/mine/takes/day 1"
-    below.mkdir(parents=True)
-    (below / "d.BVH").write_text("")
-    (below / "d_gait.txt").write_text("1 walk\n")
-    (below / "d_injuries.txt").write_text("frames:9\n")
-    (base / "data/mine/.trash").mkdir()
-    (base / "data/mine/.trash/e.bvh").write_text("")
-    project = Project(base, {})
-    assert list(project.dataset("mine").entries) == ["a", "b", "c", "d"]
-    assert project.dataset("mine").source("d") == str(below / "d.BVH")
-    assert project.dataset("mine").label_files("d") == [str(below / "d_gait.txt")]
-    assert project.dataset("mine").channel_files("d", "injury") == [str(below / "d_injuries.txt")]
-
-
-def test_a_clip_in_linked_folders_is_found_once(base: Path) -> None:
+def test_clips_are_found_once_in_sub_and_linked_folders_whatever_the_case_of_their_suffix(base: Path) -> None:
     """A linked collection is found once, even if one of its links leads back to it."""
     kept = base / "kept/day 1"
     kept.mkdir(parents=True)
-    (kept / "d.bvh").write_text("")
+    (kept / "d.BVH").write_text("")
+    (kept / "d_gait.txt").write_text("1 walk\n")
     (kept / "d_injuries.txt").write_text("frames:9\n")
     (kept / "back").symlink_to(base / "data/mine")
     for name in ("first", "second"):
         (base / f"data/mine/{name}").symlink_to(base / "kept")
     (base / "data/mine/gone").symlink_to(base / "nowhere")
-    project = Project(base, {})
-    assert list(project.dataset("mine").entries) == ["a", "b", "c", "d"]
-    assert project.dataset("mine").source("d") == str(base / "data/mine/first/day 1/d.bvh")
-    assert project.dataset("mine").channel_files("d", "injury") == [
-        str(base / "data/mine/first/day 1/d_injuries.txt")
-    ]
+    (base / "data/mine/.trash").mkdir()
+    (base / "data/mine/.trash/e.bvh").write_text("")
+    data, found = Project(base, {}).dataset("mine"), base / "data/mine/first/day 1"
+    assert list(data.entries) == ["a", "b", "c", "d"]
+    assert data.source("d") == str(found / "d.BVH")
+    assert data.label_files("d") == [str(found / "d_gait.txt")]
+    assert data.channel_files("d", "injury") == [str(found / "d_injuries.txt")]
 
 
 @pytest.mark.parametrize("mirror", [True, False])

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import re
 import subprocess
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -107,30 +106,3 @@ def test_a_bad_configuration_is_refused_before_planning(workflow, override: str,
     assert message in text
     assert "Building DAG" not in text
     assert "Traceback" not in text
-
-
-@pytest.fixture
-def small_disk(workflow: Workflow) -> Iterator[Path]:
-    """The run's results on a small file system of their own. Snakemake's own files are elsewhere, because it
-    adds a traceback to our message if it cannot write them.
-    """
-    results = workflow.folder / "results"
-    results.mkdir()
-    mount = ["mount", "-t", "tmpfs", "-o", "size=3m", "tmpfs", str(results)]
-    if subprocess.run(mount, capture_output=True).returncode:
-        pytest.skip("this user may not mount a small file system")
-    yield results
-    subprocess.run(["umount", "-l", str(results)], check=True)
-
-
-@pytest.mark.slow
-def test_a_full_disk_gives_a_message_and_the_next_run_completes(workflow, small_disk: Path) -> None:
-    target = "results/datasets/tiny/database/injury"
-    text = workflow.run("-c2", target, "--keep-going", ok=False)
-    assert "the disk is full" in text
-    assert "Traceback" not in text
-    assert not list(small_disk.rglob("*.part"))
-    whole = {p: p.read_bytes() for p in small_disk.rglob("datasets/tiny/synthetic/*.bvh")}
-    subprocess.run(["mount", "-o", "remount,size=300m", str(small_disk)], check=True)
-    workflow.run("-c2", target)
-    assert {p: p.read_bytes() for p in whole} == whole

@@ -49,24 +49,19 @@ def test_a_bug_writes_its_traceback_only_to_the_log(tmp_path) -> None:
     assert "Traceback" in text
 
 
-@pytest.mark.parametrize(
-    ("path", "advice"),
-    [
-        (
-            "results/d/database/plain/statistics.npz",
-            "Delete results/d/database/plain; the same command makes it",
-        ),
-        (
-            "results/c/network/weights.npz",
-            "Delete results/c/network/weights.npz; the same command makes it again.",
-        ),
-        ("data/heights.npz", "Replace it by a good copy."),
-        ("results/c/checkpoints/0/checkpoint.npz", "Delete it; the next run makes it again."),
-    ],
-)
-def test_the_advice_to_delete_names_what_a_rule_makes(path: str, advice: str) -> None:
+AGAIN = "; the same command makes it again."
+ADVICE = {
+    "results/d/database/plain/statistics.npz": f"Delete results/d/database/plain{AGAIN}",
+    "results/c/network/weights.npz": f"Delete results/c/network/weights.npz{AGAIN}",
+    "data/heights.npz": "Replace it by a good copy.",
+    "results/c/checkpoints/0/checkpoint.npz": "Delete it; the next run makes it again.",
+}
+
+
+def test_the_advice_to_delete_names_what_a_rule_makes() -> None:
     inputs = ["results/d/database/plain", "results/c/network/weights.npz", "data/heights.npz"]
-    error = InputError(path, "damaged", line=3, fix="Delete it; the next run makes it again.")
-    assert str(with_true_advice(error, inputs)).startswith(f"{path}, line 3: damaged. {advice}")
-    other = InputError(path, "too short", fix="Use a longer clip.")
+    for path, advice in ADVICE.items():
+        error = InputError(path, "damaged", line=3, fix="Delete it; the next run makes it again.")
+        assert str(with_true_advice(error, inputs)) == f"{path}, line 3: damaged. {advice}"
+    other = InputError("a.bvh", "too short", fix="Use a longer clip.")
     assert with_true_advice(other, inputs) is other
