@@ -1,52 +1,70 @@
-"""The context of a job's script: what a user sees when the job fails."""
+"""The context of a job's script: its log, what a user sees when it fails, and that it ends with its run."""
 
+from __future__ import annotations
+
+import os
+import signal
 import subprocess
 import sys
+import time
+from pathlib import Path
 
 import pytest
 
-from hobble.core.errors import InputError
+from hobble.core.errors import HobbleError, InputError
+from hobble.workflow import lifetime
 from hobble.workflow.job import with_true_advice
 
 SCRIPT = """
+import os, time
 from types import SimpleNamespace
 from hobble.core.errors import InputError
+from hobble.core.files import atomic_path
 from hobble.workflow.job import job
 with job(SimpleNamespace(log=[{log!r}], rule="stage")) as log:
     log.info("words for the log")
-    {body}
+    print("begun", flush=True)
+    {work}
 """
 
 
-def ended(log: str, body: str) -> subprocess.CompletedProcess:
-    script = SCRIPT.format(log=log, body=body)
-    return subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False)
+def started(log: str | Path, work: str, run: int | None = None) -> subprocess.Popen[str]:
+    """A job of the run with that process id, after its work has begun."""
+    environment = dict(os.environ)
+    if run is not None:
+        environment[lifetime.RUN_VARIABLE] = f"{run} {lifetime._start_time(run)}"
+    command = [sys.executable, "-c", SCRIPT.format(log=str(log), work=work)]
+    pipe = subprocess.PIPE
+    process = subprocess.Popen(command, env=environment, stdout=pipe, stderr=subprocess.STDOUT, text=True)
+    assert process.stdout.readline() == "begun\n"
+    return process
+
+
+def ended(log: str | Path, work: str) -> tuple[int, str]:
+    """Status and output of a job."""
+    process = started(log, work)
+    said = process.communicate()[0]
+    return process.returncode, said.strip()
 
 
 @pytest.mark.parametrize("log", ["/dev/full", "/proc/nowhere/job.log"])
 def test_a_job_continues_even_if_the_log_cannot_be_written(log: str) -> None:
-    end = ended(log, "print('done')")
-    assert (end.returncode, end.stdout, end.stderr) == (0, "done\n", "")
-    end = ended(log, "raise InputError('clip.bvh', 'is torn')")
-    assert (end.returncode, end.stderr.strip()) == (1, "stage: clip.bvh: is torn.")
+    assert ended(log, "print('done')") == (0, "done")
+    assert ended(log, "raise InputError('clip.bvh', 'is torn')") == (1, "stage: clip.bvh: is torn.")
 
 
-def test_disk_errors_are_not_reported_as_bugs(tmp_path) -> None:
-    end = ended(str(tmp_path / "job.log"), "open('/proc/1/nowhere')")
-    assert end.returncode == 1
-    assert end.stderr.startswith("stage: /proc/1/nowhere: No such file or directory. See ")
-    assert "Traceback" in (tmp_path / "job.log").read_text()
-
-
-def test_a_bug_writes_its_traceback_only_to_the_log(tmp_path) -> None:
-    path = tmp_path / "logs" / "job.log"
-    end = ended(str(path), "{}['left knee']")
-    assert end.returncode == 1
-    assert "KeyError: 'left knee'" in end.stderr
-    assert "Traceback" not in end.stderr
-    text = path.read_text()
-    assert "words for the log" in text
-    assert "Traceback" in text
+def test_an_error_is_one_line_and_its_traceback_is_in_the_log(tmp_path: Path) -> None:
+    path = tmp_path / "logs/job.log"
+    for work, message in {
+        "open('/proc/1/nowhere')": "stage: /proc/1/nowhere: No such file or directory. See ",
+        "{}['left knee']": "stage: KeyError: 'left knee'. This is a bug in Hobble",
+    }.items():
+        status, said = ended(path, work)
+        assert status == 1
+        assert said.startswith(message)
+        assert "\n" not in said
+        assert "words for the log" in path.read_text()
+        assert "Traceback" in path.read_text()
 
 
 AGAIN = "; the same command makes it again."
@@ -65,3 +83,67 @@ def test_the_advice_to_delete_names_what_a_rule_makes() -> None:
         assert str(with_true_advice(error, inputs)) == f"{path}, line 3: damaged. {advice}"
     other = InputError("a.bvh", "too short", fix="Use a longer clip.")
     assert with_true_advice(other, inputs) is other
+
+
+def test_only_one_run_works_in_a_folder_and_its_lock_ends_with_it(tmp_path: Path) -> None:
+    path = tmp_path / ".snakemake/run.lock"
+    work = f"from hobble.workflow.lifetime import lock; from pathlib import Path; lock(Path({str(path)!r}))"
+    run = started(tmp_path / "log", f"{work}; print('locked', flush=True); time.sleep(60)")
+    assert run.stdout.readline() == "locked\n"
+    with pytest.raises(HobbleError, match="cannot be locked, because another run of Snakemake is at work"):
+        lifetime.lock(path)
+    run.kill()
+    run.wait()
+    lifetime.lock(path)
+
+
+def test_a_user_without_a_name_gets_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    def nameless() -> str:
+        raise KeyError("getpwuid(): uid not found")
+
+    monkeypatch.setattr(lifetime.getpass, "getuser", nameless)
+    monkeypatch.setenv("USER", "somebody")
+    lifetime.ensure_user_name()
+    assert os.environ["USER"] == str(os.getuid())
+
+
+DEAF = "while True:\n        try: time.sleep(60)\n        except BaseException: pass"
+
+
+@pytest.mark.parametrize(
+    ("work", "status"),
+    [("time.sleep(60)", 128 + signal.SIGTERM), (DEAF, -signal.SIGKILL)],
+    ids=["willing", "deaf"],
+)
+def test_a_job_ends_soon_after_its_run(tmp_path: Path, work: str, status: int) -> None:
+    run = subprocess.Popen([sys.executable, "-c", "import time; time.sleep(60)"])
+    process = started(tmp_path / "job.log", work, run.pid)
+    assert process.poll() is None
+    run.kill()  # not waited for, because a zombie does not count as a run either
+    before = time.monotonic()
+    assert process.wait(timeout=10) == status
+    assert time.monotonic() - before < 5
+    assert process.stdout.read() == ""
+    run.wait()
+
+
+def test_a_stopped_job_cleans_up_silently_even_if_it_is_told_twice(tmp_path: Path) -> None:
+    """Ctrl-C reaches a job twice: from the terminal, and from Snakemake, which ends its jobs."""
+    work = f"""
+    with atomic_path({str(tmp_path / "out.txt")!r}) as part:
+        part.write_text("half")
+        try:
+            print("writing", flush=True)
+            time.sleep(60)
+        finally:
+            print("cleaning", flush=True)
+            time.sleep(1)"""
+    process = started(tmp_path / "job.log", work, os.getpid())
+    assert process.stdout.readline() == "writing\n"
+    process.send_signal(signal.SIGINT)
+    assert process.stdout.readline() == "cleaning\n"
+    for again in (signal.SIGTERM, signal.SIGINT):
+        process.send_signal(again)
+    assert process.wait(timeout=10) == 128 + signal.SIGINT
+    assert process.stdout.read() == ""
+    assert [file.name for file in tmp_path.iterdir()] == ["job.log"]
