@@ -200,6 +200,8 @@ def load_npz(path: str | Path, names: Iterable[str] | None = None) -> Arrays:
         check_archive(path, archive)
         stored = [name.removesuffix(".npy") for name in archive.namelist()]
         wanted = stored if names is None else list(names)
+        if missing := [name for name in wanted if name not in stored]:
+            raise InputError(path, f"holds no array {printable(missing[0])!r}", fix=DELETE_IT)
         return Arrays(path, [(name, _read_array(archive, f"{name}.npy")) for name in wanted])
     raise AssertionError("not reached")
 
