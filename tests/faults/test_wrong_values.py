@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from hobble.channels.clip_values import load_values
-from hobble.core.clip import load_clip
+from hobble.core.clip import load_clip, load_clip_report
 from hobble.core.declared import load_report
 from hobble.core.errors import HobbleError
 from hobble.core.files import CHECKSUMS, read_json, write_json
@@ -29,6 +29,7 @@ from .damage import change_file
 BATCHES = "datasets/tiny/batches"
 READERS: dict[str, Callable[[Path], Any]] = {
     f"{BATCHES}/motion/uneven-1/motion/uneven-1.npz": lambda path: [load_clip(path).positions],
+    f"{BATCHES}/motion/uneven-1/motion/uneven-1.json": load_clip_report,
     f"{BATCHES}/labels/uneven-1/labels/uneven-1.npz": load_labels,
     f"{BATCHES}/labels/uneven-1/labels/uneven-1.json": lambda path: load_report(path, "labels", LabelReport),
     f"{BATCHES}/channels/uneven-1/channels/injury/uneven-1.npz": load_values,
@@ -54,7 +55,7 @@ def test_a_wrong_value_is_refused_or_harmless(finished, tmp_path: Path, file: st
         except HobbleError as error:
             refusals.append(str(error))
         else:
-            values = found if isinstance(found, list | tuple) else vars(found).values()
+            values = found if isinstance(found, list | tuple) else getattr(found, "__dict__", {}).values()
             arrays = [value for value in values if isinstance(value, np.ndarray) and value.dtype.kind == "f"]
             assert all(np.isfinite(array).all() for array in arrays), number
     assert refusals

@@ -1,4 +1,4 @@
-"""Another workflow imports this one as a module; `snakemake --report` and `--lint`."""
+"""Another workflow imports this one as a module; `snakemake --report`. (`make check` runs `--lint`.)"""
 
 from __future__ import annotations
 
@@ -45,7 +45,3 @@ def test_snakemakes_own_report_shows_the_pages(copied) -> None:
     text = (copied.folder / "own.html").read_text()
     assert "results/test/report.html" in text
     assert "a character to steer and to hurt" in text
-
-
-def test_lint_has_nothing_to_say(workflow) -> None:
-    assert "Lints for" not in workflow.run("--lint")

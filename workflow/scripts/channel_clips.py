@@ -6,8 +6,7 @@ from the data set.
 
 from hobble.channels import channel
 from hobble.channels.clip_values import read_clip_values, save_values, write_report
-from hobble.core.clip import load_clip
-from hobble.core.files import read_json
+from hobble.core.clip import load_clip, load_clip_report
 from hobble.workflow.job import make_each
 
 
@@ -18,7 +17,7 @@ def make_values(piece, log):
     """
     name, clip = piece.params["channel"], load_clip(piece.input["clip"])
     source = channel(name).make_source(piece.params["source"], piece.input["files"])
-    values, warnings = read_clip_values(name, clip, source, read_json(piece.input["report"]))
+    values, warnings = read_clip_values(name, clip, source, load_clip_report(piece.input["report"]))
     for warning in warnings:
         log.warning("%s", warning)
     columns = channel(name).columns(clip.skeleton)

@@ -5,8 +5,7 @@ It is refused if a clip in training and a held-out clip show the same motion.
 
 from pathlib import Path
 
-from hobble.core.clip import load_clip
-from hobble.core.files import read_json
+from hobble.core.clip import load_clip, load_clip_report
 from hobble.database.options import Merging
 from hobble.database.write import refuse_split_pairs, write_database
 from hobble.motion.duplicates import clip_digest, duplicate_pairs
@@ -18,7 +17,9 @@ with job(snakemake) as log:
     # A digest holds what is compared of a clip: a few poses and the checksum of its file.
     files = Inputs(snakemake.input.batches)
     digests = [
-        clip_digest(load_clip(files(f"motion/{clip}.npz")), read_json(files(f"motion/{clip}.json"))["sha256"])
+        clip_digest(
+            load_clip(files(f"motion/{clip}.npz")), load_clip_report(files(f"motion/{clip}.json"))["sha256"]
+        )
         for clip in snakemake.params.compared
     ]
     refuse_split_pairs(

@@ -3,9 +3,9 @@
 from hobble.channels import channel
 from hobble.channels.clip_values import load_values, save_values
 from hobble.channels.clip_values import write_report as write_channel_report
-from hobble.core.clip import load_clip, save_clip
+from hobble.core.clip import load_clip, load_clip_report, save_clip
 from hobble.core.declared import load_report
-from hobble.core.files import read_json, write_json
+from hobble.core.files import write_json
 from hobble.hurt.options import HURT_CHANNEL, Hurt
 from hobble.hurt.version import hurt_version
 from hobble.labels.clip_labels import LabelReport, load_labels, save_labels
@@ -39,7 +39,7 @@ def make_version(piece, log):
         version_number=piece.params["turn"],
         ground=piece.params["ground"],
     )
-    motion_report = {**read_json(piece.input["report"]), "clip": hurt.clip.name, "hurt_of": clip.name}
+    motion_report = {**load_clip_report(piece.input["report"]), "clip": hurt.clip.name, "hurt_of": clip.name}
     write_files(piece.output, "", hurt.clip, motion_report, hurt.labels, label_report, hurt.severity)
     log.info("%s: %d frames from %d of %s", hurt.clip.name, len(hurt.clip), len(clip), clip.name)
     if "mirror_clip" in piece.output:
@@ -53,7 +53,7 @@ def make_mirror(output):
     """
     clip = load_clip(output["clip"])
     clip = mirror_clip(clip, f"{clip.name}_mirror")
-    motion_report = mirror_report(read_json(output["report"]), clip.name)
+    motion_report = mirror_report(load_clip_report(output["report"]), clip.name)
     label_report = load_report(output["label_report"], "the report of labels", LabelReport)
     labels, label_report = mirror_labels(load_labels(output["labels"]), label_report, clip)
     severity = channel(HURT_CHANNEL).mirror(load_values(output["injury"])[0], clip.skeleton)

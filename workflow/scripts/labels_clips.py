@@ -3,9 +3,8 @@
 They are computed from the motion, or taken from hand-made label files.
 """
 
-from hobble.core.clip import load_clip
+from hobble.core.clip import load_clip, load_clip_report
 from hobble.core.declared import load_report
-from hobble.core.files import read_json
 from hobble.labels.clip_labels import LabelReport, load_labels, save_labels
 from hobble.labels.label import label_clip, mirror_labels, write_report
 from hobble.labels.options import LabelOptions
@@ -21,7 +20,7 @@ def make_labels(piece, log):
     labels, report = label_clip(
         clip,
         piece.input["files"],
-        read_json(piece.input["report"]),
+        load_clip_report(piece.input["report"]),
         piece.params["gait"],
         piece.params["ground"],
         LabelOptions.model_validate(piece.params["options"]),

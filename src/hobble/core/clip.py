@@ -6,10 +6,13 @@ import json
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
+from typing import Annotated, Any, cast
 
 import numpy as np
+from pydantic import ConfigDict, Field
+from typing_extensions import TypedDict
 
-from hobble.core.declared import ArrayOf, load_declared
+from hobble.core.declared import ArrayOf, load_declared, load_report
 from hobble.core.errors import InputError
 from hobble.core.files import DELETE_IT, save_npz
 from hobble.core.quat import Array
@@ -71,6 +74,29 @@ DECLARED = {
     "root": ArrayOf(("F", 3), low=-FARTHEST, high=FARTHEST),
     "translations": ArrayOf(("F", "J", 3), low=-FARTHEST, high=FARTHEST, optional=True),
 }
+
+
+class ClipReport(TypedDict):
+    """What later jobs read of the report of a clip. It has further entries.
+
+    facing: in the first frame, degrees. source_frames, source_fps: of the clip's file. source_start: its
+    first frame that is used, from 0. cycle_frames: after so many frames the clip repeats.
+    """
+
+    __pydantic_config__ = ConfigDict(extra="allow")  # type: ignore[misc]
+
+    clip: str
+    sha256: str
+    facing: Annotated[float, Field(allow_inf_nan=False)]
+    source_frames: Annotated[int, Field(ge=1)]
+    source_fps: Annotated[float, Field(gt=0, allow_inf_nan=False)]
+    source_start: Annotated[int, Field(ge=0)]
+    cycle_frames: Annotated[int, Field(ge=1)]
+
+
+def load_clip_report(path: str | Path) -> dict[str, Any]:
+    """The report of a clip, as `hobble.motion.make.make_clip` makes it."""
+    return cast(dict[str, Any], load_report(path, "the report of a clip", ClipReport))
 
 
 def save_clip(path: str | Path, clip: Clip) -> None:
