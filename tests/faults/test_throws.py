@@ -41,7 +41,7 @@ def lab() -> Iterator[Lab]:
 @pytest.mark.parametrize(
     ("throw", "times", "refusals"),
     [(throws.kill, 16, 0), (throws.orphan, 8, 0), (throws.gone, 5, 0), (throws.full_disk, 4, 0),
-     (throws.no_permission, 4, 0), (throws.harm, 40, 20), (throws.wrong_value, 60, 30)],
+     (throws.no_permission, 4, 0), (throws.harm, 40, 20), (throws.wrong_value, 60, 15)],
 )  # fmt: skip
 def test_no_fault_of_a_job_damages_a_result(lab: Lab, throw, times: int, refusals: int) -> None:
     thrown = [throw(lab, Random(f"20-{number}")) for number in range(times)]
