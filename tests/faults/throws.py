@@ -138,8 +138,9 @@ def harm(lab: Lab, rng: Random) -> Throw:
         target.unlink(missing_ok=True)
         target.write_bytes(damaged(rng, (lab.run / path).read_bytes()))
         os.utime(target, ns=((lab.run / path).stat().st_mtime_ns,) * 2)
-        what = "a damaged checkpoint" if "checkpoints" in path else "damaged bytes of a file"
-        return judged(bench, what, bench.run(), _named(target))
+        if "checkpoints" in path:  # no input: the advice is to delete it
+            return judged(bench, "a damaged checkpoint", bench.run(), _named(target), mend=target.unlink)
+        return judged(bench, "damaged bytes of a file", bench.run(), _named(target))
 
 
 def wrong_value(lab: Lab, rng: Random) -> Throw:
