@@ -23,7 +23,7 @@ from hobble.models.load import load_network
 from hobble.report.character import playable_with_recogniser
 from hobble.report.gather import gather
 from hobble.report.page import render_report
-from hobble.report.recorded_motion import packed_comparisons, packed_scenes
+from hobble.report.recorded_motion import packed_comparisons
 from hobble.runtime.options import Runtime
 
 REPORTS = {"motion": "motion", "labels": "labels", "channels": "channels/injury"}
@@ -73,10 +73,8 @@ def rendered(results: Path, dataset: Path, count: int) -> tuple[float, float]:
         )
         network = load_network(weights)
         runtime = Runtime.model_validate(material.resolved["configuration"]["runtime"])
-        known = material.network
         page = render_report(
             material,
-            packed_scenes(results / "runtime/scenarios.npz", known["skeleton"], known["channels"]),
             playable_with_recogniser(network, runtime),
             packed_comparisons(network, files["rows"], splits),
             (results.parent / "page/bundle.js").read_text(encoding="utf-8"),

@@ -107,7 +107,9 @@ LIMIT = 1200  # seconds that the shared run may take
 
 
 def shared_folder(config: pytest.Config) -> Path:
-    """A folder that all processes of this session of pytest share."""
+    """A folder that all processes of this session share; HOBBLE_RUN: one that later sessions share, too."""
+    if kept := os.environ.get("HOBBLE_RUN"):
+        return Path(kept)
     base = config._tmp_path_factory.getbasetemp()  # type: ignore[attr-defined]
     return (base.parent if hasattr(config, "workerinput") else base) / "shared"
 
@@ -119,6 +121,8 @@ def pytest_collection_finish(session: pytest.Session) -> None:
     if worker != "gw0" or not any(wanted & set(getattr(i, "fixturenames", ())) for i in session.items):
         return
     folder = shared_folder(session.config)
+    if folder.exists():  # HOBBLE_RUN has one
+        return
     made = copy_of(ROOT, folder)
     script = '"$@" > said 2>&1; echo $? > status.part; mv status.part status'
     command = ["sh", "-c", script, "sh", *made.command("-c2", RUN, "-d", str(made.folder))]
@@ -146,7 +150,7 @@ def copied(finished: Workflow, tmp_path: Path) -> Workflow:
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
-    """Say which report tests were skipped because there is no browser, and where pictures were saved."""
+    """Say which report tests were skipped because there is no browser."""
     skipped = terminalreporter.getreports("skipped")
     missed = [report.nodeid for report in skipped if "the page was not opened" in str(report.longrepr)]
     if missed:
@@ -155,8 +159,3 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
         )
         for name in missed:
             terminalreporter.write_line(name)
-    pictures = ROOT / "build" / "report-sections"
-    if pictures.is_dir() and any(
-        "tests/report" in str(r.nodeid) for r in terminalreporter.getreports("passed")
-    ):
-        terminalreporter.write_line(f"pictures of the report's sections: {pictures}")

@@ -1,37 +1,35 @@
+"""The page as HTML: its parts, its policy, and markup in names, which has no effect."""
+
 from __future__ import annotations
 
 import base64
 import json
 import re
 import zlib
+from dataclasses import fields, replace
 from html.parser import HTMLParser
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
+import numpy as np
 import pytest
 
-from hobble.core.skeleton import Skeleton
-from hobble.report import templates
-from hobble.report.gather import ReportMaterial, gather
+from hobble.core.errors import HobbleError
+from hobble.measures.measure import all_measures
+from hobble.models.network import Network
+from hobble.report import data_section, templates
+from hobble.report.bundle import bundle_page_scripts, install_npm_packages
+from hobble.report.gather import ReportMaterial
 from hobble.report.page import render_report
+from hobble.report.parts import json_data
+from hobble.report.recorded_motion import TURN, UNIT, packed_comparisons, packed_motion
+from tests.report.browser import Browser, opened
+from tests.report.conftest import CLIP
 
-SECTIONS = [
-    "play",
-    "gallery",
-    "engine",
-    "summary",
-    "walking",
-    "accuracy",
-    "injury",
-    "speed",
-    "training",
-    "data",
-    "terrain",
-    "costs",
-    "configuration",
-    "origin",
-]
+SECTIONS = {
+    *("play", "gallery", "engine", "summary", "accuracy", "injury", "speed", "training", "data", "terrain"),
+    *("costs", "configuration", "origin"),
+}
 
 
 class Outline(HTMLParser):
@@ -63,103 +61,163 @@ def outline(page: str) -> Outline:
     return Outline(page)
 
 
-def data_of(outline: Outline) -> dict[str, Any]:
-    """The data of the page, by part."""
-    out = {}
-    for text, element in zip(outline.scripts, outline.all("script"), strict=True):
-        if element.get("type") == "application/zlib":
-            text = zlib.decompress(base64.b64decode(text)).decode()
-        if "id" in element:
-            out[element["id"].removeprefix("data-")] = json.loads(text)
-    return out
-
-
-def test_the_page_has_every_section_and_links_to_it(outline: Outline) -> None:
-    ids = [e["id"] for e in outline.all("section")]
-    assert ids == SECTIONS
-    links = {e["href"] for e in outline.all("a")}
-    assert {f"#{i}" for i in ids} - links == {"#gallery", "#engine"}
-
-
-def test_the_page_loads_nothing_from_elsewhere(page: str, outline: Outline) -> None:
-    assert len(page.encode()) < 10e6
-    assert len(outline.elements) < 6000
-    for tag, attributes in outline.elements:
-        assert "src" not in attributes, tag
-        assert not (attributes.get("href") or "").startswith(("http", "//", "file"))
-    assert [e["href"] for e in outline.all("link")] == ["data:,"]
-    (policy,) = [e["content"] for e in outline.all("meta") if e.get("http-equiv")]
-    assert (policy or "").startswith("default-src 'none'")
-    assert "unsafe-inline" not in (policy or "")
-    for kind, directive in (("script", "script-src"), ("style", "style-src")):
-        allowed = (policy or "").partition(f"{directive} ")[2].partition(";")[0]
-        (text,) = re.findall(f"<{kind}>(.*?)</{kind}>", page, re.DOTALL)
-        assert allowed.startswith(templates.hash_source(text))
-    assert not [attributes for _, attributes in outline.elements if "style" in attributes]
-    own = "".join(p.read_text() for p in templates.FOLDER.glob("web/*.js"))
-    assert not re.search(r"fetch\(|XMLHttpRequest|import\(|WebSocket|sendBeacon", own)
-
-
-def test_every_chart_has_its_data_and_a_label(outline: Outline) -> None:
-    charts = data_of(outline)["charts"]
+def test_every_section_is_linked_and_every_chart_control_and_id_is_in_order(outline: Outline) -> None:
+    sections = {e["id"] for e in outline.all("section")}
+    assert sections > SECTIONS
+    assert {f"#{i}" for i in sections} - {e["href"] for e in outline.all("a")} == {"#gallery", "#engine"}
+    ids = [a["id"] for _, a in outline.elements if "id" in a]
+    assert len(ids) == len(set(ids))
+    labels = {e["for"] for e in outline.all("label")}
+    assert all(e["id"] in labels for e in outline.all("select"))
+    assert labels <= set(ids)
+    packed = outline.scripts[[e.get("id") for e in outline.all("script")].index("data-charts")]
+    charts = json.loads(zlib.decompress(base64.b64decode(packed)))
     drawn = [e for e in outline.all("div") if "data-chart" in e]
     assert {e["data-chart"] for e in drawn} == set(charts)
     assert len(drawn) == len(charts) >= 12
     assert all(e["aria-label"] for e in drawn)
 
 
-def test_ids_are_unique_and_controls_are_labelled(outline: Outline) -> None:
-    ids = [a["id"] for _, a in outline.elements if "id" in a]
-    assert len(ids) == len(set(ids))
-    labels = {e["for"] for e in outline.all("label")}
-    assert all(e["id"] in labels for e in outline.all("select"))
-    assert labels <= set(ids)
+def test_the_page_is_small_and_loads_nothing_from_elsewhere(page: str, outline: Outline) -> None:
+    assert len(page.encode()) < 10e6
+    assert len(outline.elements) < 6000
+    for tag, attributes in outline.elements:
+        assert "src" not in attributes, tag
+        assert "style" not in attributes, tag
+        assert not (attributes.get("href") or "").startswith(("http", "//", "file"))
+    (policy,) = [e["content"] or "" for e in outline.all("meta") if e.get("http-equiv")]
+    assert policy.startswith("default-src 'none'")
+    assert "unsafe-inline" not in policy
+    for kind, directive in (("script", "script-src"), ("style", "style-src")):
+        allowed = policy.partition(f"{directive} ")[2].partition(";")[0]
+        (text,) = re.findall(f"<{kind}>(.*?)</{kind}>", page, re.DOTALL)
+        assert allowed.startswith(templates.hash_source(text))
+    own = "".join(p.read_text() for p in templates.FOLDER.glob("web/*.js"))
+    assert not re.search(r"fetch\(|XMLHttpRequest|import\(|WebSocket|sendBeacon", own)
 
 
-def test_equal_inputs_give_equal_pages(
+def test_a_network_without_channels_has_a_page_and_measurements_without_results_no_section(
     material: ReportMaterial,
-    play: dict[str, Any],
-    character: dict[str, Any],
-    compared: dict[str, Any],
-    script: str,
-    hero: dict[str, Any],
-    page: str,
 ) -> None:
-    again = render_report(material, play, character, compared, script, hero)
-    commit = re.compile(r'<td class="hash">[0-9a-f]{40}[^<]*</td>')  # of a checkout that others may work in
-    assert commit.sub("", again) == commit.sub("", page)
+    nothing = {one.name: {"applies": False, "reason": "no such input"} for one in all_measures()}
+    ids = {e["id"] for e in Outline(render_report(replace(material, measurements=nothing))).all("section")}
+    assert ids == SECTIONS - {"play", "gallery", "engine", "accuracy", "injury", "speed"}
 
 
-HOSTILE = "<script>alert(1)</script><img src=x onerror=alert(2)>\"'&{{7*7}}"
-
-
-def test_a_hostile_clip_name_is_only_text(
-    examples: ModuleType, holden31: Skeleton, tmp_path: Path, outline: Outline
-) -> None:
-    clips = (HOSTILE, *examples.CLIPS[1:])
-    arguments = examples.write_all(
-        tmp_path, holden31, clips, terrain_names=[f"c{i}" for i in range(len(clips))]
-    )
-    material = gather(**{**arguments, "title": HOSTILE, "dataset": HOSTILE})
-    text = render_report(material)
-    hostile = Outline(text)
-    assert len(hostile.all("script")) == len(outline.all("script"))
-    assert not hostile.all("img")
-    assert not any(key.startswith("on") for _, a in hostile.elements for key in a)
-    assert "{{7*7}}" in text
-
-
-def test_a_network_without_injuries_has_a_page(
-    examples: ModuleType, holden31: Skeleton, tmp_path: Path
-) -> None:
-    text = render_report(gather(**examples.write_all(tmp_path, holden31, injury=False)))
-    assert 'id="injury"' not in text
-    assert "Injury response" not in text
-    assert 'data-chart="sweep-pose"' not in text
-    assert 'id="walking"' not in text
-    assert 'id="play"' not in text
-
-
-def test_our_scripts_cannot_end_their_element(material: ReportMaterial) -> None:
+def test_scripts_that_would_end_their_element_are_refused(material: ReportMaterial) -> None:
     with pytest.raises(ValueError, match="bundle"):
         render_report(material, bundle="'</SCRIPT>'")
+
+
+@pytest.mark.slow
+def test_the_page_does_not_grow_with_the_clips(
+    material: ReportMaterial, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """With smaller limits, so that a test need not make hundreds of clips."""
+    monkeypatch.setattr(data_section, "MOST_ROWS", 12)
+    monkeypatch.setattr(data_section, "MOST_REMARKS", 20)
+
+    def size(copies: int) -> int:
+        many = {
+            key: [{**one, "clip": f"{one['clip']}-{i}"} for i in range(copies) for one in reports]
+            for key in ("motion", "labels", "channels")
+            if (reports := getattr(material, key))
+        }
+        return len(render_report(replace(material, **many)))
+
+    assert size(100) < 1.01 * size(20)
+
+
+HOSTILE = (
+    "<script>pwned=1</script></script></style><img src=x onerror=pwned=2>\"'`&amp;{{7*7}}${pwned=3}"
+    '<a href="javascript:pwned=4">x</a><svg onload=pwned=5><!--]]>'
+)
+
+
+@pytest.fixture(scope="module")
+def hostile(
+    material: ReportMaterial, character: dict[str, Any], network: Network, script: str
+) -> tuple[str, str]:
+    """A page in which a clip, the trained link and the data set have a name of markup, and the link."""
+    (link,) = network.trained_labels("injury")
+
+    def renamed(value: Any) -> Any:
+        text = json.dumps(json_data(value))
+        for name in (CLIP, link):
+            text = text.replace(json.dumps(name), json.dumps(HOSTILE))
+        return json.loads(text)
+
+    kept = ("measures", "terrain_files", "row_files")
+    changed = {
+        f.name: renamed(getattr(material, f.name)) for f in fields(ReportMaterial) if f.name not in kept
+    }
+    named = dict.fromkeys(("name", "dataset", "title"), HOSTILE)
+    compared = renamed(packed_comparisons(network, material.row_files, material.splits))
+    page = render_report(
+        ReportMaterial(**{**changed, **named, **{key: getattr(material, key) for key in kept}}),
+        renamed(character),
+        compared,
+        script,
+    )
+    return page, link
+
+
+def test_a_hostile_name_is_only_text(hostile: tuple[str, str], outline: Outline) -> None:
+    found = Outline(hostile[0])
+    assert len(found.all("script")) == len(outline.all("script"))
+    assert not found.all("img")
+    assert not any(key.startswith("on") for _, attributes in found.elements for key in attributes)
+    assert "{{7*7}}" in hostile[0]
+
+
+@pytest.mark.slow
+def test_no_script_in_a_hostile_name_runs(hostile: tuple[str, str], tmp_path: Path) -> None:
+    """Everything is touched: choosers, sorting, folds, charts."""
+    tabs = opened(hostile[0], tmp_path)
+    tab: Browser = next(tabs)
+    tab.run("location.hash = '#summary'")
+    tab.run("document.querySelectorAll('details').forEach((d) => { d.open = true; })")
+    tab.run("Hobble.drawAll()")
+    tab.run("document.querySelectorAll('th button').forEach((b) => b.click())")
+    tab.run(
+        "document.querySelectorAll('select').forEach((s) => { s.selectedIndex = s.options.length - 1;"
+        " s.dispatchEvent(new Event('change', { bubbles: true })); })"
+    )
+    tab.run("new Promise((done) => setTimeout(done, 500))")
+    assert tab.run("typeof pwned") == "undefined"
+    bad = 'img[src=x], [onerror], [onload], svg svg[onload], a[href^="javascript"]'
+    assert tab.run(f"document.querySelectorAll({json.dumps(bad)}).length") == 0
+    assert not [url for url in tab.requests if not url.startswith(("file:", "data:", "blob:"))]
+    for place in ("h1", "#data td"):
+        shown = f"[...document.querySelectorAll({json.dumps(place)})].some((e) => e.textContent.includes(%s))"
+        assert tab.run(shown % json.dumps(HOSTILE)), place
+    assert tab.run(f"document.title.includes({json.dumps(HOSTILE)})")
+    next(tabs, None)
+
+
+def test_a_script_that_is_wrong_is_named(modules: Path, results: Path, tmp_path: Path) -> None:
+    (tmp_path / "index.js").write_text("const a = ;")
+    with pytest.raises(HobbleError, match=r"index\.js:1"):
+        bundle_page_scripts(modules, results / "page/engine.wasm", tmp_path / "out.js", tmp_path)
+    assert not (tmp_path / "out.js").exists()
+
+
+@pytest.mark.slow
+def test_without_the_registry_the_message_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("npm_config_registry", "http://127.0.0.1:9/")
+    monkeypatch.setenv("npm_config_cache", str(tmp_path / "cache"))
+    monkeypatch.setenv("npm_config_fetch_retries", "0")
+    with pytest.raises(HobbleError, match=r"could not download .* from the npm registry"):
+        install_npm_packages(tmp_path / "page")
+
+
+def test_motion_is_packed_within_a_tenth_of_a_millimetre() -> None:
+    rng = np.random.default_rng(0)
+    world = rng.uniform(-90, 90, (7, 5, 3)) + rng.uniform(-4000, 4000, (7, 1, 3))
+    turns = rng.uniform(-1, 1, (7, 5, 4))
+    packed = {key: base64.b64decode(text) for key, text in packed_motion(world, turns, [0, 2, 4]).items()}
+    root = np.frombuffer(packed["root"], "<f4").reshape(7, 1, 3)
+    pose = np.frombuffer(packed["pose"], "<i2").reshape(7, 3, 3)
+    assert np.abs(root + pose * UNIT - world[:, ::2]).max() < 0.01
+    turn = np.frombuffer(packed["turn"], "<i2").reshape(7, 3, 4) / TURN
+    assert np.abs(turn - turns[:, ::2]).max() < 1e-4

@@ -5,8 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from hobble.core.errors import InputError
-from hobble.report.provenance import read_benchmark, summarise_pipeline
+from hobble.report.provenance import summarise_pipeline
 
 HEADER = "s\th:m:s\tmax_rss\tmax_vms\tmax_uss\tmax_pss\tio_in\tio_out\tmean_load\tcpu_time\n"
 
@@ -85,10 +84,3 @@ def test_missing_files_are_listed(tmp_path: Path) -> None:
     assert found["missing"] == [nowhere, f"{nowhere}.npz"]
     assert found["stages"][0]["jobs"] == 0
     assert found["stages"][0]["max_rss_mb"] is None
-
-
-def test_a_table_that_is_no_benchmark_is_refused(tmp_path: Path) -> None:
-    path = tmp_path / "a.tsv"
-    path.write_text("clip\tframes\nwalk\t3\n")
-    with pytest.raises(InputError, match=r"a\.tsv: not a Snakemake benchmark"):
-        read_benchmark(path)

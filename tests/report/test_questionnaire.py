@@ -6,7 +6,6 @@ import json
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -14,38 +13,34 @@ import pytest
 
 from hobble.core.errors import HobbleError
 from hobble.core.files import read_json
-from hobble.core.skeleton import Skeleton
 from hobble.measures import films
-from hobble.measures.films import FILMS, list_doubts, part_links, write_questionnaire
+from hobble.measures.films import FILMS, part_links, write_questionnaire
 from hobble.measures.study import PARTS, QUESTIONS, read_answers, read_study
-from hobble.models.load import load_network
 from hobble.models.network import Network
+from hobble.runtime.options import Runtime
+from tests.report.browser import Browser, opened
 
 SHORT = FILMS[3:7]
 
 
 @pytest.fixture(scope="module")
 def made(
-    network: Network, examples: ModuleType, tmp_path_factory: pytest.TempPathFactory
+    network: Network, runtime: Runtime, tmp_path_factory: pytest.TempPathFactory
 ) -> tuple[Path, dict[str, Any]]:
     """The page with four small and short films."""
     folder = tmp_path_factory.mktemp("questionnaire")
     with pytest.MonkeyPatch.context() as patch:
         for name, seconds in (("WARM_UP_SECONDS", 0.1), ("HEALTHY_SECONDS", 0.1), ("HURT_SECONDS", 0.3)):
             patch.setattr(films, name, seconds)
-        return folder, write_questionnaire(
-            network, folder, examples.RUNTIME, "example", SHORT, "sided", size=48
-        )
+        return folder, write_questionnaire(network, folder, runtime, "example", SHORT, "sided", size=48)
 
 
-@pytest.fixture
-def tab(
-    made: tuple[Path, dict[str, Any]], tools: ModuleType, tmp_path_factory: pytest.TempPathFactory
-) -> Iterator[Any]:
-    yield from tools.opened((made[0] / "questionnaire.html").read_text(), tmp_path_factory.mktemp("asked"))
+@pytest.fixture(scope="module")
+def tab(made: tuple[Path, dict[str, Any]], tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
+    yield from opened((made[0] / "questionnaire.html").read_text(), tmp_path_factory.mktemp("asked"))
 
 
-def again(tab: Any, forget: bool = False) -> None:
+def again(tab: Browser, forget: bool = False) -> None:
     """Open the page again, with or without the answers that the browser has stored."""
     if forget:
         tab.run("localStorage.clear()")
@@ -133,29 +128,6 @@ def test_orders_differ_and_a_reopened_page_continues(tab: Any) -> None:
     assert tab.run("Study.state.order") == order
 
 
-@pytest.mark.slow
-def test_axe_finds_no_accessibility_problem_in_any_of_the_three_parts(tab: Any, modules: Path) -> None:
-    again(tab, forget=True)
-    assert tab.violations(modules) == []
-    tab.run("document.getElementById('begin').click()")
-    assert tab.violations(modules) == []
-    for _ in range(4):
-        answer_first(tab)
-    assert not tab.run("document.getElementById('done').hidden")
-    assert tab.violations(modules) == []
-
-
-def test_films_without_a_visible_injury_get_a_warning() -> None:
-    rows = [
-        {"film": 1, "from_healthy_cm": 3.0, "untrained": []},
-        {"film": 2, "from_healthy_cm": 0.01, "untrained": ["A-B"]},
-    ]
-    assert list_doubts({"films": rows[:1]}) == []
-    same, never = list_doubts({"films": rows})
-    assert same.startswith("film 2: nobody can see the injury")
-    assert never == "Never hurt in training: A-B."
-
-
 def test_the_link_that_was_hurt_in_training_is_hurt(network: Network) -> None:
     links = network.channels["injury"]
     x_mean = network.x_mean.copy()
@@ -171,11 +143,8 @@ def test_the_link_that_was_hurt_in_training_is_hurt(network: Network) -> None:
 
 
 def test_a_network_that_is_not_told_what_hurts_says_which_is(
-    examples: ModuleType, holden31: Skeleton, tmp_path: Path
+    network: Network, runtime: Runtime, tmp_path: Path
 ) -> None:
-    examples.weights(tmp_path / "weights.npz", holden31, links=False)
     with pytest.raises(HobbleError, match="no injury channel"):
-        write_questionnaire(
-            load_network(tmp_path / "weights.npz"), tmp_path / "out", examples.RUNTIME, "plain"
-        )
+        write_questionnaire(replace(network, channels={}), tmp_path / "out", runtime, "plain")
     assert not (tmp_path / "out").exists()

@@ -6,7 +6,6 @@ import base64
 import ctypes
 import json
 from dataclasses import replace
-from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -27,22 +26,21 @@ from hobble.report.character import (
     packed_statistics,
     playable_with_recogniser,
 )
+from hobble.runtime.options import Runtime
+from tests.report.browser import Browser
 
 
 @pytest.fixture(scope="module")
-def walks(examples: ModuleType, holden31: Skeleton) -> dict[str, Array]:
+def walks(walk: Array, holden31: Skeleton) -> dict[str, Array]:
     """Walks (F, J, 3), cm: even, with noise in every joint, along a curve, and on the spot."""
-    even = examples.walker(holden31, 240, 2.2)["positions"].astype(float)
-    frames, rng = np.arange(240), np.random.default_rng(4)
-    uneven = even + 1.5 * np.sin(frames[:, None, None] / 19 + rng.uniform(0, 6, even.shape[1:]))
-    knee = holden31.role("right_knee")
-    uneven[:, knee, 2] += 4 * np.sin(frames / 9) ** 2
+    frames, rng = np.arange(len(walk)), np.random.default_rng(4)
+    uneven = walk + 1.5 * np.sin(frames[:, None, None] / 19 + rng.uniform(0, 6, walk.shape[1:]))
+    uneven[:, holden31.role("right_knee"), 2] += 4 * np.sin(frames / 9) ** 2
     angle = np.radians(0.15) * frames
     turned = uneven.copy()
     turned[..., 0] = np.cos(angle)[:, None] * uneven[..., 0] + np.sin(angle)[:, None] * uneven[..., 2]
     turned[..., 2] = np.cos(angle)[:, None] * uneven[..., 2] - np.sin(angle)[:, None] * uneven[..., 0]
-    still = even - even[:, :1] * [1, 0, 1]
-    found = {"even": even, "uneven": uneven, "bending": turned, "on the spot": still}
+    found = {"even": walk, "uneven": uneven, "bending": turned, "on the spot": walk - walk[:, :1] * [1, 0, 1]}
     return {name: np.round(places, 6) for name, places in found.items()}
 
 
@@ -110,23 +108,19 @@ def test_c_recognises_the_same_limps_as_python(library: ctypes.CDLL) -> None:
     assert len(labels) >= 4, "the cases are called different things"
 
 
-def test_a_walk_is_compared_with_the_healthy_walk_of_the_same_figure(
-    network: Network, examples: ModuleType, holden31: Skeleton, monkeypatch: pytest.MonkeyPatch
+def test_there_is_no_recogniser_for_a_figure_that_stays_on_the_spot_or_has_no_knees(
+    network: Network, runtime: Runtime, holden31: Skeleton, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """There is no answer for a figure that stays on the spot or has no knees."""
-    spec, healthy = (
-        playable_with_recogniser(network, examples.RUNTIME), healthy_walk(network, holden31, examples.RUNTIME)
-    )  # fmt: skip
-    assert spec["recogniser"]["healthy"] == [healthy[name] for name in PROFILE_IN_C]
-    assert healthy["speed_per_leg"] > 0.5
     without = {role: joint for role, joint in holden31.roles.items() if role != "left_knee"}
-    assert healthy_walk(network, replace(holden31, roles=without), examples.RUNTIME) is None
+    assert healthy_walk(network, replace(holden31, roles=without), runtime) is None
     monkeypatch.setattr("hobble.report.character.AHEAD", (0.0, 0.0))
-    assert healthy_walk(network, holden31, examples.RUNTIME) is None
-    assert "recogniser" not in playable_with_recogniser(network, examples.RUNTIME)
+    assert healthy_walk(network, holden31, runtime) is None
+    assert "recogniser" not in playable_with_recogniser(network, runtime)
 
 
-def test_the_panel_shows_the_recognised_limp(tab: Any, walks: dict[str, Array], holden31: Skeleton) -> None:
+def test_the_panel_shows_the_recognised_limp(
+    tab: Browser, walks: dict[str, Array], holden31: Skeleton
+) -> None:
     """The recogniser in Play uses three seconds, and asks the user to walk if there is no cycle."""
     healthy = profile_of_walk(measure_cycles(holden31, walks["even"], 60))
     recogniser = packed_statistics() | {
@@ -135,9 +129,9 @@ def test_the_panel_shows_the_recognised_limp(tab: Any, walks: dict[str, Array], 
     }
     said = {}
     for name in ("even", "on the spot"):
-        frames = walks[name].reshape(240, -1).tolist()
+        frames = walks[name].reshape(len(walks[name]), -1).tolist()
         said[name] = tab.run(f"""(() => {{
-          const spec = {{ ...Hobble.material.playable.example, recogniser: {json.dumps(recogniser)} }};
+          const spec = {{ ...Hobble.material.playable.test, recogniser: {json.dumps(recogniser)} }};
           const watch = Hobble.watch(spec);
           {json.dumps(frames)}.forEach((places) => watch.add(places));
           return watch.say();

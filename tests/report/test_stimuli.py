@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 from pathlib import Path
-from types import ModuleType
 
 import numpy as np
 import pytest
@@ -17,11 +16,12 @@ from hobble.core.errors import HobbleError
 from hobble.core.skeleton import Skeleton
 from hobble.figure.mesh import body_mesh
 from hobble.figure.pack import links_of_bones
-from hobble.models.load import load_network
 from hobble.models.network import Network
 from hobble.motion.read import read_bvh
 from hobble.report import stimuli
 from hobble.report.raster import BODY, BodyRenderer, Camera
+from hobble.runtime.loops import RepeatedWalk
+from hobble.runtime.options import Runtime
 
 UPRIGHT = np.tile(quat.IDENTITY, (19, 1))
 
@@ -37,15 +37,6 @@ def standing(holden31: Skeleton) -> np.ndarray:
     for j, p in enumerate(holden31.parents):
         place[j] = holden31.offsets[j] + (place[p] if p >= 0 else 0)
     return place[body_mesh(holden31).bones] - [0, place[:, 1].min() - 2.7, 0]
-
-
-def test_there_are_thirteen_walks_of_the_study_and_one_for_each_preset(network: Network) -> None:
-    wanted = [loop for *_, loop in stimuli.all_loops(network)]
-    assert len(injury_shown.PLAIN_LOOPS) == 13
-    assert [loop.coloured for loop in wanted] == [False] * 13 + [True] * 4
-    hurt = [tuple(sorted(loop.values)) for loop in wanted if not loop.coloured]
-    assert len(set(hurt)) == 13, "no two are the same"
-    assert dict(wanted[1].values) == {"LeftUpLeg-LeftLeg": injury_shown.LOOP_SEVERITY}
 
 
 def test_the_body_stands_where_the_camera_says(studio: BodyRenderer, standing: np.ndarray) -> None:
@@ -82,19 +73,21 @@ def test_the_injured_part_is_coloured_if_requested(
     assert np.all(np.abs(columns - x[knee]) < 15)
 
 
-def test_the_distance_of_walks_ignores_start_and_heading(holden31: Skeleton) -> None:
-    time, joints = np.arange(134), len(holden31.joints)
-    swing = 20 * np.sin(2 * np.pi * (time[:, None] / 67 + np.linspace(0, 1, joints)))
-    place = np.stack([0 * swing, 90 + swing, 2.0 * time[:, None] + swing], axis=-1)
+def test_the_distance_of_walks_ignores_start_and_heading(walk: np.ndarray) -> None:
+    def loop(positions: np.ndarray, way: tuple[float, float, float]) -> RepeatedWalk:
+        return RepeatedWalk(positions, np.tile(quat.IDENTITY, (*positions.shape[:2], 1)), np.array(way), 0.0)
 
-    def loop(positions: np.ndarray, way: tuple[float, float, float]) -> stimuli.RepeatedWalk:
-        return stimuli.RepeatedWalk(positions, np.zeros((*positions.shape[:2], 4)), np.array(way), 0.0)
-
-    walk = loop(place, (0, 0, 268))
-    turned = loop(np.roll(place, 20, axis=0)[..., [2, 1, 0]] * [1, 1, -1] + [500, 0, 7], (268, 0, 0))
-    assert stimuli.loop_distance(turned, walk) < 1e-9
-    lame = place + np.where(np.arange(joints) == 5, 31.0, 0.0)[:, None] * [1, 0, 0]
-    assert stimuli.loop_distance(loop(lame, (0, 0, 268)), walk) == pytest.approx(31 / joints)
+    place = walk - [0, 0, 1] * walk[:, :1] + np.arange(len(walk))[:, None, None] * [0, 0, 2.0]
+    first, length = loop(place, (0, 0, 2.0 * len(place))), 2.0 * len(place)
+    later = np.roll(place, 20, axis=0) + np.where(np.arange(len(place)) < 20, -length, 0)[:, None, None] * [
+        0,
+        0,
+        1,
+    ]
+    turned = loop(later[..., [2, 1, 0]] * [1, 1, -1] + [500, 0, 7], (length, 0, 0))
+    assert stimuli.loop_distance(turned, first) < 0.1
+    lame = place + np.where(np.arange(31) == 5, 31.0, 0.0)[:, None] * [1, 0, 0]
+    assert stimuli.loop_distance(loop(lame, (0, 0, length)), first) == pytest.approx(1, abs=0.1)
 
 
 def test_stimuli_without_a_visible_injury_get_a_warning() -> None:
@@ -117,21 +110,21 @@ def test_stimuli_without_a_visible_injury_get_a_warning() -> None:
 
 
 def test_a_loop_is_written_as_pictures_and_bvh(
-    network: Network, examples: ModuleType, tmp_path: Path, monkeypatch
+    network: Network, runtime: Runtime, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(injury_shown, "PLAIN_LOOPS", {"healthy": (), "left-foot": ("left foot",)})
     monkeypatch.setattr(injury_shown, "PRESETS", {"Bad back": {"lower back": 8}})
     x_mean = network.x_mean.copy()
     x_mean[network.layout.x_channel("injury")][network.channels["injury"].index("LeftFoot-LeftToeBase")] = 0.5
     network = replace(network, x_mean=x_mean)  # a network that learnt from a hurt left foot, and nothing else
-    stimuli.write_stimuli(network, tmp_path / "a", examples.RUNTIME, size=64)
-    names = {"healthy", "left-foot", "preset-bad-back"}
+    stimuli.write_stimuli(network, tmp_path / "a", runtime, size=64)
+    names = ["healthy", "left-foot", "preset-bad-back", "guarding-guarding"]
     assert {p.name for p in (tmp_path / "a").iterdir()} == {"stimuli.json"} | {
         f"{n}.{kind}" for n in names for kind in ("webp", "bvh")
     }
     listed = json.loads((tmp_path / "a/stimuli.json").read_text())["stimuli"]
-    assert [row["name"] for row in listed] == ["healthy", "left-foot", "preset-bad-back"]
-    assert [row["untrained"] for row in listed] == [[], [], ["Hips-LowerBack"]]
+    assert [row["name"] for row in listed] == names
+    assert [row["untrained"] for row in listed[:3]] == [[], [], ["Hips-LowerBack"]]
     assert listed[0]["from_plain_cm"] == 0 != listed[1]["from_plain_cm"]
     with Image.open(tmp_path / "a/left-foot.webp") as image:
         frames = len(read_bvh(tmp_path / "a/left-foot.bvh"))
@@ -142,9 +135,8 @@ def test_a_loop_is_written_as_pictures_and_bvh(
 
 
 def test_a_network_that_cannot_be_hurt_says_which_can(
-    examples: ModuleType, holden31: Skeleton, tmp_path: Path
+    network: Network, runtime: Runtime, tmp_path: Path
 ) -> None:
-    examples.weights(tmp_path / "weights.npz", holden31, links=False)
     with pytest.raises(HobbleError, match="`channels`"):
-        stimuli.write_stimuli(load_network(tmp_path / "weights.npz"), tmp_path / "out", examples.RUNTIME)
+        stimuli.write_stimuli(replace(network, channels={}), tmp_path / "out", runtime)
     assert not (tmp_path / "out").exists()

@@ -12,21 +12,7 @@ from hobble.runtime.ground import CELL, Heightmap
 from tests.runtime.walking import hills, walk
 
 
-def test_terrain_may_be_a_function_a_heightmap_or_an_array(network) -> None:
-    cell = 4.0
-    grid = (np.arange(401) - 200) * cell
-    heights = hills(grid[None, :], grid[:, None])
-    coarse = Heightmap(heights, cell)
-    motions = [
-        [p.positions for p in walk(ProceduralAnimation(network, steering=1.0), 40, terrain=terrain)]
-        for terrain in (hills, coarse, None)
-    ]
-    np.testing.assert_allclose(motions[0], motions[1], atol=0.2)
-    assert np.abs(np.subtract(motions[0], motions[2])).max() > 2
-    one, other = ProceduralAnimation(network), ProceduralAnimation(network)
-    np.testing.assert_array_equal(
-        walk(one, 9, terrain=heights)[-1].positions, walk(other, 9, terrain=Heightmap(heights))[-1].positions
-    )
+def test_what_is_no_terrain_is_refused(network) -> None:
     with pytest.raises(TypeError, match="not str"):
         ProceduralAnimation(network).next_pose((0, 1), terrain="hill")
     with pytest.raises(ValueError, match="2 x 2"):
@@ -57,12 +43,6 @@ def test_a_heightmap_is_in_the_callers_axes_and_unit(network, handed: str, up: s
     np.testing.assert_allclose(root(sampled(CELL * axes.scale)), expected, atol=0.5)
     level = root(np.full((8, 8), 1.0))["XYZ".index(up)]
     assert level == pytest.approx(1 / axes.scale, abs=1e-3)
-
-
-def test_a_heightmap_is_bilinear_and_its_border_continues() -> None:
-    ground = Heightmap(np.array([[0.0, 10.0], [20.0, 50.0]]), cell=2.0, centre=(5.0, 7.0))
-    x, z = np.array([4.0, 6.0, 4.0, 6.0, 5.0, 99.0]), np.array([6.0, 6.0, 8.0, 8.0, 7.0, -99.0])
-    np.testing.assert_allclose(ground(x, z), [0, 10, 20, 50, 20, 10])
 
 
 @pytest.mark.parametrize("unit", ["m"])

@@ -1,4 +1,4 @@
-"""Feet stand on the ground under them, and raise the heel or the body where a leg cannot reach."""
+"""Feet stay where they landed and on the ground; legs reach them without moving too fast."""
 
 from __future__ import annotations
 
@@ -6,20 +6,138 @@ import itertools
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from hobble.core import quat
-from hobble.core.skeleton import Skeleton
-from hobble.runtime.animation import ProceduralAnimation
+from hobble.core.skeleton import Skeleton, forward_kinematics, two_bone_knee
 from hobble.runtime.feet import (
     BODY_FREE,
-    FLOATING,
+    LOCK_AT,
+    MISSED,
+    RELEASE,
+    STEP_FRAMES,
+    STEP_HEIGHT,
     STRETCH,
+    TOO_FAR,
     carry_body,
     foot_parts,
     leg_joints,
+    place_feet,
     rest_facing,
 )
-from tests.runtime.one_figure import Feet, crouched
+from hobble.runtime.leg_reach import bend_leg
+
+
+def crouched(skeleton: Skeleton, thigh: float = 0.5, knee: float = 0.9) -> tuple[np.ndarray, np.ndarray]:
+    """Positions (J, 3) and world rotations (J, 4) of a figure. Radians: thighs forward, knees bent."""
+    local = np.tile([1.0, 0, 0, 0], (1, len(skeleton.joints), 1))
+    for side in ("left", "right"):
+        local[0, skeleton.role(f"{side}_hip")] = quat.from_axis_angle([1.0, 0, 0], -thigh)
+        local[0, skeleton.role(f"{side}_knee")] = quat.from_axis_angle([1.0, 0, 0], knee)
+    rotations, positions = forward_kinematics(skeleton, local, np.array([[0.0, 90.0, 0.0]]))
+    return positions[0], rotations[0]
+
+
+class Feet:
+    """`place_feet` with its state, on one figure."""
+
+    def __init__(self, skeleton: Skeleton, *bent: float) -> None:
+        self.legs = leg_joints(skeleton)
+        self.below = foot_parts(skeleton, self.legs)
+        self.lock, self.hold, self.lift = np.zeros((1, 2)), np.zeros((1, 2, 2)), np.zeros((1, 2))
+        self.step, self.missed = np.zeros((1, 2)), np.zeros((1, 2))
+        self.added = np.tile([1.0, 0, 0, 0], (1, 2, 2, 1))
+        self.ahead, self.fastest = rest_facing(skeleton), 1e8
+        self.base = crouched(skeleton, *bent)
+        self.shown, self.height = self.base[0][None, self.legs[:, 1:]], np.zeros(1)
+
+    def __call__(
+        self,
+        moved: np.ndarray,
+        contact: float,
+        ground: float | None = None,
+        locking: bool = True,
+        other: float = 0.0,
+    ):
+        if ground is None:  # just under the feet, neither sunk nor floating
+            ground = min(self.base[0][self.legs[0, 2], 1] - 5.0, self.base[0][self.legs[0, 3], 1] - 4.0) - 1.0
+        position, rotation = self.base[0][None] + moved, self.base[1][None].copy()
+        contacts = np.array([[contact, contact, other, other]], np.float32)
+        legs = self.legs, self.below, np.array([5.0, 4.0]), self.ahead, self.fastest
+        held = self.lock, self.hold, self.step, self.missed
+        feet = held, self.lift, self.added, self.shown, self.height, np.zeros(1)
+        place_feet(contacts, np.full((1, 4), ground), locking, legs, feet, position, rotation)
+        self.contacts, self.ground = contacts[0], ground
+        self.rotation = rotation[0]
+        return position[0]
+
+
+def test_a_foot_in_contact_stays_and_is_released_slowly(holden31: Skeleton) -> None:
+    feet = Feet(holden31)
+    toe = holden31.role("left_toe")
+    step = np.array([0.0, 0, 1.5])
+    first = feet(0 * step, LOCK_AT)[toe]
+    for k in range(1, 8):
+        np.testing.assert_allclose(feet(k * step, 1.0)[toe], first, atol=1e-9)
+    free = feet.base[0][toe] + 8 * step
+    np.testing.assert_allclose(feet(8 * step, 0.0)[toe], free + (1 - RELEASE) * (first - free), atol=1e-6)
+    for _ in range(20):
+        last = feet(8 * step, 0.0)[toe]
+    np.testing.assert_allclose(last, free, atol=1e-9)
+
+
+def glide(
+    feet: Feet, speed: float, frames: int, **contacts: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The left toe (F, 3), where the network has it (F, 3), and whether it counts as standing (F,).
+
+    The figure moves forward by `speed` cm a frame, and the network says that its feet stand.
+    """
+    toe = feet.legs[0, 3]
+    shown, network, stands = [], [], []
+    for k in range(frames):
+        moved = np.array([0.0, 0, speed * k])
+        shown.append(feet(moved, 1.0, **contacts)[toe])
+        network.append(feet.base[0][toe] + moved)
+        stands.append(feet.contacts[1] >= LOCK_AT)
+    return np.array(shown), np.array(network), np.array(stands)
+
+
+@pytest.mark.parametrize("speed", [0.4, 2.0])
+def test_a_gliding_foot_steps_instead_of_sliding(holden31: Skeleton, speed: float) -> None:
+    """While a foot counts as standing it does not move. Otherwise it is in the air."""
+    feet = Feet(holden31)
+    shown, network, stands = glide(feet, speed, int(150 / speed), other=1.0)
+    still = stands[1:] & stands[:-1]
+    moves = np.linalg.norm(np.diff(shown, axis=0)[:, ::2], axis=1)
+    assert moves[still].max() < 1e-6
+    assert np.abs(shown - network)[:, 2].max() < TOO_FAR + 2 * speed
+    edges = np.flatnonzero(np.diff(stands.astype(int)))
+    lengths = np.diff(edges)[::2]
+    assert len(lengths) >= 3
+    assert set(lengths) == {STEP_FRAMES - 1}
+    high = shown[:, 1] - network[:, 1]
+    for a, b in zip(edges[::2], edges[1::2], strict=False):
+        assert STEP_HEIGHT - 1.5 < high[a + 1 : b + 1].max() < STEP_HEIGHT
+        assert 0.3 < high[a + 1] < 2.5, "it rises and comes down gradually"
+        assert high[b] < 2.5
+        assert np.linalg.norm(shown[b + 1] - network[b + 1]) < 0.5, "it lands where the network has it"
+
+
+def test_a_foot_that_its_leg_cannot_reach_steps(holden31: Skeleton) -> None:
+    """The body rises by 30 cm, further than a leg stretches, while the foot is held 8 cm ahead."""
+    feet = Feet(holden31, 0.2, 0.35)
+    toe = holden31.role("left_toe")
+    first = feet(np.zeros(3), 1.0, other=1.0)[toe]
+    slid = []
+    for k in range(1, 20):
+        shown = feet(np.array([0.0, min(1.5 * k, 30.0), -8.0]), 1.0, ground=0.0, other=1.0)[toe]
+        if feet.contacts[1] < LOCK_AT:
+            break
+        slid.append(np.hypot(*(shown - first)[::2]))
+    assert feet.contacts[1] == 0.0
+    assert 0.0 < max(slid) < MISSED + 2.0
 
 
 def stretched(position: np.ndarray, legs: np.ndarray) -> float:
@@ -65,33 +183,6 @@ def test_feet_are_lifted_out_of_the_ground(holden31: Skeleton) -> None:
     )
 
 
-def test_a_standing_foot_that_floats_comes_down(holden31: Skeleton) -> None:
-    feet = Feet(holden31)
-    toe, heel = holden31.role("left_toe"), holden31.role("left_heel")
-    low = min(feet.base[0][toe, 1] - 4.0, feet.base[0][heel, 1] - 5.0)
-    for gap, left in ((8.0, FLOATING), (2.0, 2.0)):
-        for _ in range(30):
-            standing = feet(np.zeros(3), 1.0, ground=low - gap)
-        assert min(standing[toe, 1] - 4.0, standing[heel, 1] - 5.0) - (low - gap) == pytest.approx(
-            left, abs=0.01
-        )
-    for _ in range(60):
-        flying = feet(np.zeros(3), 0.0, ground=low - 8.0)
-    assert flying[toe, 1] == pytest.approx(feet.base[0][toe, 1], abs=1e-3)
-
-
-@pytest.mark.parametrize("slope", [0.0, 0.3])
-def test_the_character_stands_on_the_ground_it_is_given(steady, slope: float) -> None:
-    character = ProceduralAnimation(steady)
-    skeleton = steady.skeleton
-    heights = [
-        character.next_pose((0, 1.5), terrain=lambda x, z: slope * z).positions[skeleton.role("hips"), 1]
-        for _ in range(200)
-    ]
-    # A figure that climbs a slope of .3 at 1.5 cm a frame rises .45 cm a frame.
-    np.testing.assert_allclose(np.diff(heights[120:]).mean(), slope * 1.5, atol=0.01)
-
-
 def test_standing_feet_raise_and_lower_the_body(holden31: Skeleton) -> None:
     """The foot in contact decides how far the body is raised or lowered; the hips stay within their range."""
     base, _ = crouched(holden31)
@@ -122,3 +213,79 @@ def test_standing_feet_raise_and_lower_the_body(holden31: Skeleton) -> None:
     above = base[hips, 1] - soles[0]
     assert carried_to(soles[0], soles[0], stands, -far, above - 6) == pytest.approx(-6)
     assert carried_to(soles[0], soles[0], [0.0] * 4, above + 5, far) == pytest.approx(5)
+
+
+@given(*[st.floats(-25, 25)] * 3)
+@settings(max_examples=40, deadline=None)
+def test_reaching_with_a_leg_equals_two_bone_ik(holden31: Skeleton, x: float, y: float, z: float) -> None:
+    position, rotation = crouched(holden31)
+    hip, knee, heel, _ = leg_joints(holden31)[0]
+    before, turned = position.copy(), rotation.copy()
+    shift = np.array([x, y, z])
+    added, leg = np.tile([1.0, 0, 0, 0], (2, 1)), leg_joints(holden31)[0]
+    for _ in range(12):  # enough frames to reach any of the targets
+        position, rotation = before.copy(), turned.copy()
+        bend_leg(position, rotation, leg, shift, rest_facing(holden31), added, (before[leg[1:]], 0.0, 1e8))
+    upper, lower = (
+        np.linalg.norm(before[knee] - before[hip]),
+        np.linalg.norm(before[heel] - before[knee]),
+    )
+    leg = before[heel] - before[hip]
+    pole = quat.rotate(quat.between(leg, leg + shift), before[knee] - before[hip])
+    expected = two_bone_knee(before[hip], before[heel] + shift, pole, upper, lower)
+    np.testing.assert_allclose(position[knee], expected[0], atol=1e-6)
+    np.testing.assert_allclose(position[heel], expected[1], atol=1e-6)
+    # The bones' rotations go with them, the others stay.
+    for joint, child in ((hip, knee), (knee, heel)):
+        bone = quat.rotate(quat.inv(turned[joint]), before[child] - before[joint])
+        moved = quat.rotate(rotation[joint], bone)
+        np.testing.assert_allclose(moved, position[child] - position[joint], atol=1e-6)
+    others = [j for j in range(len(position)) if j not in (hip, knee)]
+    np.testing.assert_array_equal(rotation[others], turned[others])
+
+
+def ahead_of_leg(position: np.ndarray, leg: np.ndarray) -> float:
+    """How far the knee is in front of the line from hip to heel, cm."""
+    hip, knee, heel, _ = position[leg]
+    share = (knee[1] - hip[1]) / (heel[1] - hip[1])
+    return float((knee - hip - share * (heel - hip))[2])
+
+
+def test_a_knee_that_passes_the_line_from_hip_to_heel_stays_in_front(holden31: Skeleton) -> None:
+    """The network's leg gets straight and bends backward, while its foot is held. The knee does not flip."""
+    feet = Feet(holden31, 0.25, 0.5)
+    hip, knee, heel, toe = feet.legs[0]
+    straight, knees = feet.base[0].copy(), []
+    line = straight[heel] - straight[hip]
+    line /= np.linalg.norm(line)
+    out = straight[knee] - straight[hip] - line * ((straight[knee] - straight[hip]) @ line)
+    out /= np.linalg.norm(out)
+    middle = straight[hip] + 0.46 * (straight[heel] - straight[hip])
+    for k, ahead in enumerate(np.linspace(4, -4, 60)):
+        feet.base[0][knee] = middle + ahead * out
+        shown = feet(np.array([0.0, 0, min(0.2 * k, 6.0)]), 1.0)
+        assert ahead_of_leg(shown, feet.legs[0]) > 1
+        knees.append(shown[knee])
+    assert np.linalg.norm(np.diff(knees, axis=0), axis=1).max() < 2
+    for _ in range(10):  # also without a foot that is held
+        free = feet(np.zeros(3), 0.0)
+    assert ahead_of_leg(free, feet.legs[0]) > 1
+    np.testing.assert_allclose(free[toe], straight[toe], atol=0.1)
+
+
+def test_knee_heel_and_toe_move_no_further_in_a_frame_than_allowed(holden31: Skeleton) -> None:
+    """The network jumps at random. When it stops, the leg gets to where it is without the limit."""
+    fastest = {}
+    for limit in (9.0, 1e8):
+        rng, feet = np.random.default_rng(4), Feet(holden31)
+        feet.fastest = limit
+        below, shown = feet.legs[0, 1:], [feet.base[0]]
+        for _ in range(300):
+            moved, contact, ground = rng.uniform(-4, 4, 3), rng.integers(2), rng.uniform(-5, 25)
+            shown.append(feet(moved, contact, ground=ground))
+        fastest[limit] = np.linalg.norm(np.diff(np.array(shown)[:, below], axis=0), axis=-1).max()
+        for _ in range(60):
+            last = feet(np.zeros(3), 0.0, ground=-50.0)
+        np.testing.assert_allclose(last, feet.base[0], atol=1e-3)
+    assert fastest[9.0] <= 9.0 + 1e-6
+    assert fastest[1e8] > 12

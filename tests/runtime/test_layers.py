@@ -45,22 +45,6 @@ def test_a_character_waves_and_looks_while_it_walks(network, axes: Axes, rig: st
             assert now == pytest.approx(was, abs=1e-9)
 
 
-def test_a_look_is_limited_and_weighted(network) -> None:
-    character = ProceduralAnimation(network)
-    pose = walk(character, 20)[-1]
-    before, head = facing(character, pose), pose.positions[character.skeleton.role("head")]
-    behind = head - 100 * before + [0.0, 1.0, 0.0]
-
-    def turned(**options: float) -> float:
-        after = facing(character, character.layers.look_at(pose, behind, **options))
-        return float(np.degrees(np.arccos(np.clip(before @ after, -1, 1))))
-
-    assert turned(most=50.0) == pytest.approx(50, abs=1e-6)
-    assert turned(most=50.0, weight=0.5) == pytest.approx(25, abs=1e-6)
-    assert turned(most=180.0, weight=0.25) == pytest.approx(45, abs=3)
-    assert turned(weight=0.0) == pytest.approx(0, abs=0.01)
-
-
 def test_parts_play_the_frame_of_another_clip(network) -> None:
     """For a crowd: the named joints get these local rotations, half of the way with half of the weight."""
     character = ProceduralAnimation(network, characters=3)

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from hobble.channels.speed_limits import UNLIMITED, Limits
-from hobble.core.errors import InputError
-from hobble.models.load import load_network
 from hobble.models.network import Network
 from hobble.runtime.animation import ProceduralAnimation
 
@@ -69,28 +66,3 @@ def test_steering_does_not_exceed_the_limit(limited: Network) -> None:
     assert speed < 1.0
     speed, _ = speed_and_gait(limited, (0, 2.5), {}, steering=2.0)
     assert speed > 2.5
-
-
-def test_a_network_file_keeps_its_limits(limited: Network, tmp_path) -> None:
-    def saved(limits) -> Network:
-        arrays = {f"W{i}": w for i, w in enumerate(limited.weights)} | {
-            f"b{i}": b for i, b in enumerate(limited.biases)
-        }
-        for key in ("x_mean", "x_std", "y_mean", "y_std"):
-            arrays[key.capitalize().replace("_", "")] = getattr(limited, key)
-        meta = {
-            "layout": limited.layout.to_dict(),
-            "skeleton": limited.skeleton.to_dict(),
-            "channels": {"injury": list(limited.channels["injury"])},
-            "limits": limits,
-        }
-        np.savez(tmp_path / "weights.npz", **arrays, meta=np.array(json.dumps(meta)))
-        return load_network(tmp_path)
-
-    table = limited.limits["injury"].to_dict()
-    np.testing.assert_array_equal(
-        saved({"injury": table}).limits["injury"].speeds, limited.limits["injury"].speeds
-    )
-    for wrong in ({"injury": {**table, "levels": [0, 9]}}, {"mood": table}, {"injury": 3}, [table]):
-        with pytest.raises(InputError, match=r"weights\.npz"):
-            saved(wrong)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,6 +13,7 @@ from hobble.runtime import scenarios as runtime_scenarios
 from hobble.runtime.glb import export_glb
 from hobble.runtime.options import Runtime
 from hobble.runtime.scenarios import generate_scenarios, scenarios
+from tests.figure.glb import Glb
 
 
 def test_a_walk_is_cut_where_it_repeats() -> None:
@@ -43,28 +43,14 @@ def test_each_gait_is_in_the_file_as_a_loop_healthy_and_hurt(
     monkeypatch.setattr(runtime_scenarios, "scenarios", lambda _: short)
     generate_scenarios(hurtable, tmp_path / "scenarios.npz", tmp_path / "bvh", Runtime())
     export_glb(tmp_path / "a.glb", hurtable, tmp_path / "scenarios.npz", Runtime())
-    data = (tmp_path / "a.glb").read_bytes()
-    length = int.from_bytes(data[12:16], "little")
-    document, numbers = json.loads(data[20 : 20 + length]), data[28 + length :]
-
-    def values(animation: dict, node: str, path: str) -> np.ndarray:
-        """What the animation gives a node: (keys, 3 or 4)."""
-        number = next(j for j, each in enumerate(document["nodes"]) if each["name"] == node)
-        target = {"node": number, "path": path}
-        sampler = next(c["sampler"] for c in animation["channels"] if c["target"] == target)
-        accessor = document["accessors"][animation["samplers"][sampler]["output"]]
-        view = document["bufferViews"][accessor["bufferView"]]
-        size = {"VEC3": 3, "VEC4": 4}[accessor["type"]]
-        return np.frombuffer(numbers, "<f4", accessor["count"] * size, view["byteOffset"]).reshape(-1, size)
-
-    animations = {animation["name"]: animation for animation in document["animations"]}
+    file = Glb(tmp_path / "a.glb")
     for gait in loops.SPEEDS:
         for hurt in ("", "_left_knee", "_lower_back"):
-            still, moving = animations[f"{gait}{hurt}_loop"], animations[f"{gait}{hurt}_loop_root_motion"]
-            assert not values(still, "root", "translation").any()
-            assert values(moving, "root", "translation")[:, 0] == pytest.approx(0, abs=1e-4)
+            still, moving = f"{gait}{hurt}_loop", f"{gait}{hurt}_loop_root_motion"
+            assert not file.keys(still, "root", "translation").any()
+            assert file.keys(moving, "root", "translation")[:, 0] == pytest.approx(0, abs=1e-4)
             for animation in (still, moving):  # the last pose is the first one
                 for node, path in (("Hips", "translation"), ("LeftLeg", "rotation"), ("Spine1", "rotation")):
-                    found = values(animation, node, path)
+                    found = file.keys(animation, node, path)
                     assert found[-1] == pytest.approx(found[0], abs=1e-4)
-    assert set(animations) > {"walk", "jog"}  # the scenarios
+    assert set(file.animations) > {"walk", "jog"}  # the scenarios

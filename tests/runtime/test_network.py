@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -61,16 +60,6 @@ def test_no_phase_reads_outside_the_table(phase: float) -> None:
             assert around[[0, -1]].tolist() == [7, 7]
             assert around[1:-1].sum() == pytest.approx(1, abs=1e-6)
             assert np.count_nonzero(around[1:-1]) <= blended
-
-
-def test_a_column_that_never_varied_is_ignored(network: Network) -> None:
-    std = network.x_std.copy()
-    std[5] = 0
-    blind = replace(network, x_std=std).predictor()
-    x, phase = rows(network)
-    before = blind.predict(x, phase)
-    x[:, 5] += 1e6
-    np.testing.assert_array_equal(before, blind.predict(x, phase))
 
 
 def test_release_folder_round_trip(tmp_path: Path, network: Network, holden31) -> None:

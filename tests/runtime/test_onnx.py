@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import numpy as np
-import onnx
 import onnxruntime
 import pytest
 
 from hobble.cli.__main__ import main
-from hobble.core.skeleton import Skeleton
-from hobble.models.onnx_file import OPSET, TOLERANCE, export, write_checked
+from hobble.models.onnx_file import TOLERANCE, write_checked
 from hobble.models.pfnn import OPTIONS
 from hobble.models.pfnn.release import write_release
-from hobble.rows.layout import RowLayout
 
 
 def run(path: Path, x: np.ndarray, phase: np.ndarray) -> np.ndarray:
@@ -37,21 +33,6 @@ def test_onnxruntime_predicts_the_same_as_the_runtime(
         phase = rng.uniform(-1, 2, rows).astype(np.float32)
         y = run(tmp_path / "network.onnx", x, phase)
         np.testing.assert_allclose(y, network.predictor(mode).predict(x, phase.astype(float)), atol=1e-4)
-
-
-def test_the_file_describes_its_inputs_and_outputs(hurtable, tmp_path: Path) -> None:
-    export(tmp_path / "network.onnx", hurtable, "linear")
-    model = onnx.load(tmp_path / "network.onnx")
-    assert [(o.domain, o.version) for o in model.opset_import] == [("", OPSET)]
-    shapes = [[d.dim_param or d.dim_value for d in v.type.tensor_type.shape.dim] for v in model.graph.input]
-    assert shapes == [["batch", 372], ["batch"]]
-    (meta,) = (json.loads(p.value) for p in model.metadata_props if p.key == "hobble")
-    assert meta["mode"] == "linear"
-    assert RowLayout.from_dict(meta["layout"]) == hurtable.layout
-    assert meta["channels"]["injury"] == list(hurtable.channels["injury"])
-    assert Skeleton.from_dict(meta["skeleton"]).joints == hurtable.skeleton.joints
-    export(tmp_path / "again.onnx", hurtable, "linear")
-    assert (tmp_path / "again.onnx").read_bytes() == (tmp_path / "network.onnx").read_bytes()
 
 
 def test_the_command_exports_onnx(

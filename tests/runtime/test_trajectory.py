@@ -74,19 +74,6 @@ def test_yaw_velocity_is_that_of_the_world_seen_from_the_root() -> None:
     np.testing.assert_allclose(direction[0, MIDDLE], [np.sin(0.05), np.cos(0.05)], atol=1e-6)
 
 
-def test_future_samples_are_at_their_frames_and_continue_in_a_line() -> None:
-    position, direction, gait = path()
-    y = prediction(speed=2.0)
-    y[0, LAYOUT.y_position][: LAYOUT.future] = [0, 1, 4, 9, 16, 25]
-    move(y, position, direction, gait)
-    root = position[0, MIDDLE]
-    samples = position[0, MIDDLE :: LAYOUT.step] - root
-    np.testing.assert_allclose(samples, np.stack([[0, 1, 4, 9, 16, 25], 20.0 * np.arange(6)], 1), atol=1e-5)
-    steps = np.diff(position[0, MIDDLE + 50 :], axis=0)
-    np.testing.assert_allclose(steps, np.tile([0.9, 2.0], (9, 1)), atol=1e-5)
-    np.testing.assert_allclose(np.linalg.norm(direction[0], axis=-1), 1, atol=1e-6)
-
-
 def test_a_standing_figure_does_not_drift() -> None:
     position, direction, gait = path(stand=1.0)
     phase = move(prediction(speed=2.0, turn=0.1), position, direction, gait)
@@ -99,10 +86,8 @@ def test_a_standing_figure_does_not_drift() -> None:
     ("target", "moved"),
     [
         ((0.0, 0.0), (0.375, 1.5)),  # the target is to stand
-        ((0.0, 3.0), (0.5, 2.0)),
         ((2.0, 2.0), (0.5, 2.0)),
         ((0.0, -3.0), (0.5, 1.5)),  # against the target, but not across it
-        ((-1.0, 0.0), (0.375, 2.0)),
     ],
 )
 def test_movement_against_the_target_is_reduced(target, moved) -> None:
@@ -114,11 +99,8 @@ def test_movement_against_the_target_is_reduced(target, moved) -> None:
 @pytest.mark.parametrize(
     ("target", "moved"),
     [
-        ((0.0, 2.0), (0.0, 2.0)),  # as the target
         ((0.0, 2.1), (0.0, 2.1)),  # reached with less than the whole share
-        ((0.0, 9.0), (0.0, 2.2)),  # faster
         ((0.0, 0.0), (0.0, 1.6)),  # to stop
-        ((5.0, 0.0), (0.2, 1.6)),  # to the left
         ((3.0, 4.0), (0.12 + 0.32, 2.0 + 0.16 - 0.24)),  # faster, and more to the left
     ],
 )
@@ -145,33 +127,13 @@ def test_strafing_follows_from_velocity_and_facing(
     np.testing.assert_allclose(yaw, np.pi / 2 * (1 - (1 - t) ** direction_bias), atol=1e-9)
 
 
-def test_velocity_direction_and_gait_approach_the_target_at_their_rates() -> None:
-    position, heading, gait = path(0.0, stand=1.0)
-    velocity, direction, strafe = np.zeros((1, 2)), np.array([[0.0, 1.0]]), np.zeros(1)
-    shares = np.eye(6)[[1]]
-    target = np.array([[2.0, 0.0]]), np.array([[1.0, 0.0]]), np.ones(1), shares
-    correction = np.zeros((1, 2))
-    trajectory.follow_target(
-        target, 0.0, (velocity, direction, strafe, correction), (position, heading, gait)
-    )
-    np.testing.assert_allclose(velocity, [[1.8, 0]])
-    np.testing.assert_allclose(np.arctan2(*direction[0]), 0.9 * np.pi / 2)
-    np.testing.assert_allclose(strafe, 0.9)
-    np.testing.assert_allclose(gait[0, MIDDLE], [0.9, 0.1, 0, 0, 0, 0])
-    np.testing.assert_allclose(gait[0, MIDDLE - 1], [1, 0, 0, 0, 0, 0])
-
-
 @pytest.mark.parametrize(
     ("steering", "target", "corrected"),
     [
         (0.0, (0.0, 2.0), (0.0, 2.0)),
         (1.0, (0.0, 1.5), (0.0, 1.5)),  # what is reached is not corrected
-        (1.0, (0.0, 2.0), (0.0, 2.5)),
         (2.0, (0.5, 2.0), (1.5, 3.0)),
-        (1.0, (0.0, 9.0), (0.0, 16.5)),
         (3.0, (0.0, 9.0), (0.0, 27.0)),  # at most twice as much again
-        (1.0, (0.0, 0.3), (0.0, -0.3)),
-        (1.0, (0.0, 0.0), (0.0, 0.0)),
     ],
 )
 def test_steering_adds_the_error_to_the_target(steering: float, target: tuple, corrected: tuple) -> None:

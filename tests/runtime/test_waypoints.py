@@ -33,13 +33,6 @@ def test_a_point_that_follows_its_target_reaches_all_waypoints() -> None:
     np.testing.assert_allclose(frames[4:8], expected, rtol=0.03)
 
 
-def test_the_distance_from_the_path_is_that_from_its_line() -> None:
-    follower = Follower(SQUARE)
-    for place, distance in (((30.0, 500.0), 30.0), ((-40.0, -30.0), 50.0), ((0.0, 10.0), 0.0)):
-        follower.lead(np.array([place]))
-        assert follower.off_path[0] == pytest.approx(distance)
-
-
 def test_the_character_follows_waypoints(network) -> None:
     character = ProceduralAnimation(network, waypoints=SQUARE, steering=0.0)
     pose = character.next_pose()

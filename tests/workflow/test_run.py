@@ -125,6 +125,6 @@ def test_every_export_is_made(copied) -> None:
     names = ("hobble.js", "hobble.d.ts", "index.html", "example.js")
     assert all((export / "web" / name).stat().st_size > 500 for name in names)
     assert (export / "engine/character.hob").read_bytes()[:6] == b"HOBBLE"
-    assert len(list((export / "engine/traces").iterdir())) == 8
+    assert len(list((export / "engine/traces").iterdir())) == 9
     assert len(list((export / "pfnn").glob("W0_*.bin"))) == 50
     assert (export / "linear.onnx").stat().st_size > 1e4

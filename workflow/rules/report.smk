@@ -67,7 +67,6 @@ rule report:
     input:
         measurements=lambda w: configuration(w).result_files(),
         pipeline=rules.pipeline_summary.output.json,
-        scenarios=rules.generate.output.scenarios,
         configuration=rules.configuration.output.yaml,
         weights=network_file("weights.npz"),
         history=network_file("history.csv"),

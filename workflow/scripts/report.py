@@ -8,7 +8,7 @@ from hobble.models.load import load_network
 from hobble.report.character import opening_slider, playable_with_recogniser
 from hobble.report.gather import gather
 from hobble.report.page import render_report
-from hobble.report.recorded_motion import packed_comparisons, packed_scenes
+from hobble.report.recorded_motion import packed_comparisons
 from hobble.runtime.options import Runtime
 from hobble.workflow.job import Inputs, job
 
@@ -38,12 +38,11 @@ with job(snakemake):
         rows=rows,
         measures=all_measures(),
     )
-    walks = packed_scenes(files.scenarios, material.network["skeleton"])
     network = load_network(files.weights)
     runtime = Runtime.model_validate(material.resolved["configuration"]["runtime"])
     character = playable_with_recogniser(network, runtime)
     opening = opening_slider(character, material.measurements.values())
     captured_and_predicted = packed_comparisons(network, rows, params.splits)
     bundle = Path(files.bundle).read_text(encoding="utf-8")
-    page = render_report(material, walks, character, captured_and_predicted, bundle, opening)
+    page = render_report(material, character, captured_and_predicted, bundle, opening)
     write_text(snakemake.output.html, page)

@@ -30,7 +30,7 @@ from hobble.runtime.controller import FPS
 from hobble.runtime.feet import foot_parts, leg_joints, rest_facing, sole_heights
 from hobble.runtime.options import Runtime
 
-MAGIC, VERSION, ORDER_MARK = b"HOBBLE\r\n", 2, 0x01020304
+MAGIC, VERSION, ORDER_MARK = b"HOBBLE\r\n", 3, 0x01020304
 HEADER, ENTRY, ALIGNMENT = 64, 40, 64
 TYPES = {"int32": 1, "float32": 2, "float64": 3, "int16": 4, "uint8": 5}
 # Standardised inputs are multiplied by 1 / standard deviation. With a smaller factor an input has no effect,
@@ -78,21 +78,6 @@ def character_bytes(network: Network, runtime: Runtime, storage: str | None = No
     }
     sections |= _body_sections(network) | _channel_sections(network, runtime)
     return _packed(sections)
-
-
-def coarsened(file: bytes) -> bytes:
-    """A character file whose int16 weights are rounded to multiples of 128, so that it compresses to half.
-
-    A weight then has 9 bits. Other numbers stay.
-    """
-    content = bytearray(file)
-    for at in range(HEADER, HEADER + ENTRY * int.from_bytes(file[28:32], "little"), ENTRY):
-        name, kind, offset, count = struct.unpack_from("<16sQQQ", file, at)
-        if name.rstrip(b"\0") == b"weights" and kind == TYPES["int16"]:
-            weights = np.frombuffer(content, "<i2", count, offset)
-            weights[:] = 128 * np.clip(np.round(weights / 128), -255, 255)
-    content[24:28] = struct.pack("<I", zlib.adler32(content[HEADER:]))
-    return bytes(content)
 
 
 # The numbers of the section "sizes", in their order; those from "form" on depend on the kind of network, see
@@ -177,6 +162,7 @@ def _channel_sections(network: Network, runtime: Runtime) -> Sections:
     return {
         **joined,
         "channel_of": joined["channel_of"].astype(np.int32),
+        "slows": np.array([channel(name).slows for name in network.channels], np.uint8),
         "limit_levels": levels,
         "limits": np.concatenate(limits).astype(float),
         "names": np.frombuffer("".join(f"{name}\0" for name in names).encode(), np.uint8),

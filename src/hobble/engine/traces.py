@@ -1,8 +1,9 @@
-"""Golden traces: inputs and poses of the Python runtime in eight situations, to check ports against.
+"""Golden traces: inputs and poses of the Python runtime in nine situations, to check ports against.
 
 A trace file, little-endian: the magic bytes, uint32 version, frames F, joints J, channel columns K, rows and
-columns of a grid of ground heights (both 0 on flat ground at 0), float64 cm between two of its rows or
-columns, and its heights as float32, row by row. The grid's middle is the origin. Then come F records of
+columns of a grid of ground heights (both 0 on flat ground at 0), seed of the variation, float64 amount of the
+variation and cm between two rows or columns of the grid, and its heights as float32, row by row. The grid's
+middle is the origin. Then come F records of
 float32 numbers. A record has the inputs of a frame: target velocity (2), facing (2; 0, 0: where it goes),
 number of the gait (-1: by speed), and the value of each channel column (K); then the pose: root (3), yaw,
 phase, contacts (4), positions (J, 3), rotations (J, 4). Units and axes are those of `c/hobble.h`; the
@@ -27,7 +28,8 @@ from hobble.runtime.animation import ProceduralAnimation
 from hobble.runtime.ground import Heightmap
 from hobble.runtime.options import Runtime
 
-MAGIC, VERSION, FRAMES = b"HOBTRACE", 1, 600
+SEED = 7  # of the variation
+MAGIC, VERSION, FRAMES = b"HOBTRACE", 2, 600
 CELL, SIDE = 20.0, 129  # cm between two heights of the hills, and how many heights they have on a side
 
 
@@ -41,7 +43,7 @@ class Situation:
     """velocity, facing: functions from the frame to x and z; facing (0, 0) is where the character goes.
 
     gait: its name; None: by speed. hurt: whether channel values rise after two seconds. hills: whether the
-    ground is uneven.
+    ground is uneven. variation: how much steps differ.
     """
 
     velocity: Callable[[int], Array]
@@ -49,6 +51,7 @@ class Situation:
     gait: str | None = "walk"
     hurt: bool = False
     hills: bool = False
+    variation: float = 0.0
 
 
 SITUATIONS: Mapping[str, Situation] = {
@@ -62,6 +65,7 @@ SITUATIONS: Mapping[str, Situation] = {
         lambda f: _vector(0 if f % 240 < 120 else 1, 90 * (1 + f // 240)),
     ),
     "hurt": Situation(lambda f: _vector(2.5, 0.3 * f), hurt=True),
+    "varied": Situation(lambda f: _vector(2.5, 0.3 * f), hurt=True, variation=1.0),
     "hills": Situation(lambda f: _vector(2.5, 0.4 * f), gait=None, hurt=True, hills=True),
 }
 
@@ -91,7 +95,9 @@ def trace(
 
     frames: its length. storage: how the weights are stored, as in `hobble.engine.hob.character_bytes`.
     """
-    animation = ProceduralAnimation(network, storage=storage, **dict(runtime))
+    animation = ProceduralAnimation(
+        network, storage=storage, variation=situation.variation, seed=SEED, **dict(runtime)
+    )
     grid = hills() if situation.hills else np.zeros((0, 0), np.float32)
     terrain = Heightmap(grid, CELL) if situation.hills else None
     hurt = channel_values(network)
@@ -121,8 +127,8 @@ def trace(
             ).astype("<f4")
         )
     columns = sum(map(len, network.channels.values()))
-    header = VERSION, frames, len(pose.positions), columns, *grid.shape, CELL
-    return struct.pack("<8s6Id", MAGIC, *header) + grid.astype("<f4").tobytes() + np.array(records).tobytes()
+    header = VERSION, frames, len(pose.positions), columns, *grid.shape, SEED, situation.variation, CELL
+    return struct.pack("<8s7I2d", MAGIC, *header) + grid.astype("<f4").tobytes() + np.array(records).tobytes()
 
 
 def write_traces(folder: Path, network: Network, runtime: Runtime) -> None:

@@ -22,9 +22,8 @@ from hobble.figure.rig import Rig, rig_of
 
 METRES = 0.01  # metres per centimetre
 LEAST_MOVEMENT = 1e-5  # a joint counts as still if each component of its rotation varies by less than this
-COLOUR = (0.72, 0.72, 0.69, 1.0)  # of the body: red, green, blue, opacity
 # Codes of glTF for the type of numbers, and for the use of an array (vertices, indices of triangles).
-COMPONENTS = {"float32": 5126, "uint8": 5121, "uint16": 5123, "uint32": 5125}
+COMPONENTS = {"float32": 5126, "uint8": 5121, "uint16": 5123}
 ARRAY, ELEMENTS = 34962, 34963
 
 
@@ -108,7 +107,7 @@ def write_glb(path: str | Path, skeleton: Skeleton, motions: Iterable[BodyMotion
     mesh, buffer = body_mesh(skeleton), _Buffer()
     bones = rig_of(skeleton, mesh)
     count = len(bones.names)
-    material: dict[str, object] = {"metallicFactor": 0.0, "roughnessFactor": 0.8}
+    material = {"baseColorTexture": {"index": 0}, "metallicFactor": 0.0, "roughnessFactor": 0.8}
     document: dict[str, object] = {
         "asset": {"version": "2.0", "generator": "Hobble"},
         "scene": 0,
@@ -124,22 +123,12 @@ def write_glb(path: str | Path, skeleton: Skeleton, motions: Iterable[BodyMotion
                 "inverseBindMatrices": buffer.add(_inverse_bind_matrices(bones), "MAT4"),
             }
         ],
+        "textures": [{"source": 0, "sampler": 0}],
+        "samplers": [{}],
+        "images": [
+            {"name": "clay", "mimeType": "image/jpeg", "bufferView": buffer.add_bytes(TEXTURE.read_bytes())}
+        ],
     }
-    if mesh.uv is None:
-        material["baseColorFactor"] = list(COLOUR)
-    else:
-        material["baseColorTexture"] = {"index": 0}
-        document |= {
-            "textures": [{"source": 0, "sampler": 0}],
-            "samplers": [{}],
-            "images": [
-                {
-                    "name": "clay",
-                    "mimeType": "image/jpeg",
-                    "bufferView": buffer.add_bytes(TEXTURE.read_bytes()),
-                }
-            ],
-        }
     if animations := [_animation(motion, bones, buffer) for motion in motions]:
         document["animations"] = animations
     document |= {
@@ -174,9 +163,8 @@ def _primitive(mesh: Mesh, bones: Rig, buffer: _Buffer) -> dict[str, object]:
 
     A corner with several places in the texture is in the file as often.
     """
-    uv = np.zeros((len(mesh.faces), 3, 2)) if mesh.uv is None else mesh.uv
     found, faces = np.unique(
-        np.column_stack([mesh.faces.ravel(), uv.reshape(-1, 2)]), axis=0, return_inverse=True
+        np.column_stack([mesh.faces.ravel(), mesh.uv.reshape(-1, 2)]), axis=0, return_inverse=True
     )
     corner, uv = found[:, 0].astype(int), found[:, 1:]
     weights = whole_weights(mesh.weights[corner])
@@ -190,13 +178,11 @@ def _primitive(mesh: Mesh, bones: Rig, buffer: _Buffer) -> dict[str, object]:
         "NORMAL": buffer.add(normals, "VEC3", ARRAY),
         "JOINTS_0": buffer.add(bone, "VEC4", ARRAY),
         "WEIGHTS_0": buffer.add(weights, "VEC4", ARRAY, normalized=True),
+        "TEXCOORD_0": buffer.add(uv.astype(np.float32), "VEC2", ARRAY),
     }
-    if mesh.uv is not None:
-        attributes["TEXCOORD_0"] = buffer.add(uv.astype(np.float32), "VEC2", ARRAY)
-    wide = np.uint32 if len(corner) > 65535 else np.uint16
     return {
         "attributes": attributes,
-        "indices": buffer.add(faces.ravel().astype(wide), "SCALAR", ELEMENTS),
+        "indices": buffer.add(faces.ravel().astype(np.uint16), "SCALAR", ELEMENTS),
         "material": 0,
     }
 

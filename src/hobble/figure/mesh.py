@@ -19,7 +19,7 @@ from hobble.core import quat
 from hobble.core.compiled import njit
 from hobble.core.files import load_npz
 from hobble.core.quat import Array
-from hobble.core.skeleton import Skeleton, rest_positions
+from hobble.core.skeleton import NEEDED_ROLES, Skeleton, rest_positions
 
 FIGURE = Path(__file__).with_name("body.npz")
 TEXTURE = Path(__file__).with_name("body.jpg")
@@ -29,10 +29,6 @@ LEGS_OUT = np.radians(5.0)  # angle between the legs and the vertical
 SHORTEST_BONE = 0.5  # cm; a shorter bone is not turned, because it hardly has a direction
 LEG_LENGTH, TOE_HEIGHT = 81.0, 2.5  # cm, of the figure: from hip to ankle; from sole to ball of the foot
 MOST_BONES = 4  # at most this many bones move a corner
-# The roles that a skeleton must have for a body in the shape of a person.
-NEEDED = ("hips", "head", *(f"{s}_{r}" for s in SIDES for r in ("shoulder", "hip", "knee", "heel", "toe")))
-# If a role of NEEDED is missing, the body consists of rods: half widths at their upper and lower end, cm.
-STICK = (2.6, 1.9)
 
 
 @dataclass(frozen=True)
@@ -53,8 +49,8 @@ class Pose:
 def modelled_pose(skeleton: Skeleton) -> Pose:
     """A skeleton in the pose of the sculpted figure: arms and legs are spread, so that no parts touch.
 
-    Its rest pose must stand and face +Z (see config/skeletons/README.md). Raises KeyError if a role of NEEDED
-    is missing.
+    Its rest pose must stand and face +Z (see config/skeletons/README.md). Raises KeyError if one of
+    `hobble.core.skeleton.NEEDED_ROLES` is missing.
     """
     joint_of = _find_bones(skeleton)
     aims = _bone_directions(joint_of)
@@ -83,16 +79,18 @@ def _has_role(skeleton: Skeleton, role: str) -> bool:
 
 def _find_bones(skeleton: Skeleton) -> dict[str, int]:
     """`Pose.joint_of` for a skeleton."""
+    for role in NEEDED_ROLES:
+        skeleton.role(role)  # raises KeyError with the name of the missing role
     found = {role: skeleton.role(role) for role in skeleton.roles if _has_role(skeleton, role)}
-    hips = found["hips"]
-    found.setdefault("neck", max(skeleton.parents[found["head"]], 0))
-    found.setdefault("chest", _common_joint(skeleton, found["left_shoulder"], found["right_shoulder"]))
-    found.setdefault("spine", _first_below(skeleton, hips, found["chest"]))
+    top = next(found[role] for role in ("head", "neck", "chest", "spine", "hips") if role in found)
+    found.setdefault("neck", max(skeleton.parents[found["head"]], 0) if "head" in found else top)
+    found.setdefault("head", top)
     for side in SIDES:
+        found.setdefault(f"{side}_shoulder", top)
         found.setdefault(f"{side}_elbow", found[f"{side}_shoulder"])
         found.setdefault(f"{side}_wrist", found[f"{side}_elbow"])
-        for role in ("hip", "knee", "heel", "toe"):
-            skeleton.role(f"{side}_{role}")  # raises KeyError with the name of the missing role
+    found.setdefault("chest", _common_joint(skeleton, found["left_shoulder"], found["right_shoulder"]))
+    found.setdefault("spine", _first_below(skeleton, found["hips"], found["chest"]))
     return found
 
 
@@ -145,13 +143,18 @@ def _with_missing_roles(known: dict[str, Array]) -> dict[str, Array]:
     The positions of the missing roles are estimated. The factors are rough proportions of a person.
     """
     out = dict(known)
+    leg = float(np.linalg.norm(out["hips"] - out["left_heel"]))
+    out.setdefault("head", out["hips"] + [0.0, 0.7 * leg, 0.0])
+    for side, sign in zip(SIDES, (1.0, -1.0), strict=True):
+        way = 0.72 * (out["head"] - out["hips"])
+        out.setdefault(f"{side}_shoulder", out["hips"] + way + [sign * 0.2 * leg, 0.0, 0.0])
     middle = (out["left_shoulder"] + out["right_shoulder"]) / 2
     out.setdefault("neck", middle + 0.35 * (out["head"] - middle))
     out.setdefault("chest", out["hips"] + 0.62 * (out["neck"] - out["hips"]))
     out.setdefault("spine", out["hips"] + 0.45 * (out["chest"] - out["hips"]))
     for side, sign in zip(SIDES, (1.0, -1.0), strict=True):
         arm = np.array([sign * np.cos(ARMS_DOWN), -np.sin(ARMS_DOWN), 0.06])
-        upper_arm = 0.33 * np.linalg.norm(out["hips"] - out[f"{side}_heel"])  # length, cm
+        upper_arm = 0.33 * leg  # length, cm
         out.setdefault(f"{side}_elbow", out[f"{side}_shoulder"] + upper_arm * arm)
         out.setdefault(f"{side}_wrist", out[f"{side}_elbow"] + 0.85 * upper_arm * arm)
     return out
@@ -161,29 +164,29 @@ def _with_missing_roles(known: dict[str, Array]) -> dict[str, Array]:
 class Mesh:
     """A body in the rest pose of its skeleton, centimetres.
 
-    corners, normals: (V, 3). faces: (T, 3) indices of corners, counter-clockwise seen from outside. shade:
-    (V,) brightness of each corner: 1 if the body covers none of the corner's surroundings, 0.15 if the body
-    covers them all. uv: (T, 3, 2) where each corner of a triangle is in the texture, x to the right and y
-    down, from 0 to 1; None without a texture. bones: (B,) joints of the skeleton that move the body.
-    bones_of_corner: (V, 4) the bones that move each corner, as indices into `bones`. weights: (V, 4) weights
-    of these bones, which sum to 1. positions (B, 3), rotations (B, 4): the bones in the rest pose, in which
-    no bone is turned.
+    corners, normals: (V, 3). faces: (T, 3) indices of corners, counter-clockwise seen from outside. coarse:
+    fewer triangles between some of the corners, for slow machines. shade: (V,) brightness of each corner: 1
+    if the body covers none of the corner's surroundings, 0.15 if the body covers them all. uv: (T, 3, 2)
+    where each corner of a triangle is in the texture, x to the right and y down, from 0 to 1. bones: (B,)
+    joints of the skeleton that move the body. bones_of_corner: (V, 4) the bones that move each corner, as
+    indices into `bones`. weights: (V, 4) weights of these bones, which sum to 1. positions: (B, 3) of the
+    bones in the rest pose, in which no bone is turned.
     """
 
     corners: Array = field(repr=False)
     normals: Array = field(repr=False)
     faces: NDArray[np.int64] = field(repr=False)
+    coarse: NDArray[np.int64] = field(repr=False)
     shade: Array = field(repr=False)
-    uv: Array | None = field(repr=False)
+    uv: Array = field(repr=False)
     bones: NDArray[np.int64] = field(repr=False)
     bones_of_corner: NDArray[np.int64] = field(repr=False)
     weights: Array = field(repr=False)
     positions: Array = field(repr=False)
-    rotations: Array = field(repr=False)
 
     def posed(self, positions: Array, rotations: Array) -> Array:
         """Corners (V, 3) of the body for world positions (B, 3) and rotations (B, 4) of its bones."""
-        turn = quat.to_matrix(quat.mul(rotations, quat.inv(self.rotations)))
+        turn = quat.to_matrix(rotations)
         move = positions - np.einsum("bij,bj->bi", turn, self.positions)
         return _skinned(self.corners, self.bones_of_corner, self.weights, turn, move)
 
@@ -206,7 +209,7 @@ def _skinned(
 
 
 def body_mesh(skeleton: Skeleton) -> Mesh:
-    """The body of a skeleton: a person if the skeleton has the roles NEEDED, else a rod for every bone.
+    """The body of a skeleton.
 
     The mesh depends only on the joints (with their parents and offsets) and the roles. Skeletons that agree
     in these share one mesh.
@@ -229,8 +232,6 @@ def _joints_and_roles(skeleton: Skeleton) -> str:
 def _build_mesh(joints_and_roles: str) -> Mesh:
     """The mesh of the skeleton with these joints and roles (JSON)."""
     skeleton = Skeleton.from_dict({"name": "body", **json.loads(joints_and_roles)})
-    if not all(_has_role(skeleton, role) for role in NEEDED):
-        return _sticks(skeleton)
     figure, pose, rest = load_npz(FIGURE), modelled_pose(skeleton), rest_positions(skeleton)
     roles, bones, weights = figure["roles"].tolist(), figure["bones"], figure["weights"].astype(float)
     weights /= weights.sum(axis=1, keepdims=True)
@@ -258,13 +259,13 @@ def _build_mesh(joints_and_roles: str) -> Mesh:
         corners,
         normals,
         figure["faces"].astype(np.int64),
+        figure["coarse"].astype(np.int64),
         figure["shade"] / 255,
         figure["uv"] / 65535,
         used,
         order,
         np.take_along_axis(shares, order, axis=1),
         rest[used],
-        np.tile(quat.IDENTITY, (len(used), 1)),
     )
 
 
@@ -330,52 +331,3 @@ def _bone_axes(at: dict[str, Array], scale: float) -> dict[str, tuple[Array, Arr
 
 def _unit(v: Array) -> Array:
     return v / max(float(np.linalg.norm(v)), 1e-9)
-
-
-def _sticks(skeleton: Skeleton) -> Mesh:
-    """A body of rods, one for every bone, in the rest pose."""
-    rest = rest_positions(skeleton)
-    ends = [(p, rest[p], rest[j]) for j, p in enumerate(skeleton.parents) if p >= 0]
-    ends = ends or [(0, rest[0], rest[0])]
-    rods = [_rod(a, b) for _, a, b in ends]
-    corners, faces = rods[0]
-    size, count = len(corners), len(rods)
-    corners, bones = np.concatenate([rod for rod, _ in rods]), np.unique([bone for bone, _, _ in ends])
-    middle = np.repeat([(a + b) / 2 for _, a, b in ends], size, axis=0)
-    normals = np.array([_unit(v) for v in corners - middle])
-    owner = np.repeat(np.searchsorted(bones, [bone for bone, _, _ in ends]), size)
-    return Mesh(
-        corners,
-        normals,
-        np.concatenate([faces + k * size for k in range(count)]),
-        np.ones(len(corners)),
-        None,
-        bones,
-        np.pad(owner[:, None], ((0, 0), (0, MOST_BONES - 1))),
-        np.tile([1.0] + [0.0] * (MOST_BONES - 1), (len(corners), 1)),
-        rest[bones],
-        np.tile(quat.IDENTITY, (len(bones), 1)),
-    )
-
-
-def _rod(start: Array, end: Array, sides: int = 12) -> tuple[Array, NDArray[np.int64]]:
-    """Corners and triangles of a closed rod with round ends."""
-    way = end - start
-    along = _unit(way) if np.linalg.norm(way) > SHORTEST_BONE else np.array([0.0, 1, 0])
-    across = _unit(np.cross(along, [0.0, 0, 1] if abs(along[2]) < 0.9 else [1.0, 0, 0]))
-    third, angles = np.cross(along, across), np.linspace(0, 2 * np.pi, sides, endpoint=False)
-    around = np.cos(angles)[:, None] * across + np.sin(angles)[:, None] * third
-    rings = [
-        place + radius * (np.sin(tilt) * along + np.cos(tilt) * around)
-        for place, radius, tilts in ((start, STICK[0], (-60, -30, 0)), (end, STICK[1], (0, 30, 60)))
-        for tilt in np.radians(tilts)
-    ]
-    tips = [start - STICK[0] * along, end + STICK[1] * along]
-    count, last = len(rings), sides * len(rings)
-    k, other = np.arange(sides), (np.arange(sides) + 1) % sides
-    faces = [np.stack([np.full(sides, last), other, k], 1)]
-    for ring in range(count - 1):
-        a, b = ring * sides, (ring + 1) * sides
-        faces += [np.stack([a + k, a + other, b + k], 1), np.stack([a + other, b + other, b + k], 1)]
-    faces.append(np.stack([np.full(sides, last + 1), last - sides + k, last - sides + other], 1))
-    return np.concatenate([*rings, np.array(tips)]), np.concatenate(faces)

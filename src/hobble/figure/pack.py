@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hobble.core import quat
 from hobble.core.files import to_base64
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
@@ -19,33 +18,30 @@ from hobble.figure.mesh import Mesh, body_mesh
 from hobble.figure.rig import rig_of
 
 UNIT = 0.01  # cm; positions of corners are stored as multiples of this
-TURN = 32767  # the integer that stands for 1 in packed rotations
 
 
 def packed_body(skeleton: Skeleton) -> dict[str, Any]:
     """The mesh of a skeleton's body, and the data with which a page moves it.
 
     Most keys are fields of `Mesh`. `corners` are in multiples of `unit` (cm), `normals` of 1/127, `shade` of
-    1/255. `wide`: whether `faces` are 32-bit instead of 16-bit. `bone`, `share`: the `bones_of_corner` and
+    1/255. `bone`, `share`: the `bones_of_corner` and
     `weights` of `Mesh`, weights in multiples of 1/255. `keep`: the joints that are bones of the mesh.
-    `places`, `turns`: positions and rotations of these joints in the bind pose. `balls`: result of
-    `part_spheres`. `rig`: the bones of `rig_of`, for files, the joints of the skeleton from number 1 on.
+    `places`: positions of these joints in the rest pose. `balls`: result of `part_spheres`. `rig`: the bones
+    of `rig_of`, for files, the joints of the skeleton from number 1 on.
     """
     mesh = body_mesh(skeleton)
     bones = rig_of(skeleton, mesh)
-    index_type = np.uint16 if len(mesh.corners) < 1 << 16 else np.uint32
     return {
         "unit": UNIT,
         "corners": to_base64(np.round(mesh.corners / UNIT).astype(np.int16)),
         "normals": to_base64(np.round(mesh.normals * 127).astype(np.int8)),
         "shade": to_base64(np.round(mesh.shade * 255).astype(np.uint8)),
-        "faces": to_base64(mesh.faces.astype(index_type)),
-        "wide": index_type is np.uint32,
+        "faces": to_base64(mesh.faces.astype(np.uint16)),
+        "coarse": to_base64(mesh.coarse.astype(np.uint16)),
         "bone": to_base64(mesh.bones_of_corner.astype(np.uint8)),
         "share": to_base64(whole_weights(mesh.weights)),
         "keep": mesh.bones.tolist(),
         "places": np.round(mesh.positions, 4).tolist(),
-        "turns": np.round(mesh.rotations, 6).tolist(),
         "balls": np.round(part_spheres(mesh), 2).tolist(),
         "rig": {
             "names": bones.names,
@@ -69,7 +65,7 @@ def part_spheres(mesh: Mesh) -> Array:
     for b in range(len(mesh.bones)):
         if not (moved := main_bone == b).any():
             continue
-        local = quat.rotate(quat.inv(mesh.rotations[b]), mesh.corners[moved] - mesh.positions[b])
+        local = mesh.corners[moved] - mesh.positions[b]
         low, high = local.min(axis=0), local.max(axis=0)
         # The radius is the geometric mean of the half edges of the box around these corners.
         out[b] = [*(low + high) / 2, float(np.prod((high - low) / 2) ** (1 / 3))]
@@ -133,8 +129,3 @@ def link_ends(joints: Sequence[str], links: Sequence[str]) -> list[tuple[int, in
         known = [(joints.index(a), joints.index(b)) for a, b in splits if a in joints and b in joints]
         pairs.append(known[0] if known else None)
     return pairs
-
-
-def packed_turns(rotations: Array) -> str:
-    """Rotations (F, B, 4) as 16-bit integers in base64. The integer TURN stands for 1."""
-    return to_base64(np.round(np.clip(rotations, -1, 1) * TURN).astype(np.int16))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import base64
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
@@ -12,31 +12,18 @@ from hobble.channels import channel
 from hobble.channels.shown import channel_display, channel_words
 from hobble.core.files import to_base64
 from hobble.core.skeleton import Skeleton
-from hobble.engine.hob import character_bytes, coarsened
+from hobble.engine.hob import character_bytes
 from hobble.figure.mesh import mesh_key
 from hobble.gait.cycles import SCALARS, measure_cycles
 from hobble.gait.profile import Profile, profile_of_walk
 from hobble.gait.recognise import LEANING, PARTS, SIDES, STRENGTHS, Grader, grader_of_all_people
 from hobble.models.network import Network
-from hobble.runtime.animation import Pose, ProceduralAnimation
+from hobble.runtime.animation import ProceduralAnimation
 from hobble.runtime.export import restore_bone_lengths
 from hobble.runtime.feet import leg_joints
 from hobble.runtime.options import Runtime
 
 AHEAD = (0.0, 2.5)  # target velocity, cm a frame: as fast as walking in the page's section Play
-
-
-def walk_straight(
-    network: Network, runtime: Runtime, frames: int, channels: Mapping[str, Mapping[str, float]]
-) -> Iterator[tuple[ProceduralAnimation, Pose]]:
-    """Yields the character and its pose after each frame, at 60 Hz. The character is always the same object.
-
-    channels: channel -> column -> value. A channel is a group of inputs of the network, such as the
-    severities of injuries, and a column is one of them. Columns that are not given have the value 0.
-    """
-    animation = ProceduralAnimation(network, **dict(runtime))
-    for _ in range(frames):
-        yield animation, animation.next_pose(AHEAD, None, "walk", **channels)
 
 
 def playable_data(network: Network, runtime: Runtime) -> dict[str, Any]:
@@ -64,12 +51,6 @@ def playable_data(network: Network, runtime: Runtime) -> dict[str, Any]:
         "legs": leg_joints(skeleton).tolist(),
         "body": mesh_key(skeleton),
     }
-
-
-def coarse_weights(spec: Mapping[str, Any]) -> dict[str, Any]:
-    """The data of a character, from `playable_data`, with weights that compress to half."""
-    file = coarsened(base64.b64decode(spec["file"]))
-    return {**spec, "file": base64.b64encode(file).decode("ascii")}
 
 
 def shown_channels(network: Network, scales: Mapping[str, float]) -> list[dict[str, Any]]:
@@ -134,44 +115,31 @@ def opening_slider(playable: Mapping[str, Any], measurements: Iterable[Mapping[s
     results of each measurement.
 
     In the result, `part` is the label of a slider, or None if no channel has sliders. It is the slider that
-    makes the walk limp most. If no limps were measured, it is the slider that changes the pose most. If poses
-    were not measured either, it is the first slider. `value` is its value, in tenths of the highest.
+    makes the walk limp most; the first one if no limps were measured. `value` is its value, in tenths of the
+    highest.
     """
     channel = opening_channel(playable)
     if channel is None:
         return {"part": None, "value": 0}
     # Column -> label of its slider.
     labels = {channel["columns"][i]: label for label, i in channel["sliders"].items()}
-    # Column -> its highest rank. A row of a table names its column under "link".
-    ranks: dict[str, tuple[float, float]] = {}
-    for results in measurements:
-        # `responses`: how much the pose changes with severity. `sizes`: how large each limp is.
-        for table, rank in (("responses", _pose_change_rank), ("sizes", _limp_rank)):
-            for row in results.get(table) or ():
-                if row.get("gait") == "walk" and row["link"] in labels:
-                    ranks[row["link"]] = max(ranks.get(row["link"], (0.0, 0.0)), rank(row))
-    best = max(ranks, key=lambda column: ranks[column]) if ranks else next(iter(labels))
-    return {"part": labels[best], "value": OPENING_VALUE}
+    # Column -> its strongest limp. A row of the limps that were measured names its column under "link".
+    limps = dict.fromkeys(labels, 0.0)
+    for row in (row for results in measurements for row in results.get("sizes") or ()):
+        if row.get("gait") == "walk" and row["link"] in labels:
+            limps[row["link"]] = max(limps[row["link"]], _limp_size(row))
+    return {"part": labels[max(limps, key=lambda column: limps[column])], "value": OPENING_VALUE}
 
 
-def _pose_change_rank(row: Mapping[str, Any]) -> tuple[float, float]:
-    """A rank by how far severity 10 moves the joints, cm. It is below the rank of every walk that limps.
-
-    Limps come first because people open the page to see a limp. If only the change of pose counted, the back
-    would win, because a hurt back bends the whole figure.
-    """
-    return 0.0, row.get("from_healthy_cm") or 0.0
-
-
-def _limp_rank(row: Mapping[str, Any]) -> tuple[float, float]:
-    """A rank by how much the limp changes the walk: the changes of stance, step and knee, added up.
+def _limp_size(row: Mapping[str, Any]) -> float:
+    """How much a limp changes the walk: the changes of stance, step and knee, added up.
 
     `stance`: how much longer the sound leg stands than the hurt one, as a share of the cycle; the healthy
     walk has 0. `step_hurt`, `knee_hurt`: length of the step and range of the knee of the hurt leg, divided
     by those of the healthy walk.
     """
     ratios = [row.get(name) for name in ("step_hurt", "knee_hurt")]
-    return abs(row.get("stance") or 0.0) + sum(abs(1 - ratio) for ratio in ratios if ratio is not None), 0.0
+    return abs(row.get("stance") or 0.0) + sum(abs(1 - ratio) for ratio in ratios if ratio is not None)
 
 
 def body_channel(playable: Mapping[str, Any]) -> Mapping[str, Any] | None:
@@ -214,9 +182,9 @@ def healthy_walk(network: Network, skeleton: Skeleton, runtime: Runtime) -> Prof
     """
     if not all(f"{side}_{part}" in skeleton.roles for side in SIDES for part in ROLES):
         return None
-    poses = [pose for _, pose in walk_straight(network, runtime, HEALTHY_WARM_UP + HEALTHY_MEASURED, {})][
-        HEALTHY_WARM_UP:
-    ]
+    animation = ProceduralAnimation(network, **dict(runtime))
+    poses = [animation.next_pose(AHEAD, None, "walk") for _ in range(HEALTHY_WARM_UP + HEALTHY_MEASURED)]
+    poses = poses[HEALTHY_WARM_UP:]
     positions, rotations = np.array([p.positions for p in poses]), np.array([p.rotations for p in poses])
     walk = measure_cycles(skeleton, restore_bone_lengths(skeleton, positions, rotations)[1], 60)
     return profile_of_walk(walk) if len(walk) else None

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from hobble.figure.pack import packed_body
-from hobble.report.character import body_channel, coarse_weights, skeleton_of
+from hobble.report.character import body_channel, skeleton_of
 from hobble.report.parts import (
     Chart,
     Column,
@@ -42,9 +42,9 @@ def render_comparison(
     """The comparison as one HTML document.
 
     compared: the content of compare.json. playables: configuration -> data of a character that its network
-    moves in the page, from `playable_data` in `hobble.report.character`. If these characters do not all fit
-    into the page, the weights of all of them are rounded to 9 bits. Characters that still do not fit are left
-    out. bundle: all scripts of the page as one script. measures: all measurements, for what they show.
+    moves in the page, from `playable_data` in `hobble.report.character`. Characters that do not fit into
+    the page are left out. bundle: all scripts of the page as one script. measures: all measurements, for what
+    they show.
     """
     columns = [column for each in compared_by(measures, "compared_columns", compared) for column in each]
     verdicts = [v for each in compared_by(measures, "compared_verdicts", compared) for v in each]
@@ -70,9 +70,6 @@ def render_comparison(
     bodies = {spec["body"]: packed_body(skeleton_of(spec)) for spec in playables.values()}
     used = sum(map(len, (bundle.encode(), compressed(bodies), *map(compressed, drawn.values()))))
     on_page, left_out = select_fitting(playables, LARGEST_PAGE - RESERVED - used)
-    rounded = {name: coarse_weights(spec) for name, spec in playables.items()} if left_out else {}
-    if left_out:
-        on_page, left_out = select_fitting(rounded, LARGEST_PAGE - RESERVED - used)
     bodies = {spec["body"]: bodies[spec["body"]] for spec in on_page.values()}
     return render_page(
         "compare.html.j2",
@@ -85,7 +82,6 @@ def render_comparison(
         lead="The same measurements of " + ", ".join(names) + ", compared with published results.",
         playable=list(on_page),
         left_out=left_out,
-        rounded=any(rounded[name] != playables[name] for name in on_page if name in rounded),
         hurts=any(body_channel(spec) for spec in on_page.values()),
         **sections,
     )

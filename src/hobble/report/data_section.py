@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -15,13 +15,12 @@ from hobble.core.skeleton import Skeleton
 from hobble.motion.retarget import MOST_DIFFERENCE, most_different
 from hobble.report.gather import ReportMaterial
 from hobble.report.parts import Chart, Column, Table, axis, bar_trace
-from hobble.rows.clip_rows import Excerpt, cut_into_excerpts, load_excerpt, row_count, shuffle_key
+from hobble.rows.clip_rows import ClipRows, cut_into_excerpts, load_excerpt, row_count, shuffle_key
 from hobble.rows.layout import GAITS
 
 MOST_SHOWN = 150  # the terrain of at most this many clips is shown
 MOST_ROWS = 2000  # the table of clips has at most this many rows
 MOST_COUNTED = 600  # at most this many clips are read to count how many seconds of data there are
-MOST_EXCERPTS = 600  # the frames of at most this many excerpts of clips are counted
 MOST_REMARKS = 500  # the table of doubts, warnings and repairs has at most this many rows
 # Split, its name on the page, the colour of its bars.
 SPLITS = (("train", "training", "@muted"), ("held_out", "held out", "@accent"))
@@ -48,8 +47,8 @@ def some_files(paths: Sequence[str], most: int) -> list[str]:
 def seconds_of_data(paths: Sequence[str], splits: Mapping[str, str]) -> dict[str, Any]:
     """Seconds of data in the files `database/clips/<clip>.npz`.
 
-    splits: clip -> "train" or "held_out". At most MOST_COUNTED clips and MOST_EXCERPTS excerpts of them are
-    read; then the seconds are an estimate for all.
+    splits: clip -> "train" or "held_out". If there are more than MOST_COUNTED clips, some are read, and the
+    seconds are an estimate for all.
 
     The result has `both`: split -> seconds at each combination, (bins between two TURN_EDGES, bins between
     two SPEED_EDGES); `channels`: channel -> column -> seconds in each bin of TENTHS; `estimate`: a sentence
@@ -57,13 +56,11 @@ def seconds_of_data(paths: Sequence[str], splits: Mapping[str, str]) -> dict[str
     bins count in the outermost bin. Channel values below half a tenth do not count.
     """
     read_paths = some_files(paths, MOST_COUNTED)
-    chosen, share = _chosen_excerpts(read_paths)
     # Each frame that is read stands for this many seconds of data. The clips have 60 frames a second.
-    weight = len(paths) / max(len(read_paths), 1) / share / 60
+    weight = len(paths) / max(len(read_paths), 1) / 60
     both = {split: np.zeros((len(TURN_EDGES) - 1, len(SPEED_EDGES) - 1)) for split in SPLIT_WORDS}
     channels: dict[str, dict[str, Array]] = {}
-    for path, excerpt in chosen:
-        rows = load_excerpt(path, excerpt)
+    for rows in _in_pieces(read_paths):
         # A frame in which one gait cycle ends and the next begins has two rows. Only the first one counts.
         first_rows = np.unique(rows.frame, return_index=True)[1]
         y, layout = np.asarray(rows.y[first_rows], float), rows.layout
@@ -81,43 +78,16 @@ def seconds_of_data(paths: Sequence[str], splits: Mapping[str, str]) -> dict[str
                 if values.any():
                     counts = np.histogram(10 * values / definition.highest, np.arange(0.5, 11))[0]
                     seconds[column] = seconds.get(column, 0) + counts * weight
-    read = [f"{len(read_paths):,} of {len(paths):,} clips"] if len(paths) > len(read_paths) else []
-    read += [f"{100 * share:.0f} % of their frames"] if share < 1 else []
-    estimate = f" Estimated from {' and '.join(read)}." if read else ""
+    some = len(read_paths) < len(paths)
+    estimate = f" Estimated from {len(read_paths):,} of {len(paths):,} clips." if some else ""
     return {"both": both, "channels": channels, "estimate": estimate}
 
 
-def _chosen_excerpts(paths: Sequence[str]) -> tuple[list[tuple[str, Excerpt]], float]:
-    """The excerpts to read, each with the file of its clip: all, or MOST_EXCERPTS drawn at random.
-
-    Also returns their share of all rows.
-    """
-    every = [
-        (path, excerpt) for path in paths for excerpt in cut_into_excerpts(Path(path).stem, row_count(path))
-    ]
-    if len(every) <= MOST_EXCERPTS:
-        return every, 1.0
-    drawn = sorted(every, key=lambda pair: shuffle_key(f"{pair[1].clip} {pair[1].first}"))[:MOST_EXCERPTS]
-    return drawn, sum(excerpt.rows for _, excerpt in drawn) / sum(excerpt.rows for _, excerpt in every)
-
-
-def _seconds_chart(
-    name: str,
-    title: str,
-    caption: str,
-    seconds: Mapping[str, Sequence],
-    x: Sequence,
-    hover: str,
-    **more: Any,
-) -> Chart | None:
-    """Stacked bars at x; None without data. seconds: split -> heights of its bars. more: of the layout."""
-    traces = [
-        bar_trace(label, x, seconds[split], colour, f"{hover}: %{{y:.1f}} s<extra></extra>")
-        for split, label, colour in SPLITS
-        if any(seconds[split])
-    ]
-    whole = {"barmode": "stack", "yaxis": axis("seconds", rangemode="tozero"), **more}
-    return Chart(name, title, caption, traces, whole, 300) if traces else None
+def _in_pieces(paths: Iterable[str]) -> Iterator[ClipRows]:
+    """The rows of the clips, a long clip in pieces, so that they need little memory."""
+    for path in paths:
+        for excerpt in cut_into_excerpts(Path(path).stem, row_count(path)):
+            yield load_excerpt(path, excerpt)
 
 
 def gait_chart(material: ReportMaterial) -> Chart | None:
@@ -127,29 +97,24 @@ def gait_chart(material: ReportMaterial) -> Chart | None:
         of_split = totals[material.split_of(report["clip"])]
         for gait, seconds in (report.get("seconds") or {}).items():
             of_split[gait] += seconds
+    traces = [
+        bar_trace(label, GAITS, list(totals[split].values()), colour, "%{x}: %{y:.1f} s<extra></extra>")
+        for split, label, colour in SPLITS
+        if any(totals[split].values())
+    ]
+    layout = {"barmode": "stack", "yaxis": axis("seconds", rangemode="tozero"), "xaxis": {"type": "category"}}
     caption = (
         "Seconds of each gait, including mirrored clips. The network learns little of a gait with a low bar."
     )
-    bars = {split: list(seconds.values()) for split, seconds in totals.items()}
-    x_axis = {"type": "category"}
-    return _seconds_chart("gaits", "Seconds of each gait", caption, bars, GAITS, "%{x}", xaxis=x_axis)
+    return Chart("gaits", "Seconds of each gait", caption, traces, layout, 300) if traces else None
 
 
-def speed_and_turn_charts(counted: Mapping[str, Any]) -> list[Chart | None]:
-    """Seconds at each speed, at each turning speed, and at each combination. counted: `seconds_of_data`."""
-    speeds, turns, estimate = _middles(SPEED_EDGES), _middles(TURN_EDGES), counted["estimate"]
-    of_speed, of_turn = (
-        {split: np.round(seconds.sum(axis=axis), 3).tolist() for split, seconds in counted["both"].items()}
-        for axis in (0, 1)
-    )
-    both = sum(counted["both"].values())
+def speed_and_turn_chart(counted: Mapping[str, Any]) -> Chart | None:
+    """Seconds at each combination of speed and turning speed. counted: from `seconds_of_data`."""
+    speeds, turns, both = _middles(SPEED_EDGES), _middles(TURN_EDGES), sum(counted["both"].values())
     if not both.any():
-        return []
+        return None
     shown = int(np.flatnonzero(both.any(axis=0)).max()) + 1  # number of bins of speeds
-    little = "Where there is little or no data, the network has to interpolate."
-    mirrors = "With mirrored clips, left and right are alike."
-    of_turns = {"bargap": 0.08, "xaxis": axis("degrees per second (positive: to the left)")}
-    of_speeds = {"bargap": 0.08, "xaxis": axis("m/s", range=[0, speeds[shown - 1] + 0.3])}
     trace = {
         **_heat_trace(speeds[:shown], turns, both[:, :shown]),
         "colorscale": [[0, "@sunken"], [0.15, "@muted"], [1, "@accent"]],
@@ -158,29 +123,10 @@ def speed_and_turn_charts(counted: Mapping[str, Any]) -> list[Chart | None]:
         "zmin": 0,
         "hovertemplate": "%{x:.1f} m/s, %{y}°/s: %{z:.1f} s<extra></extra>",
     }
-    layout = {"xaxis": axis("m/s"), "yaxis": axis("degrees per second", automargin=True)}
+    turning = axis("degrees per second (positive: to the left)", automargin=True)
+    layout, estimate = {"xaxis": axis("m/s"), "yaxis": turning}, counted["estimate"]
     caption = f"Seconds of data at each combination of speed and turn. {_empty_cells(estimate)}.{estimate}"
-    return [
-        _seconds_chart(
-            "speeds",
-            "Speed over the ground",
-            f"Seconds at each speed. {little}{estimate}",
-            of_speed,
-            speeds,
-            "%{x:.1f} m/s",
-            **of_speeds,
-        ),
-        _seconds_chart(
-            "turns",
-            "Turning speed",
-            f"Seconds of data at each turning speed. {mirrors}{estimate}",
-            of_turn,
-            turns,
-            "%{x}°/s",
-            **of_turns,
-        ),
-        Chart("speed-turn", "Speed and turn combined", caption, [trace], layout, 300),
-    ]
+    return Chart("speed-turn", "Speed and turn", caption, [trace], layout, 300)
 
 
 def channel_charts(counted: Mapping[str, Any], shown_name: Callable[[str], str] = str) -> list[Chart]:

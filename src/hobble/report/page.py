@@ -39,7 +39,6 @@ KIND_ORDER = ("warn", "note", "good", "fact")  # kinds of hints, in the order of
 
 def render_report(
     material: ReportMaterial,
-    scenes: Mapping[str, Any] | None = None,
     playable: Mapping[str, Any] | None = None,
     captured_and_predicted: Mapping[str, Any] | None = None,
     bundle: str = "",
@@ -47,7 +46,7 @@ def render_report(
 ) -> str:
     """The report as one HTML document.
 
-    scenes: from `recorded_motion.packed_scenes`. playable: from `character.playable_data` or
+    playable: from `character.playable_data` or
     `character.playable_with_recogniser`. captured_and_predicted: from `recorded_motion.packed_comparisons`.
     bundle: the page's scripts, from `bundle.bundle_page_scripts`. hero: the top of the page, from
     `character.opening_slider`. A section without data is left out. Without `hero`, the characters at the top
@@ -58,14 +57,13 @@ def render_report(
     counted = data.seconds_of_data(material.row_files, material.splits)
     sections = _sections(material, counted, terrain)
     measured_sections = join_sections(measured_by(material, "section"))
-    scenes, playable, compared = dict(scenes or {}), playable or {}, captured_and_predicted or {}
+    playable, compared = playable or {}, captured_and_predicted or {}
     grounds = ground_pictures(terrain, material.network["skeleton"])
     opening = hero or opening_slider(playable, material.measurements.values())
     for_scripts = {
         **drawn_by_script([sections, measured_sections]),
         "bodies": _bodies(material),
         "hero": opening,
-        "scenes": scenes,
         "grounds": grounds,
         "name": material.name,
         "playable": {material.name: playable} if playable else {},
@@ -88,7 +86,6 @@ def render_report(
         measured_sections=measured_sections,
         figures=key_figures(material),
         hints=hints(material, counted["both"]),
-        scene_names=[scene["name"] for scene in scenes.get("scenarios", ())],
         playable=for_scripts["playable"],
         captured_and_predicted=[clip["name"] for clip in compared.get("clips", ())],
         grounds=[picture["name"] for picture in grounds["pictures"]],
@@ -124,7 +121,7 @@ def _sections(
         "stages": {"seconds": seconds, "bytes": sizes, "table": own.stage_table(material)},
         "data": {
             "gaits": data.gait_chart(material),
-            "speeds": data.speed_and_turn_charts(counted),
+            "speeds": data.speed_and_turn_chart(counted),
             "channels": data.channel_charts(counted, shown_names(material.network["skeleton"])),
             "clips": data.clip_table(material),
             "remarks": data.remarks_table(material),

@@ -1,4 +1,4 @@
-"""Packs motion that a page plays: scripted walks, captured beside predicted clips, and fitted grounds."""
+"""Packs motion that a page plays: captured beside predicted clips, and fitted grounds."""
 
 from __future__ import annotations
 
@@ -8,12 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from hobble.core.files import load_npz, map_npz, to_base64
+from hobble.core.files import map_npz, to_base64
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 from hobble.figure.mesh import body_mesh, mesh_key
-from hobble.figure.pack import packed_turns
-from hobble.figure.rig import fitted_rotations
 from hobble.models.network import Network
 from hobble.rows.clip_rows import ClipRows, load_clip_rows, unbroken_stretches
 from hobble.runtime.animation import ProceduralAnimation
@@ -21,101 +19,23 @@ from hobble.runtime.export import restore_bone_lengths
 
 FPS = 20  # frame rate of the motion in the page
 UNIT = 0.01  # joint positions are stored as 16-bit integers in steps of this many cm
-# Roles of the joints that can touch the ground, in the order of the predicted contacts.
-FEET = ("left_heel", "left_toe", "right_heel", "right_toe")
-CONTACT = 0.5  # a joint touches the ground if its predicted contact (0 to 1) is above this
-
-# Scripted walk -> its description on the page.
-DESCRIPTIONS = {
-    "walk": "Walks straight on, then in a curve",
-    "jog": "Jogs straight on, then in a curve",
-    "crouch": "Crouches straight on",
-    "strafe": "Walks sideways, facing ahead",
-    "backward": "Walks backward",
-    "stop_and_go": "Stops and goes",
-    "turn_in_place": "Turns on the spot in quarter turns",
-}
+TURN = 32767  # the integer that stands for 1 in packed rotations
 
 
-def packed_scenes(path: str | Path, skeleton: Mapping[str, Any]) -> dict[str, Any]:
-    """The scripted walks of the page; {} without a skeleton.
+def packed_motion(positions: Array, rotations: Array, keep: Sequence[int]) -> dict[str, str]:
+    """Packs world positions (F, J, 3), cm, and rotations (F, J, 4) of the joints `keep`, as base64.
 
-    path: `runtime/scenarios.npz`, from `hobble.runtime.scenarios.generate_scenarios`. Walks in which a value
-    of a channel rises are left out: readers set it in Play. skeleton: the network's, as a dict; empty if it
-    has none.
-
-    The motion is stored at FPS, for the joints that move the drawn body. Their positions are relative to the
-    root joint, as 16-bit integers in steps of 0.1 mm. Rotations have 16 bits, too.
-    """
-    data = load_npz(path)
-    if not skeleton:
-        return {}
-    figure = Skeleton.from_dict({"name": "", **skeleton})
-    bones = body_mesh(figure).bones.tolist()  # the joints that move the drawn body
-    feet = [figure.role(role) if figure.roles.get(role) in figure.joints else -1 for role in FEET]
-    frame_step = max(1, round(float(data["fps"]) / FPS))
-    walks = []
-    for name in map(str, data["names"]):
-        # Arrays of the walk, of every frame_step-th frame.
-        motion = {key.removeprefix(f"{name}/"): v for key, v in data.items() if key.startswith(f"{name}/")}
-        if any(map(str, motion.pop("swept"))):
-            continue
-        walk = {"name": title_of(name), "description": DESCRIPTIONS.get(name, "")}
-        motion = {key: values[::frame_step] for key, values in motion.items()}
-        walks.append({**walk, **_packed_walk(motion, figure, bones)})
-    return {
-        "fps": float(data["fps"]) / frame_step,
-        "joints": len(bones),
-        "unit": UNIT,
-        "feet": [bones.index(j) for j in feet] if all(j in bones for j in feet) else [],
-        "body": mesh_key(figure),
-        "scenarios": walks,
-    }
-
-
-def _packed_walk(motion: Mapping[str, Array], figure: Skeleton, keep: list[int]) -> dict[str, Any]:
-    """One scripted walk, packed for the page. motion: its arrays. keep: joints to store."""
-    # One byte for each frame: bit 0 is the contact of FEET[0], bit 3 that of FEET[3].
-    contacts = (motion["contacts"][:, :4] > CONTACT) @ (1 << np.arange(4))
-    return {
-        "frames": len(motion["positions"]),
-        **packed_motion(figure, motion["positions"].astype(float), motion["rotations"].astype(float), keep),
-        "contacts": to_base64(contacts.astype(np.uint8)),
-        # 0 to 255 stands for phase 0 to 1.
-        "phase": to_base64(np.round(255 * (motion["phase"] % 1.0)).astype(np.uint8)),
-    }
-
-
-def packed_motion(
-    figure: Skeleton, positions: Array, rotations: Array, keep: Sequence[int]
-) -> dict[str, str]:
-    """Packs positions (F, J, 3) and rotations (F, J, 4) as a motion with constant bone lengths.
-
-    keep: the joints to store. In the result, `root` and `pose` are from `pack_positions`. `turn` has the
-    joints' rotations, from `hobble.figure.pack.packed_turns`.
-    """
-    world_rotations, world_positions = restore_bone_lengths(figure, positions, rotations)
-    return {**pack_positions(world_positions, keep), "turn": packed_turns(world_rotations[:, keep])}
-
-
-def pack_positions(positions: Array, keep: Sequence[int] | slice = slice(None)) -> dict[str, str]:
-    """Packs joint positions (F, J, 3), cm, as base64.
-
-    keep: the joints to store. In the result, `root`: (F, 3) positions of joint 0, float32, cm. `pose`:
-    positions of the joints `keep` relative to joint 0, int16, in steps of UNIT.
+    In the result, `root`: (F, 3) positions of joint 0, float32, cm. `pose`: positions relative to joint 0,
+    int16, in steps of UNIT. `turn`: rotations, int16, where TURN stands for 1.
     """
     root = positions[:, 0].astype(np.float32)
     steps = np.round((positions[:, keep] - root[:, None].astype(float)) / UNIT)
-    return {"root": to_base64(root), "pose": to_base64(np.clip(steps, -32767, 32767).astype(np.int16))}
-
-
-def title_of(name: str) -> str:
-    """The title of a scripted walk. name: as in the file.
-
-    >>> title_of("stop_and_go")
-    'Stop and go'
-    """
-    return name.replace("_", " ").capitalize()
+    turns = np.round(np.clip(rotations[:, keep], -1, 1) * TURN)
+    return {
+        "root": to_base64(root),
+        "pose": to_base64(np.clip(steps, -32767, 32767).astype(np.int16)),
+        "turn": to_base64(turns.astype(np.int16)),
+    }
 
 
 FEWEST_CLIPS = 6  # if fewer clips are held out, training clips are added up to this number
@@ -133,9 +53,9 @@ def packed_comparisons(
     from the captured input of the frame before. The ground is the first terrain fit of the frame: fits are
     ground heights that suit the motion. Both motions are drawn at the captured root.
 
-    Keys of the result: `fps`; `unit`, cm for a step of the packed positions; `joints`, the number of joints
-    that are drawn; `body`, the key of the body's mesh; `clips`, one `_compared_clip` each. It is {} if there
-    is no clip to show or the network has no skeleton.
+    Keys of the result: `fps`; `joints`, the number of joints that are drawn; `body`, the key of the body's
+    mesh; `clips`, one `_compared_clip` each. It is {} if there is no clip to show or the network has no
+    skeleton.
     """
     if network.skeleton is None:
         return {}
@@ -150,8 +70,7 @@ def packed_comparisons(
             clips.append(_compared_clip(network, rows, splits.get(rows.clip, "train"), drawn_joints))
     if not clips:
         return {}
-    mesh = mesh_key(network.skeleton)
-    return {"fps": FPS, "unit": UNIT, "joints": len(drawn_joints), "body": mesh, "clips": clips}
+    return {"fps": FPS, "joints": len(drawn_joints), "body": mesh_key(network.skeleton), "clips": clips}
 
 
 def longest_stretch(path: str | Path) -> tuple[int, int]:
@@ -178,8 +97,8 @@ def _compared_clip(network: Network, rows: ClipRows, split: str, drawn_joints: l
     error = found.distance.mean(axis=1)[::frame_step]
     assert network.skeleton is not None
     captured, predicted = (
-        packed_motion(
-            network.skeleton, pose.positions[::frame_step], pose.rotations[::frame_step], drawn_joints
+        restore_bone_lengths(
+            network.skeleton, pose.positions[::frame_step], pose.rotations[::frame_step].astype(float)
         )
         for pose in (found.truth, found.predicted)
     )
@@ -187,8 +106,8 @@ def _compared_clip(network: Network, rows: ClipRows, split: str, drawn_joints: l
         "name": rows.clip,
         "split": split,
         "frames": len(error),
-        "captured": captured,
-        "predicted": predicted,
+        "captured": packed_motion(captured[1], captured[0], drawn_joints),
+        "predicted": packed_motion(predicted[1], predicted[0], drawn_joints),
         "error": np.round(error, 2).tolist(),
     }
 
@@ -197,7 +116,7 @@ STEPS_PER_CM = 10  # lengths are stored as 16-bit integers, in steps of a millim
 MOST_VIEWS = 8  # the page has at most this many views
 # The arrays of a view: fields of `hobble.terrain.clip_fits.FitPicture`. In the file they are called
 # picture<number>_<field>.
-ARRAYS = ("cycle", "x", "z", "ground", "soles", "contacts", "pose")
+ARRAYS = ("cycle", "x", "z", "ground", "soles", "contacts", "pose", "turns")
 
 
 def ground_pictures(paths: Iterable[str | Path], skeleton: Mapping[str, Any]) -> dict[str, Any]:
@@ -211,7 +130,7 @@ def ground_pictures(paths: Iterable[str | Path], skeleton: Mapping[str, Any]) ->
     if not skeleton:
         return {"joints": 0, "body": "", "pictures": pictures}
     figure = Skeleton.from_dict({"name": "", **skeleton})
-    drawn_joints = body_mesh(figure).bones
+    drawn_joints = body_mesh(figure).bones.tolist()
     for path in paths:
         if len(pictures) == MOST_VIEWS:
             break
@@ -221,18 +140,16 @@ def ground_pictures(paths: Iterable[str | Path], skeleton: Mapping[str, Any]) ->
             view = {array: np.array(file[f"picture{i}_{array}"]) for array in ARRAYS}
             if view["pose"].shape[1] == len(figure.joints):
                 name = f"{Path(path).stem}, cycle {int(view['cycle']) + 1}"
-                turns = fitted_rotations(figure, np.asarray(view["pose"], float))[:, drawn_joints]
-                view["pose"] = view["pose"][:, drawn_joints]
-                pictures.append({"name": name, **_packed_view(view), "turn": packed_turns(turns)})
+                pictures.append({"name": name, **_packed_view(view, drawn_joints)})
     return {"joints": len(drawn_joints), "body": mesh_key(figure), "pictures": pictures}
 
 
-def _packed_view(view: Mapping[str, Array]) -> dict[str, Any]:
+def _packed_view(view: Mapping[str, Array], keep: Sequence[int]) -> dict[str, Any]:
     """Packs the arrays of a view.
 
     x and z are measured from the first joint at the second of the three moments, so that 16 bits are enough.
     In the result, `x` and `z` are the first and the last coordinate of the ground's grid, cm. `n` is the
-    number of its points along each of them.
+    number of its points along each of them. The figure at the three moments is a `packed_motion`.
     """
     middle = view["pose"][1, 0] * np.array([1.0, 0.0, 1.0])
     return {
@@ -242,7 +159,7 @@ def _packed_view(view: Mapping[str, Array]) -> dict[str, Any]:
         "ground": _packed_steps(view["ground"]),
         "soles": _packed_steps(view["soles"] - middle),
         "contacts": to_base64(np.asarray(view["contacts"], np.uint8)),
-        "pose": _packed_steps(view["pose"] - middle),
+        **packed_motion(view["pose"] - middle, view["turns"], keep),
     }
 
 

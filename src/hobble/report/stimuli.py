@@ -15,7 +15,6 @@ from PIL import Image
 
 from hobble.channels import channel
 from hobble.channels.shown import SampleWalk, channel_display, channel_loops
-from hobble.core import quat
 from hobble.core.errors import HobbleError
 from hobble.core.files import write_json
 from hobble.core.quat import Array
@@ -119,7 +118,8 @@ def loop_distance(loop: RepeatedWalk, other: RepeatedWalk) -> float:
     Both loops are moved to the origin and turned to the same direction. The distance of a walk from itself is
     0, even if the two loops start at different moments of it.
     """
-    poses, other_poses = _turned_ahead(loop), _turned_ahead(other)
+    walks = (each.ahead().positions for each in (loop, other))
+    poses, other_poses = (places - places[:, :1] * [1, 0, 1] for places in walks)
     return float(np.mean([np.linalg.norm(other_poses - pose, axis=-1).mean(axis=1).min() for pose in poses]))
 
 
@@ -154,24 +154,17 @@ def draw_frames(
     The camera moves at constant speed. In each repetition it crosses a whole number of cells of the ground's
     grid, so that the ground repeats, too.
     """
-    count, bones = len(loop.positions), body_mesh(skeleton).bones
-    world_rotations, world_positions = restore_bone_lengths(skeleton, loop.positions, loop.rotations)
-    start, yaw = loop.positions[0, 0], np.arctan2(loop.travel[0], loop.travel[2])
-    # The mean distance of the root from a point that moves from `start` by `travel` at constant speed.
-    offset = loop.positions[:, 0].mean(axis=0) - loop.travel * (count - 1) / count / 2 - start
-    length = float(np.linalg.norm(loop.travel))
+    walk, bones = loop.ahead(), body_mesh(skeleton).bones
+    turns, places = restore_bone_lengths(skeleton, walk.positions, walk.rotations)
+    count, length = len(places), float(np.linalg.norm(walk.travel))
     # The length of the camera's way in a loop, divided by that of the character's.
     camera_factor = max(1, round(length / GRID)) * GRID / max(length, 1e-9)
-    turn = np.array([[np.cos(yaw), 0, -np.sin(yaw)], [0, 1, 0], [np.sin(yaw), 0, np.cos(yaw)]])
-    rotations = quat.mul(quat.yaw(-yaw), world_rotations[:, bones])
     out = []
     for f in range(0, count - count % FRAME_STEP, FRAME_STEP):
-        travelled = loop.travel * f / count
-        points = (world_positions[f, bones] - start - travelled - offset * [1, 0, 1]) @ turn.T
-        points[:, 1] = world_positions[f, bones, 1]
         moved = np.array([0.0, 0.0, length * f / count * camera_factor])
         camera = Camera(np.array([0.0, 82.0, 0.0]) + moved, size=size)  # about half the body's height
-        out.append(renderer.draw(points + moved, rotations[f], camera, values))
+        at = places[f, bones] - walk.travel * f / count + moved
+        out.append(renderer.draw(at, turns[f, bones], camera, values))
     return out
 
 
@@ -186,10 +179,3 @@ def save_loop(path: Path, pictures: list[NDArray[np.uint8]]) -> None:
     images[0].save(
         path, save_all=True, append_images=images[1:], duration=durations, loop=0, quality=QUALITY, method=3
     )
-
-
-def _turned_ahead(loop: RepeatedWalk) -> Array:
-    """Positions (F, J, 3) of a loop, with the root over the origin and the direction of travel along z."""
-    yaw = np.arctan2(loop.travel[0], loop.travel[2])
-    turn = np.array([[np.cos(yaw), 0, -np.sin(yaw)], [0, 1, 0], [np.sin(yaw), 0, np.cos(yaw)]])
-    return (loop.positions - loop.positions[:, :1] * [1, 0, 1]) @ turn.T

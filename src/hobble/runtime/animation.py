@@ -22,7 +22,7 @@ from hobble.runtime.character import Character, Snapshot, start_characters
 from hobble.runtime.controller import Controller
 from hobble.runtime.ground import as_ground
 from hobble.runtime.network_rows import ChannelValues
-from hobble.runtime.pose import Pose, world_rotations
+from hobble.runtime.pose import Pose
 from hobble.runtime.trajectory import target_facing
 from hobble.runtime.variation import count_steps, vary_step
 from hobble.runtime.waypoints import Follower, Waypoint
@@ -186,7 +186,6 @@ class ProceduralAnimation:
         out._targets = CallerTargets(self.network.gaits, self.axes, len(of))
         out.follower = self.follower.copies(of) if self.follower else None
         out._continue_from(self.state.copies(of))
-        out._controller.draw(tuple(array[of] for array in self._controller.drawn))
         return out
 
     def __copy__(self) -> ProceduralAnimation:
@@ -198,15 +197,12 @@ class ProceduralAnimation:
     def __getstate__(self) -> dict[str, Any]:
         """For pickle: all but the predictor and the controller, which are made anew. They hold no state."""
         made_anew = ("predictor", "_controller", "_limiter", "_terrain")
-        kept = {name: value for name, value in self.__dict__.items() if name not in made_anew}
-        return kept | {"drawn": self._controller.drawn}
+        return {name: value for name, value in self.__dict__.items() if name not in made_anew}
 
     def __setstate__(self, kept: dict[str, Any]) -> None:
-        drawn = kept.pop("drawn")
         self.__dict__.update(kept, _terrain=(None, None))
         self.predictor = self.network.predictor(*self._predicted_by)
         self._continue_from(self.state)
-        self._controller.draw(drawn)
 
     def _continue_from(self, state: Character) -> None:
         """Make a new controller, which continues from `state`."""
@@ -241,28 +237,11 @@ class ProceduralAnimation:
         return self._controller.seconds
 
     @property
-    def last_inputs(self) -> Array:
-        """(C, X) inputs of the network in the last frame, not standardised.
-
-        The next frame overwrites this array.
-        """
-        return self._controller.x
-
-    @property
-    def predicted_rotations(self) -> Array:
-        """(C, J, 4) joint rotations in the world that the network predicted for the last frame.
-
-        They are in Hobble's axes (Y up, Z forward). Unlike in the pose, there is no limit on how far a joint
-        turns in a frame.
-        """
-        return world_rotations(*self.predicted_turns)
-
-    @property
     def predicted_turns(self) -> tuple[Array, Array]:
         """Joint rotations (C, J, 3) predicted in the last frame, relative to the root, and root yaw (C,).
 
-        Both are copies, in the form that `world_rotations` takes. For many frames, collect both and call
-        `world_rotations` once, which is faster than to read `predicted_rotations` in each frame.
+        Both are copies, in the form that `hobble.runtime.pose.world_rotations` takes. Unlike in the pose,
+        there is no limit on how far a joint turns in a frame.
         """
         controller = self._controller
         turns = controller.y[:, self.network.layout.y_joint_rotation].reshape(self.characters, -1, 3)

@@ -217,7 +217,7 @@ class Controller:
         self.z = np.zeros_like(self.x)
         self.y = np.zeros((count, layout.y_size), np.float32)
         here, ahead = character.position[:, layout.window], character.direction[:, layout.window]
-        self.root = np.stack([here[:, 0], np.zeros(count), here[:, 1]], axis=1)
+        self.root = np.stack([here[:, 0], character.root_height, here[:, 1]], axis=1)
         self.yaw = np.arctan2(ahead[:, 0], ahead[:, 1])
         self.bounds = Bounds.of(network)
         # An argument of `evaluate`, but only if the network has a memory.
@@ -253,11 +253,6 @@ class Controller:
         self._ground_heights = np.zeros((count, len(self._ground_joints)))
         self._warned = False
         self._group_arrays(character)
-
-    def draw(self, drawn: tuple[Array, ...]) -> None:
-        """Take over root, yaw, pose_position and pose_rotation of another controller, its `drawn`."""
-        for array, values in zip(self.drawn, drawn, strict=True):
-            array[:] = values
 
     def _group_arrays(self, c: Character) -> None:
         """Group the arrays for the compiled functions. Once is enough: the arrays only change in place."""

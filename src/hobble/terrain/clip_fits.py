@@ -251,9 +251,9 @@ class FitPicture:
     """The best fit of one cycle, in centimetres in the clip's world.
 
     cycle: number of the cycle in the clip. x, z: (G,) coordinates of the grid. ground: (G, G) height at each
-    x[i], z[j]. soles, contacts: (T, 4, 3) and (T, 4), in the T frames that the ground is fitted to. pose:
-    (3, J, 3) joint positions after a quarter, half and three quarters of these frames. parents: (J,) index of
-    each joint's parent.
+    x[i], z[j]. soles, contacts: (T, 4, 3) and (T, 4), in the T frames that the ground is fitted to. pose,
+    turns: (3, J, 3) and (3, J, 4) positions and world rotations of the joints after a quarter, half and three
+    quarters of these frames.
     """
 
     cycle: int
@@ -263,7 +263,7 @@ class FitPicture:
     soles: Array = field(repr=False)
     contacts: Mask = field(repr=False)
     pose: Array = field(repr=False)
-    parents: np.ndarray = field(repr=False)
+    turns: Array = field(repr=False)
 
 
 def cycles_to_picture(count: int) -> set[int]:
@@ -290,5 +290,5 @@ def make_picture(clip: Clip, cycle: int, ground: CycleGround, feet: Feet, around
         soles.astype(np.float32),
         feet.contacts[around],
         clip.positions[frames].astype(np.float32),
-        np.array(clip.skeleton.parents, np.int32),
+        clip.global_rotations[frames].astype(np.float32),
     )

@@ -164,7 +164,7 @@ typedef struct { /* a character file, read only */
     int y_contacts, y_position, y_direction,
         y_joints; /* first columns in Y; 0 to 3 are velocity, turn, phase */
     const int32_t *inputs, *x_first, *x_channels, *parents, *legs, *channel_of;
-    const uint8_t *parts;
+    const uint8_t *parts, *slows; /* slows: for each channel, whether its values make a body limp */
     const char *names; /* each ends with a 0 */
     const float *x_mean, *x_inverse, *x_low, *x_high, *y_low, *y_high;
     const double *offsets, *sole, *ahead, *rates, *scales, *highest, *defaults;
@@ -438,6 +438,7 @@ static void read_channels(reader *r, model *m) {
     m->scales = doubles(r, "scales", columns, 1e-9, 1e9);
     m->highest = doubles(r, "highest", columns, 0, 1e6);
     m->defaults = doubles(r, "defaults", columns, 0, 1e6);
+    m->slows = small(r, "slows", channels, 1);
     const int32_t *levels = indices(r, "limit_levels", channels, 0, MOST_LEVELS);
     if (r->failed) return;
     for (uint64_t k = 1; k < columns; k++) require(r, m->channel_of[k - 1] <= m->channel_of[k], "channel_of");
@@ -585,6 +586,9 @@ typedef struct {
     double leg_shown[2][3][3], body_lift;
     double root[3], yaw, report[6]; /* report: what hobble_state returns */
     int placed;
+    /* Steps that differ, see vary. pace and shown: factors of the change of phase and of the values. */
+    double variation, pace, shown;
+    uint32_t seed, step;
 } character;
 
 /* What a character shall do in a frame, after all corrections. */
@@ -1429,7 +1433,7 @@ static void write_inputs(const model *m, const character *c, float *x) {
         velocity[1] = (float)c->joint_velocity[j][1];
         velocity[2] = (float)(dx * sine + dz * cosine);
     }
-    for (int k = 0; k < m->size[COLUMNS]; k++) x[m->x_channels[k]] = (float)c->values[k];
+    for (int k = 0; k < m->size[COLUMNS]; k++) x[m->x_channels[k]] = (float)((float)c->values[k] * c->shown);
 }
 
 /* Limits a row to the range of the training data. An unsound number becomes the middle of its range. */
@@ -1558,7 +1562,7 @@ static void advance(const model *m, character *c, const float *y, const double *
         c->direction[i][0] = (x * cosine + z * sine) / norm;
         c->direction[i][1] = (z * cosine - x * sine) / norm;
     }
-    c->phase += ((1 - STANDING_SHARE) * moving + STANDING_SHARE) * y[3];
+    c->phase += ((1 - STANDING_SHARE) * moving + STANDING_SHARE) * (float)(y[3] * c->pace);
     c->phase -= floor(c->phase);
 }
 
@@ -1901,6 +1905,7 @@ static void start_character(const hobble *h, character *c, double x, double z, d
     fresh.joint_rotation = c->joint_rotation;
     fresh.pose_position = c->pose_position, fresh.pose_rotation = c->pose_rotation;
     fresh.values = c->values, fresh.targets = c->targets, fresh.memory = c->memory;
+    fresh.variation = c->variation, fresh.seed = c->seed, fresh.pace = fresh.shown = 1;
     *c = fresh;
     for (int i = 0; i < m->length; i++) {
         const double *p = m->start_path + 2 * i, *d = m->start_direction + 2 * i;
@@ -1938,6 +1943,37 @@ static void start_character(const hobble *h, character *c, double x, double z, d
     c->root[2] = z;
     c->report[0] = c->yaw = yaw;
     c->report[1] = c->phase;
+}
+
+/* A number with mean 0 and standard deviation 1: see `step_noise` in variation.py. */
+static double step_noise(uint32_t seed, uint32_t step, uint32_t stream) {
+    uint32_t x = seed * 0x9E3779B1u + step * 0x85EBCA77u + stream * 0xC2B2AE3Du, total = 0;
+    x = (x ^ x >> 16) * 0x7FEB352Du;
+    x = (x ^ x >> 15) * 0x846CA68Bu;
+    x ^= x >> 16;
+    for (int byte = 0; byte < 4; byte++) total += x >> 8 * byte & 0xFF;
+    return (total - 510.0) / 147.8;
+}
+
+/* Makes each step of a character take a little more or less time and way: see variation.py, which has the same
+   numbers. Streams of random numbers: 0 time, 1 length, 2 how much an injury shows, 3 the person. */
+static void vary(const model *m, character *c, goal *target) {
+    static const double healthy[3] = {0.035, 0.03, 0.0}, hurt[3] = {0.11, 0.08, 0.12}, sides_differ = 0.015;
+    double most = 0, factors[3];
+    uint32_t half = (uint32_t)(2 * c->phase) % 2;
+    if (!(c->variation > 0)) return;
+    c->step += half != c->step % 2;
+    for (int k = 0; k < m->size[COLUMNS]; k++)
+        if (m->slows[m->channel_of[k]] && m->highest[k] > 0) most = larger(most, c->values[k] / m->highest[k]);
+    most = smaller(most, 1);
+    for (uint32_t s = 0; s < 3; s++) {
+        double spread = healthy[s] + most * (hurt[s] - healthy[s]);
+        factors[s] = 1 + c->variation * spread * step_noise(c->seed, c->step, s);
+    }
+    double person = c->variation * sides_differ * step_noise(c->seed, 0, 3);
+    c->pace = factors[0] + (c->step % 2 ? -person : person);
+    c->shown = factors[2];
+    for (int i = 0; i < 2; i++) target->velocity[i] *= factors[1];
 }
 
 /* Whether `count` numbers are finite and not too large. */
@@ -2085,6 +2121,7 @@ int hobble_frame(hobble *h, const hobble_target *targets, const hobble_ground *g
     }
     for (size_t i = 0; i < count; i++) {
         character *c = &h->state[i];
+        vary(&h->model, c, &h->goals[i]);
         if (!sound_character(h, c)) start_character(h, c, c->root[0], c->root[2], c->yaw);
     }
     error = run_frame(h, ground);
@@ -2340,6 +2377,15 @@ int hobble_set(hobble *h, int i, int column, double value) {
     if (!has_character(h, i) || !hobble_column_label(h, column)) return HOBBLE_NO_SUCH;
     if (!(value >= 0 && value <= h->model.highest[column])) return HOBBLE_BAD_VALUE;
     h->state[i].targets[column] = value / h->model.scales[column];
+    return HOBBLE_OK;
+}
+
+int hobble_vary(hobble *h, int i, double amount, unsigned seed) {
+    if (!has_character(h, i)) return HOBBLE_NO_SUCH;
+    if (!(amount >= 0 && amount <= 10)) return HOBBLE_BAD_VALUE;
+    h->state[i].variation = amount;
+    h->state[i].seed = seed;
+    h->state[i].pace = h->state[i].shown = 1;
     return HOBBLE_OK;
 }
 

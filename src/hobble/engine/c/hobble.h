@@ -31,7 +31,7 @@ extern "C" {
 #endif
 #endif
 
-#define HOBBLE_FILE_VERSION 2 /* of the character files that this runtime reads */
+#define HOBBLE_FILE_VERSION 3 /* of the character files that this runtime reads */
 #define HOBBLE_WHY 160        /* size of the text that says why a file is refused */
 #define HOBBLE_GAITS 6        /* every character has stand, walk, jog, crouch, jump and bump */
 
@@ -89,6 +89,9 @@ HOBBLE_API int hobble_reset(hobble *h, int character, double x, double z, double
 /* Makes character `to` of `h` a copy of character `from` of `other`, moved by x, z. Both have the same file.
  */
 HOBBLE_API int hobble_copy(hobble *h, int to, const hobble *other, int from, double x, double z);
+/* How much the steps of a character differ from each other: 0 not at all, 1 as those of people do, 10 at most.
+   The same seed gives the same walk. Both stay when the character starts again. */
+HOBBLE_API int hobble_vary(hobble *h, int character, double amount, unsigned seed);
 /* Runs one frame of all characters. targets: one for each. ground: NULL for flat ground at 0. */
 HOBBLE_API int hobble_frame(hobble *h, const hobble_target *targets, const hobble_ground *ground);
 

@@ -37,6 +37,7 @@ public sealed class Hobble : IDisposable
     [DllImport(Library)] static extern int hobble_frame(IntPtr h, [In] Target[] targets, IntPtr ground);
     [DllImport(Library, EntryPoint = "hobble_frame")] static extern int hobble_frame_on(IntPtr h, [In] Target[] targets, ref Ground ground);
     [DllImport(Library)] static extern int hobble_column(IntPtr h, byte[] channel, byte[] name);
+    [DllImport(Library)] static extern int hobble_vary(IntPtr h, int character, double amount, uint seed);
     [DllImport(Library)] static extern int hobble_set(IntPtr h, int character, int column, double value);
     [DllImport(Library)] static extern int hobble_gait(IntPtr h, byte[] name);
     [DllImport(Library)] static extern int hobble_joints(IntPtr h);
@@ -102,6 +103,8 @@ public sealed class Hobble : IDisposable
 
     public int Gait(string name) { return Check(hobble_gait(h, Text(name))); }
     public string JointName(int joint) { return Marshal.PtrToStringAnsi(hobble_joint_name(h, joint)); }
+    // How much its steps differ: 0 not at all, 1 as those of people do. The same seed gives the same walk.
+    public void Vary(int character, double amount, uint seed) { Check(hobble_vary(h, character, amount, seed)); }
     public void Reset(int character, double x, double z, double yaw) { Check(hobble_reset(h, character, x, z, yaw)); }
 
     // Sets a value, such as ("injury", "left thigh", 7).

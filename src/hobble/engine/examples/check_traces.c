@@ -30,23 +30,26 @@ static void *read_file(const char *path, size_t *bytes) {
 static int check(hobble *h, const char *path) {
     size_t bytes = 0;
     unsigned char *data = read_file(path, &bytes);
-    uint32_t head[6];
+    uint32_t head[7];
+    double variation = 0;
     hobble_ground ground = {0};
-    if (!data || bytes < 40 || memcmp(data, "HOBTRACE", 8)) return free(data), 0;
+    if (!data || bytes < 52 || memcmp(data, "HOBTRACE", 8)) return free(data), 0;
     memcpy(head, data + 8, sizeof head);
-    memcpy(&ground.cell, data + 32, sizeof ground.cell);
+    memcpy(&variation, data + 36, sizeof variation);
+    memcpy(&ground.cell, data + 44, sizeof ground.cell);
     size_t frames = head[1], joints = head[2], columns = head[3], grid = (size_t)head[4] * head[5],
            record = 14 + columns + 7 * joints;
-    int fits = head[0] == 1 && (int)joints == hobble_joints(h) && (int)columns == hobble_columns(h)
-               && bytes == 40 + 4 * (grid + frames * record);
+    int fits = head[0] == 2 && (int)joints == hobble_joints(h) && (int)columns == hobble_columns(h)
+               && bytes == 52 + 4 * (grid + frames * record);
     if (!fits) return free(data), 0;
-    const float *numbers = (const float *)(data + 40);
+    const float *numbers = (const float *)(data + 52);
     ground.heights = numbers;
     ground.rows = (int)head[4];
     ground.columns = (int)head[5];
     numbers += grid;
     double early = 0, late = 0, turns = 0;
     hobble_reset(h, 0, 0, 0, 0);
+    hobble_vary(h, 0, variation, head[6]);
     for (size_t f = 0; f < frames; f++, numbers += record) {
         hobble_target target = {{numbers[0], numbers[1]}, {numbers[2], numbers[3]}, {0}, (int)numbers[4]};
         for (size_t k = 0; k < columns; k++) hobble_set(h, 0, (int)k, numbers[5 + k]);

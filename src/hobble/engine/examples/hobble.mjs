@@ -95,6 +95,9 @@ export class Characters {
     this.engine.check(this.c.hobble_set(this.h, character, number, value));
   }
 
+  // How much the steps of a character differ from each other: 0 not at all, 1 as those of people do. The same seed gives the same walk.
+  vary(character, amount, seed = character) { this.engine.check(this.c.hobble_vary(this.h, character, amount, seed)); }
+
   // Says what a character shall do. velocity, facing: [x, z]. gait: its name, or null: walk or jog, by the speed.
   aim(character, velocity, facing = null, gait = null) {
     const number = gait === null ? BY_SPEED : this.engine.check(this.c.hobble_gait(this.h, this.engine.name(gait)));

@@ -102,6 +102,10 @@ class Characters:
         numbers = map(ctypes.c_double, (x, z, yaw))
         self.check(self.library.hobble_reset(self.handle, character, *numbers))
 
+    def vary(self, character: int, amount: float, seed: int) -> None:
+        """How much its steps differ: 0 not at all, 1 as those of people do. A seed gives the same walk."""
+        self.check(self.library.hobble_vary(self.handle, character, ctypes.c_double(amount), seed))
+
     def frame(self, ground: Ground | None = None) -> None:
         """Run one frame of all characters."""
         self.check(

@@ -3,7 +3,6 @@ import { bodyChannel, channelColour, valueKey } from "./base.js";
 import { createCharacter } from "./character.js";
 import { createFigure } from "./figure.js";
 import { at3, at4, conjugate, multiply } from "./math.js";
-import { createLab } from "./panel.js";
 
 const FPS = 60;
 
@@ -41,37 +40,19 @@ export const bvhText = ({ names, parents, offsets }, frames) => {
   return `HIERARCHY\n${header.join("\n")}\nMOTION\nFrames: ${frames.length}\nFrame Time: ${(1 / FPS).toFixed(7)}\n${lines.join("\n")}\n`;
 };
 
-// Draws inputs of the network in Play: ground heights and joint velocities.
-const NEEDLE_FRAMES = 8; // a needle is as long as the movement of the joint in this many frames
-const LEAST_SPEED = .15; // cm a frame: slower joints have no needle
-
-// The heights of the ground that are inputs of the network. They are sampled along the past and future path, and to both sides of it. place:
-// [x, y, z] of a sample. above: its height above the mean height of the path, cm. c: the state of the character.
-export const groundSamples = (c, spec) => {
-  const { path, directions, ground, root: [, height] } = c;
-  return Array.from(ground, (y, i) => {
-    const f = 2 * spec.step * Math.floor(i / 3), aside = (1 - i % 3) * spec.side; // to the left, on the path, to the right
-    return { place: [path[f] + aside * directions[f + 1], y, path[f + 1] - aside * directions[f]], above: y - height };
-  });
-};
-
-// Needles {from, to}, from where a joint is to where it would be in NEEDLE_FRAMES frames.
-export const jointVelocities = (c) => {
-  const { velocities, positions } = c, out = [];
-  for (let j = 0; j < positions.length / 3; j++) {
-    const v = at3(velocities, j), from = at3(positions, j);
-    if (Math.hypot(...v) >= LEAST_SPEED) out.push({ from, to: from.map((p, i) => p + NEEDLE_FRAMES * v[i]) });
-  }
-  return out;
-};
-
-// Draws the ground heights as squares, red above the mean height of the path and blue below it, and the joint velocities as needles.
-export const drawInputs = ({ marks, marksInFront, paint }, c, spec) => {
-  for (const { place: [x, y, z], above } of groundSamples(c, spec)) {
-    const rgb = Math.abs(above) < 1 ? paint.ink : above > 0 ? paint.high : paint.predicted, r = 3;
-    marks.addQuad([[x - r, y + .6, z - r], [x + r, y + .6, z - r], [x + r, y + .6, z + r], [x - r, y + .6, z + r]], rgb, .8);
-  }
-  for (const { from, to } of jointVelocities(c)) marksInFront.addNeedle(from, to, 1.6, paint.predicted, .9);
+// Counts the frames of 1/60 s that have to run before a picture. frames(now): how many, at most eight. rest(): no pictures are drawn for a while.
+export const createTicker = () => {
+  let last = null, due = 0;
+  return {
+    frames(now) {
+      due = Math.min(8, due + (last === null ? 1 : (now - last) * .06));
+      last = now;
+      const whole = Math.floor(due);
+      due -= whole;
+      return whole;
+    },
+    rest() { last = null; },
+  };
 };
 
 // One character that walks in Play or at the top of the page: its controller, its body, its footprints, and its motion of the last seconds.
@@ -81,10 +62,10 @@ const MOST_FRAMES = 1200; // the last 20 seconds of motion are kept, so that the
 // view: where the character is drawn, see view.js. spec: its data, from `hobble.report.character`. place: [x, z] in cm where it starts.
 // tint: name of a colour in the palette for its body, or null. ghost: whether the body is transparent.
 export const createActor = (view, spec, { place = [0, 0], tint = null, ghost = false } = {}) => {
-  const figure = createFigure(view, spec.body, bodyChannel(spec)?.regions || [], { ghost }), wasDown = [false, false], lab = createLab(spec.legs);
+  const figure = createFigure(view, spec.body, bodyChannel(spec)?.regions || [], { ghost }), wasDown = [false, false];
   // rig: the pose that is drawn, with bones of constant length.
   const J = spec.names.length, character = createCharacter(spec, place), rig = { places: new Float64Array(3 * J), turns: new Float64Array(4 * J) };
-  const actor = { spec, figure, character, rig, lab, place, watch: null, milliseconds: 0, frames: [] };
+  const actor = { spec, figure, character, rig, place, watch: null, milliseconds: 0, frames: [] };
   let footprints = [], groundHeight = () => 0;
 
   const takePose = () => {
@@ -98,7 +79,6 @@ export const createActor = (view, spec, { place = [0, 0], tint = null, ghost = f
     character.reset();
     takePose();
     actor.frames = [];
-    lab.clear();
     actor.watch?.clear();
     footprints = [];
   };
@@ -120,13 +100,12 @@ export const createActor = (view, spec, { place = [0, 0], tint = null, ghost = f
     if (actor.frames.length > MOST_FRAMES) actor.frames.shift();
     footprints.forEach((print) => { print.age++; });
     footprints = footprints.filter((print) => print.age < 360); // footprints fade out in 360 frames, which are six seconds
-    const { held, contacts } = character;
+    const { held } = character;
     spec.legs.forEach(([, , heel, toe], f) => {
       const down = held[f] === 1;
       if (down && !wasDown[f]) footprints.push({ from: groundUnder(heel), to: groundUnder(toe), age: 0, side: f });
       wasDown[f] = down;
     });
-    lab.add(rig.places, [0, 1].map((f) => contacts[2 * f] > .5 || contacts[2 * f + 1] > .5));
     actor.watch?.add(rig.places);
   };
   const drawGround = (withPath) => {
@@ -144,7 +123,6 @@ export const createActor = (view, spec, { place = [0, 0], tint = null, ghost = f
   actor.draw = (withPath = true, shift = [0, 0]) => {
     const { values } = character, { paint } = view, plainColour = tint ? paint[tint] : paint.body, channel = bodyChannel(spec);
     drawGround(withPath);
-    if (view.inputs) drawInputs(view, character, spec);
     figure.copyPose(rig, shift);
     figure.pose((columns) => {
       const share = channel ? Math.max(0, ...columns.map((l) => values[channel.first + l])) * channel.scale / channel.highest : 0;

@@ -16,12 +16,15 @@ export const engineOf = (spec) => {
 export const createCharacter = (spec, place = [0, 0], heading = 0) => {
   const crowd = engineOf(spec).characters(), { joints, columns } = crowd, frames = crowd.c.hobble_path_frames(crowd.h);
   crowd.reset(0, ...place, heading);
+  crowd.vary(0, 0);
   return {
     // Runs one frame. velocity: [x, z], cm. facing: [x, z], or null to look where it goes. gait: its name, or null to choose by speed.
     // ground(x, z): height of the ground in cm.
     frame(velocity, facing, gait, ground) { crowd.aim(0, velocity, facing, gait); crowd.frame(ground); },
     // Sets the value of a channel column: its number among the columns of all channels.
     set: (column, value) => crowd.set(0, column, value),
+    // How much its steps differ from each other: 0 not at all, 1 as those of people do.
+    vary: (amount, seed = 0) => crowd.vary(0, amount, seed),
     // Starts again.
     reset: () => crowd.reset(0, ...place, heading),
     release: () => crowd.release(),
@@ -29,7 +32,6 @@ export const createCharacter = (spec, place = [0, 0], heading = 0) => {
     get skeleton() { return crowd.skeleton(); },
     get positions() { return crowd.positions(); },
     get rotations() { return crowd.rotations(); },
-    get velocities() { return crowd.view("joint_velocities", 3 * joints); },
     get root() { return crowd.root(); },
     get phase() { return crowd.view("state", 6)[1]; },
     // Left heel, left toe, right heel, right toe: 0 to 1.
@@ -37,12 +39,9 @@ export const createCharacter = (spec, place = [0, 0], heading = 0) => {
     // For the left and the right foot 1 if it is held where it landed, 0 if it is free.
     get held() { return crowd.view("feet", 2); },
     get values() { return crowd.view("values", columns); },
-    // The path has an entry for each frame, half of them past and half to come: [x, z], the direction [x, z], and the shares of the gaits.
+    // The path has an entry for each frame, half of them past and half to come: [x, z], and the shares of the gaits.
     get path() { return crowd.view("path", 2 * frames); },
-    get directions() { return crowd.view("path_directions", 2 * frames); },
     get gaits() { return crowd.view("path_gaits", 6 * frames); },
-    // Heights of the ground along the path: for every `spec.step`-th entry to its left, on it, and to its right.
-    get ground() { return crowd.view("ground_samples", 3 * frames / spec.step); },
   };
 };
 

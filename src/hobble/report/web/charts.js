@@ -89,5 +89,3 @@ export const startCharts = () => {
   document.querySelectorAll("[data-chart]").forEach((element) => near.observe(element));
   onTheme.push(() => { for (const element of chosenOptions.keys()) draw(element); });
 };
-
-// Draws label strips: the contacts, phase, gait, speed and channel values of one clip over time.

@@ -4,15 +4,15 @@ import {
   MeshStandardMaterial, Quaternion, Skeleton, SkinnedMesh, Sphere, Vector3,
 } from "three";
 import { linear, material } from "./base.js";
-import { unpackBody } from "./math.js";
+import { createBones, unpackBody } from "./math.js";
+
+const THREE = { Bone, BufferAttribute, BufferGeometry, DetachedBindMode, Matrix4, Quaternion, Skeleton, SkinnedMesh, Sphere, Vector3 };
 
 const unpacked = new Map();
 
 // The unpacked body with a name, see `unpackBody`.
-export const bodyOf = (name) => {
-  if (!unpacked.has(name)) {
-    unpacked.set(name, unpackBody({ BufferAttribute, BufferGeometry, Matrix4, Quaternion, Sphere, Vector3 }, material.bodies[name]));
-  }
+const bodyOf = (name, coarse) => {
+  if (!unpacked.has(name)) unpacked.set(name, unpackBody(THREE, material.bodies[name], coarse));
   return unpacked.get(name);
 };
 
@@ -51,14 +51,10 @@ ${shader.fragmentShader}`
 // view: where it is drawn, see view.js. body: name of a body in the page. regions: for each bone, the channel columns that colour it. ghost:
 // whether it is transparent.
 export const createFigure = (view, body, regions = [], { ghost = false } = {}) => {
-  const { geometry, inverses, keep, balls } = bodyOf(body), boneCount = keep.length, unscaled = new Vector3(1, 1, 1);
-  const bones = keep.map(() => new Bone()), skeleton = new Skeleton(bones, inverses);
+  const { geometry, keep, balls } = bodyOf(body, view.simple), boneCount = keep.length, skin = createBones(THREE, bodyOf(body));
   const tints = { value: keep.map(() => new Color()) }, meshes = [];
   const add = (material) => {
-    const mesh = new SkinnedMesh(geometry, material);
-    mesh.bindMode = DetachedBindMode;
-    mesh.bind(skeleton, new Matrix4());
-    mesh.frustumCulled = false;
+    const mesh = skin.add(material);
     mesh.boundingSphere = new Sphere(); // not used, but without it three.js computes one from all corners
     view.scene.add(mesh);
     meshes.push(mesh);
@@ -74,14 +70,11 @@ export const createFigure = (view, body, regions = [], { ghost = false } = {}) =
   mesh.receiveShadow = !ghost;
 
   const figure = { mesh, keep, places: new Float64Array(3 * boneCount), turns: new Float64Array(4 * boneCount) };
-  const spot = new Vector3(), turn = new Quaternion();
+  const spot = new Vector3();
   // Moves the bones to `figure.places` and `figure.turns`. colour(columns): the colour [r, g, b], 0 to 255, of a bone with these channel columns.
   figure.pose = (colour) => {
-    const { places: p, turns: q } = figure;
     for (let b = 0; b < boneCount; b++) {
-      spot.set(p[3 * b], p[3 * b + 1], p[3 * b + 2]);
-      turn.set(q[4 * b + 1], q[4 * b + 2], q[4 * b + 3], q[4 * b]);
-      bones[b].matrixWorld.compose(spot, turn, unscaled);
+      skin.move(b, figure.places, figure.turns, b);
       linear(colour(regions[b] || []), tints.value[b]);
     }
   };
@@ -96,15 +89,10 @@ export const createFigure = (view, body, regions = [], { ghost = false } = {}) =
   // The lowest `count` of the spheres [x, y, z, radius], cm, that stand for parts of the body. They darken the ground.
   figure.balls = (count = 10) => {
     const out = balls.map(([x, y, z, r], b) => {
-      spot.set(x, y, z).applyMatrix4(bones[b].matrixWorld);
+      spot.set(x, y, z).applyMatrix4(skin.bones[b].matrixWorld);
       return [spot.x, spot.y, spot.z, r];
     });
     return out.sort((a, b) => a[1] - b[1]).slice(0, count);
-  };
-  // shown: whether the figure is drawn. fade: its opacity, 0 to 1.
-  figure.show = (shown, fade = 1) => {
-    for (const each of meshes) each.visible = shown;
-    mesh.material.opacity = fade;
   };
   figure.remove = () => { for (const each of meshes) { view.scene.remove(each); each.material.dispose(); } };
 

@@ -1,5 +1,5 @@
 // The gallery: a card for each limp or manner that the character can walk. The figure on a card walks while the pointer or the focus is on it.
-import { createActor } from "./actor.js";
+import { createActor, createTicker } from "./actor.js";
 import { find, valueKey } from "./base.js";
 import { createView } from "./view.js";
 
@@ -19,18 +19,15 @@ const createCard = (spec, channel, { name, values }, chosen) => {
   card.append(canvas, words);
   card.addEventListener("click", () => chosen(channel, values));
   const hurt = new Map(values.map(([column, value]) => [valueKey(channel, column), value]));
-  let actor = null, walks = false, last = null, due = 0;
+  const ticker = createTicker();
+  let actor = null, walks = false;
   const view = createView(canvas, { yaw: .62, pitch: .1, distance: 430 }, (now) => {
     if (!actor) {
       actor = createActor(view, spec);
       actor.start(() => 0);
       for (let f = 0; f < SETTLE; f++) actor.frame(TARGET, hurt);
     }
-    if (walks) {
-      due = Math.min(4, due + (last === null ? 1 : (now - last) * .06));
-      for (; due >= 1; due--) actor.frame(TARGET, hurt);
-      last = now;
-    }
+    for (let n = walks ? ticker.frames(now) : 0; n > 0; n--) actor.frame(TARGET, hurt);
     const [x, , z] = actor.character.root;
     view.aim([0, 84, 0]);
     view.land.drawAround([0, 0, 0]);
@@ -39,7 +36,7 @@ const createCard = (spec, channel, { name, values }, chosen) => {
     if (walks) view.requestDraw();
   }, { marks: 40 });
   view.framing = { size: 2.5, aside: 0, up: -.02 };
-  const walk = (on) => { walks = on; last = null; view.requestDraw(); };
+  const walk = (on) => { walks = on; ticker.rest(); view.requestDraw(); };
   for (const [event, on] of [["pointerenter", true], ["focus", true], ["pointerleave", false], ["blur", false]]) card.addEventListener(event, () => walk(on));
   return card;
 };

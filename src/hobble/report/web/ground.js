@@ -5,7 +5,7 @@ import {
   MeshLambertMaterial, Vector4,
 } from "three";
 import { linear } from "./base.js";
-import { cross, minus, unit } from "./math.js";
+import { minus } from "./math.js";
 
 const randomOfTile = (i, k) => { // a random number from 0 to 1, always the same for the tile (i, k)
   const n = Math.sin(12.9898 * i + 78.233 * k) * 43758.5453;
@@ -57,7 +57,8 @@ const tileGeometry = (xs, zs, height) => {
   return geometry;
 };
 
-export const createLand = (scene) => {
+// simple: whether a processor draws without a graphics card. Then the fainter lines are left out, and bodies darken less of the ground.
+export const createLand = (scene, simple) => {
   const focus = { value: [0, 0] }, reach = { value: REACH }, ink = { value: new Color() }, used = { value: 0 };
   const balls = { value: Array.from({ length: BALLS }, () => new Vector4()) };
   const material = new MeshLambertMaterial({ transparent: true });
@@ -84,10 +85,11 @@ export const createLand = (scene) => {
         return sum;
       }\n${shader.fragmentShader}`
       .replace("#include <color_fragment>", `#include <color_fragment>
-        diffuseColor.rgb = mix(diffuseColor.rgb, ink, .2 * lines(vPlace.xz / 100., .004) + .045 * lines(vPlace.xz / 25., .008));
-        if (distance(vPlace.xz, focus) < 260.) diffuseColor.rgb *= exp(-.85 * hidden());
+        diffuseColor.rgb = mix(diffuseColor.rgb, ink, .2 * lines(vPlace.xz / 100., .004)${simple ? "" : " + .045 * lines(vPlace.xz / 25., .008)"});
+        if (distance(vPlace.xz, focus) < ${simple ? "150." : "260."}) diffuseColor.rgb *= exp(-.85 * hidden());
         diffuseColor.a *= 1. - smoothstep(.25, 1., distance(vPlace.xz, focus) / reach);`);
   };
+  material.customProgramCacheKey = () => `land ${simple}`;
   const mesh = new Mesh(flatGrid(2), material);
   mesh.frustumCulled = false;
   mesh.receiveShadow = true;
@@ -147,10 +149,10 @@ export const createLand = (scene) => {
   };
 };
 
-// Marks: strips, dots, footprints and needles on the ground or in the air. For every picture, they are cleared and added again.
+// Marks: strips, dots and footprints on the ground. For every picture, they are cleared and added again.
 
-// most: the largest number of quads (faces with four corners). over: whether they are drawn in front of the body.
-export const createMarks = (scene, { most = 4000, over = false } = {}) => {
+// most: the largest number of quads (faces with four corners).
+export const createMarks = (scene, most) => {
   const geometry = new BufferGeometry(), colour = new Color(), index = [];
   const place = new BufferAttribute(new Float32Array(12 * most), 3), shade = new BufferAttribute(new Float32Array(16 * most), 4);
   for (const attribute of [place, shade]) attribute.setUsage(DynamicDrawUsage);
@@ -159,11 +161,10 @@ export const createMarks = (scene, { most = 4000, over = false } = {}) => {
   geometry.setAttribute("color", shade);
   geometry.setIndex(index);
   const material = new MeshBasicMaterial({
-    vertexColors: true, transparent: true, depthWrite: false, depthTest: !over, side: DoubleSide, polygonOffset: true, polygonOffsetFactor: -2, polygonOffsetUnits: -4,
+    vertexColors: true, transparent: true, depthWrite: false, side: DoubleSide, polygonOffset: true, polygonOffsetFactor: -2, polygonOffsetUnits: -4,
   });
   const mesh = new Mesh(geometry, material);
   mesh.frustumCulled = false;
-  if (over) mesh.renderOrder = 3;
   scene.add(mesh);
   let used = 0;
 
@@ -186,14 +187,6 @@ export const createMarks = (scene, { most = 4000, over = false } = {}) => {
         [a[0] - sx, a[1] + up, a[2] - sz], [a[0] + sx, a[1] + up, a[2] + sz],
         [b[0] + sx, b[1] + up, b[2] + sz], [b[0] - sx, b[1] + up, b[2] - sz],
       ], rgb, alpha);
-    },
-    // A needle in the air from a to b: two crossed blades, `width` cm wide at a and pointed at b.
-    addNeedle(a, b, width, rgb, alpha) {
-      const way = unit(minus(b, a)), side = unit(Math.abs(way[1]) < .9 ? cross(way, [0, 1, 0]) : [1, 0, 0]);
-      for (const out of [side, cross(way, side)]) {
-        const [left, right] = [1, -1].map((s) => a.map((v, i) => v + s * width / 2 * out[i]));
-        marks.addQuad([left, right, b, b], rgb, alpha);
-      }
     },
     // A footprint. heel, toe: the points on the ground where they stood. outline: cm ahead of the heel, and half the width there in cm.
     addPrint(heel, toe, rgb, alpha) {

@@ -1,87 +1,10 @@
-// A dial with whole values from 0 to `most`. It is drawn as an arc. People turn it by dragging, clicking or pressing keys.
-import { createActor } from "./actor.js";
+// The top of the page: a character walks in place with a value above 0 in one column of a channel. Beside it walks the same character with
+// all values 0 and the same target. Under each, a belt of lines goes back as fast as it walks.
+import { createActor, createTicker } from "./actor.js";
 import { paceOf } from "./character.js";
 import { find, material, valueKey } from "./base.js";
 import { firstShown } from "./play.js";
 import { createView } from "./view.js";
-
-const NS = "http://www.w3.org/2000/svg";
-const FROM = -130, SWEEP = 260; // where the arc starts and how far it goes, degrees clockwise from the top
-const R = 46; // radius of the arc in units of the viewBox; its centre is at (60, 60)
-
-// The point [x, y] on the arc at the share `turn` of its length.
-const arcPoint = (turn) => {
-  const angle = (FROM + SWEEP * turn - 90) * Math.PI / 180;
-  return [60 + R * Math.cos(angle), 60 + R * Math.sin(angle)];
-};
-// The SVG path of the arc between two shares of its length.
-const arcPath = (from, to) => {
-  const [a, b] = [arcPoint(from), arcPoint(to)];
-  return `M${a[0].toFixed(2)} ${a[1].toFixed(2)}A${R} ${R} 0 ${SWEEP * (to - from) > 180 ? 1 : 0} 1 ${b[0].toFixed(2)} ${b[1].toFixed(2)}`;
-};
-
-// host: an element with the role "slider", into which the dial is drawn. value: at the start. changed(value): called when a person has turned the
-// dial, but not by `set`.
-export const createDial = (host, { most = 10, value = 0, changed }) => {
-  const svg = document.createElementNS(NS, "svg"), parts = {};
-  svg.setAttribute("viewBox", "0 0 120 108");
-  svg.setAttribute("aria-hidden", "true");
-  for (const [name, tag] of [["track", "path"], ["fill", "path"], ["knob", "circle"], ["number", "text"], ["unit", "text"]]) {
-    parts[name] = document.createElementNS(NS, tag);
-    parts[name].setAttribute("class", name);
-    svg.append(parts[name]);
-  }
-  parts.track.setAttribute("d", arcPath(0, 1));
-  parts.knob.setAttribute("r", 7);
-  for (const [name, y, text] of [["number", 70, ""], ["unit", 90, `of ${most}`]]) {
-    parts[name].setAttribute("x", 60);
-    parts[name].setAttribute("y", y);
-    parts[name].textContent = text;
-  }
-  host.replaceChildren(svg);
-  host.setAttribute("aria-valuemin", 0);
-  host.setAttribute("aria-valuemax", most);
-
-  const dial = {
-    value,
-    set(to) {
-      dial.value = Math.min(most, Math.max(0, Math.round(to)));
-      const turn = dial.value / most, [x, y] = arcPoint(turn);
-      parts.fill.setAttribute("d", turn ? arcPath(0, turn) : "");
-      parts.knob.setAttribute("cx", x);
-      parts.knob.setAttribute("cy", y);
-      parts.number.textContent = dial.value;
-      host.setAttribute("aria-valuenow", dial.value);
-      host.style.setProperty("--turn", turn);
-    },
-  };
-  const turnTo = (to) => {
-    const before = dial.value;
-    dial.set(to);
-    if (dial.value !== before) changed(dial.value);
-  };
-  const turnToPointer = (event) => {
-    const box = svg.getBoundingClientRect(), scale = 120 / box.width;
-    const [x, y] = [(event.clientX - box.x) * scale - 60, (event.clientY - box.y) * scale - 60];
-    const degrees = Math.atan2(x, -y) * 180 / Math.PI;
-    turnTo(most * Math.min(1, Math.max(0, (degrees - FROM) / SWEEP)));
-  };
-  host.addEventListener("pointerdown", (event) => { host.setPointerCapture(event.pointerId); turnToPointer(event); });
-  host.addEventListener("pointermove", (event) => { if (host.hasPointerCapture(event.pointerId)) turnToPointer(event); });
-  const keySteps = {
-    ArrowUp: 1, ArrowRight: 1, ArrowDown: -1, ArrowLeft: -1, PageUp: 3, PageDown: -3, Home: -most, End: most,
-  };
-  host.addEventListener("keydown", (event) => {
-    if (!(event.key in keySteps) || event.ctrlKey || event.metaKey || event.altKey) return;
-    event.preventDefault();
-    turnTo(dial.value + keySteps[event.key]);
-  });
-  dial.set(value);
-  return dial;
-};
-
-// The top of the page: a character walks in place with a value above 0 in one column of a channel. Beside it walks the same character with
-// all values 0 and the same target. Under each, a belt of lines goes back as fast as it walks.
 
 const APART = 100; // cm between the two figures
 const LINES = 50; // cm between two lines of a belt
@@ -112,18 +35,19 @@ const createHero = (spec, opening) => {
   const values = new Map(), neutralValues = new Map(), hero = { frames: 0 };
   let resolveShown;
   hero.shown = new Promise((done) => { resolveShown = done; }); // resolved when the figure has moved, or, if it rests, has been drawn
-  // part: label of the slider that the dial sets. last: time of the last picture, ms, or null. due: how many frames have to run, of the first
-  // figure and of the second. shown: when the speeds were last shown, ms. placed: size of the canvas for which the camera was set.
+  const ticker = createTicker();
+  // part: label of the slider that the visitor sets here. dueBeside: how many frames of the second figure have to run. shown: when the speeds were last
+  // shown, ms. placed: size of the canvas for which the camera was set.
   let part = labels.includes(opening.part) ? opening.part : labels[0];
-  let last = null, due = 0, dueBeside = 0, shown = 0, placed = "", walks = !matchMedia("(prefers-reduced-motion: reduce)").matches;
+  let dueBeside = 0, shown = 0, placed = "", walks = !matchMedia("(prefers-reduced-motion: reduce)").matches;
 
   const view = createView(canvas, { yaw: .62, pitch: .1, distance: 520, nearest: 280, furthest: 900 }, (now) => {
-    if (walks) advance(now);
+    for (let n = walks ? ticker.frames(now) : 0; n > 0; n--) hero.step();
     draw(now);
     if (!walks || hero.frames) resolveShown();
     if (walks) view.requestDraw();
   });
-  view.onHidden = () => { last = null; };
+  view.onHidden = ticker.rest;
   const main = createActor(view, spec), beside = channel ? createActor(view, spec, { tint: "healthy" }) : null;
   const figures = beside ? [[main, APART / 2], [beside, -APART / 2]] : [[main, 0]]; // each with its place, x in cm
   const steps = figures.map(([actor]) => createStepCount(actor));
@@ -137,11 +61,6 @@ const createHero = (spec, opening) => {
     const behind = steps[0].progress - steps[1].progress, late = behind - Math.round(behind);
     dueBeside += Math.min(1.5, Math.max(.6, steps[1].cycle / steps[0].cycle + .5 * late));
     for (; dueBeside >= 1; dueBeside--) { beside.frame(TARGET, neutralValues); steps[1].add(); }
-  };
-  const advance = (now) => {
-    due = Math.min(4, due + (last === null ? 1 : (now - last) * .06));
-    last = now;
-    for (; due >= 1; due--) hero.step();
   };
   // Sets the camera so that the figures fill the part of the picture that no text covers.
   const place = () => {
@@ -180,16 +99,19 @@ const createHero = (spec, opening) => {
   if (channel) {
     const [before, after] = channel.says.split("{}");
     const bold = (text) => Object.assign(document.createElement("b"), { textContent: text });
+    const much = find("hero-much");
     const say = () => {
       const asked = `One network moves both. Both are asked to walk at ${metresPerSecond(SPEED)}`;
       find("hero-name-0").firstElementChild.textContent = channel.on || part;
-      if (dial.value) line.replaceChildren(`${asked}; one is told ${before}`, bold(part), `${after}, `, bold(`${dial.value} of 10`), ", and goes as fast as that allows.");
+      const value = Number(much.value);
+      find("hero-value").textContent = `${value} of 10`;
+      if (value) line.replaceChildren(`${asked}; one is told ${before}`, bold(part), `${after}, `, bold(`${value} of 10`), ", and goes as fast as that allows.");
       else line.replaceChildren(`${asked}. At 0 they walk alike.`);
       chips.forEach((chip) => chip.setAttribute("aria-pressed", String(chip.textContent === part)));
     };
-    const applyDial = () => {
+    const apply = () => {
       values.clear();
-      values.set(valueKey(channel, channel.columns[channel.sliders[part]]), dial.value / 10 * channel.highest);
+      values.set(valueKey(channel, channel.columns[channel.sliders[part]]), much.value / 10 * channel.highest);
       say();
       view.requestDraw();
     };
@@ -199,21 +121,22 @@ const createHero = (spec, opening) => {
       chip.textContent = label;
       chip.addEventListener("click", () => {
         part = label;
-        if (!dial.value) dial.set(opening.value);
-        applyDial();
+        if (!Number(much.value)) much.value = opening.value;
+        apply();
       });
       find("hero-parts").append(chip);
       return chip;
     });
-    const dial = createDial(find("hero-dial"), { value: opening.value, changed: applyDial });
-    Object.assign(hero, { dial, chips });
-    applyDial();
+    much.value = opening.value;
+    much.addEventListener("input", apply);
+    hero.chips = chips;
+    apply();
   }
   const showButton = () => {
     button.textContent = walks ? "Pause" : "Walk";
     button.setAttribute("aria-pressed", String(!walks));
   };
-  button.addEventListener("click", () => { walks = !walks; last = null; showButton(); view.requestDraw(); });
+  button.addEventListener("click", () => { walks = !walks; ticker.rest(); showButton(); view.requestDraw(); });
   showButton();
 
   // Both walk before they are seen, so that they are up to speed and limp. The second one goes on until it is in step with the first.

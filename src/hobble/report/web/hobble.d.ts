@@ -38,7 +38,16 @@ export interface Character {
   release(): void;
 }
 
+export interface Start {
+  /** Where the character starts, [x, z] in cm, and its yaw in radians. */
+  place?: [number, number];
+  heading?: number;
+  /** How much steps differ from each other: 0 not at all, 1 as those of people do. The same seed gives the same walk. */
+  variation?: number;
+  seed?: number;
+}
+
 export interface Figure { mesh: Three.SkinnedMesh; pose(character: Character): void }
 
-export function createCharacter(data: CharacterData, start?: { place?: [number, number]; heading?: number }): Character;
+export function createCharacter(data: CharacterData, start?: Start): Character;
 export function createFigure(THREE: typeof Three, data: CharacterData, material?: Three.Material): Figure;

@@ -1,17 +1,16 @@
 // Starts the parts of the page. `Hobble` gives access to them from the browser's console and from the tests.
-import { bvhText, groundSamples, jointVelocities } from "./actor.js";
+import { bvhText } from "./actor.js";
 import { colour, material, unpackParts } from "./base.js";
 import { drawAll, startCharts } from "./charts.js";
 import { createCharacter, createWatch } from "./character.js";
 import { hero, startHero } from "./hero.js";
 import { csv, startPage, startTables } from "./page.js";
-import { createLab } from "./panel.js";
 import { player, startPlay } from "./play.js";
-import { openClip, startCaptured, startFits, startWalks } from "./recorded.js";
+import { openClip, startCaptured, startFits } from "./recorded.js";
 import { createChase } from "./view.js";
 
 globalThis.Hobble = {
-  bvh: bvhText, character: createCharacter, chase: createChase, colour, csv, groundSamples, jointVelocities, lab: createLab, material, watch: createWatch,
+  bvh: bvhText, character: createCharacter, chase: createChase, colour, csv, material, watch: createWatch,
   ready: false,
   get drawAll() { return drawAll; },
   get hero() { return hero; },
@@ -19,7 +18,7 @@ globalThis.Hobble = {
   get player() { return player; },
 };
 
-const atOnce = [startPage, startTables, startCharts, startPlay], later = [startWalks, startCaptured, startFits];
+const atOnce = [startPage, startTables, startCharts, startPlay], later = [startCaptured, startFits];
 const startNext = () => {
   const start = later.shift();
   if (start) { setTimeout(startNext); start(); } else Hobble.ready = true;

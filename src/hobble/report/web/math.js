@@ -8,11 +8,8 @@ export const bytes = (text) => {
   return out.buffer;
 };
 
-export const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-export const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
 export const minus = (a, b) => [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
-// The vector of length 1 in the direction of a.
-export const unit = (a) => { const n = Math.hypot(...a) || 1; return a.map((v) => v / n); };
 // The vector between a (t = 0) and b (t = 1).
 export const mix = (a, b, t) => a.map((v, i) => v + (b[i] - v) * t);
 // The same angle in -pi to pi.
@@ -45,22 +42,38 @@ export const mixTurn = (a, i, b, k, t, out, o) => {
   for (let c = 0; c < 4; c++) out[o + c] /= n;
 };
 
-// Unpacks a body from JSON for three.js. The caller passes the classes of its own three.js.
-// body: from `hobble.figure.pack.packed_body`. In the result, keep: the joints that are bones. inverses: the inverse matrix of each bone in the
-// rest pose. balls: for each bone, a sphere [x, y, z, radius] around its part of the body, in the coordinates of the bone.
-export const unpackBody = ({ BufferAttribute, BufferGeometry, Matrix4, Quaternion, Sphere, Vector3 }, body) => {
-  const geometry = new BufferGeometry(), corners = new Int16Array(bytes(body.corners));
-  geometry.setAttribute("position", new BufferAttribute(Float32Array.from(corners, (v) => v * body.unit), 3));
-  geometry.setAttribute("normal", new BufferAttribute(new Int8Array(bytes(body.normals)), 3, true));
-  geometry.setAttribute("shade", new BufferAttribute(new Uint8Array(bytes(body.shade)), 1, true));
-  geometry.setAttribute("skinIndex", new BufferAttribute(new Uint8Array(bytes(body.bone)), 4));
-  geometry.setAttribute("skinWeight", new BufferAttribute(new Uint8Array(bytes(body.share)), 4, true));
-  geometry.setIndex(new BufferAttribute(body.wide ? new Uint32Array(bytes(body.faces)) : new Uint16Array(bytes(body.faces)), 1));
+// A body from JSON for three.js. The caller passes its own three.js. body: from `hobble.figure.pack.packed_body`. coarse: whether it has fewer
+// triangles, for a processor that draws without a graphics card. In the result, keep: the joints that are bones. balls: for each bone, a sphere [x, y, z, radius] around its part of the body, in the coordinates of the bone.
+export const unpackBody = ({ BufferAttribute, BufferGeometry, Sphere, Vector3 }, body, coarse = false) => {
+  const geometry = new BufferGeometry(), set = (name, ...values) => geometry.setAttribute(name, new BufferAttribute(...values));
+  set("position", Float32Array.from(new Int16Array(bytes(body.corners)), (v) => v * body.unit), 3);
+  set("normal", new Int8Array(bytes(body.normals)), 3, true);
+  set("shade", new Uint8Array(bytes(body.shade)), 1, true);
+  set("skinIndex", new Uint8Array(bytes(body.bone)), 4);
+  set("skinWeight", new Uint8Array(bytes(body.share)), 4, true);
+  geometry.setIndex(new BufferAttribute(new Uint16Array(bytes(coarse ? body.coarse : body.faces)), 1));
   geometry.boundingSphere = new Sphere(new Vector3(), 1e6);
-  const unscaled = new Vector3(1, 1, 1);
-  const inverses = body.places.map((place, i) => {
-    const [w, x, y, z] = body.turns[i];
-    return new Matrix4().compose(new Vector3(...place), new Quaternion(x, y, z, w), unscaled).invert();
-  });
-  return { geometry, inverses, keep: body.keep, balls: body.balls };
+  return { geometry, places: body.places, keep: body.keep, balls: body.balls };
+};
+
+// The bones of an unpacked body. add(material): a surface that they move. move(b, places, turns, j): puts bone b to place and rotation j of flat
+// arrays.
+export const createBones = ({ Bone, DetachedBindMode, Matrix4, Quaternion, Skeleton, SkinnedMesh, Vector3 }, { geometry, places: rest }) => {
+  const bones = rest.map(() => new Bone()), skeleton = new Skeleton(bones, rest.map(([x, y, z]) => new Matrix4().makeTranslation(-x, -y, -z)));
+  const spot = new Vector3(), turn = new Quaternion(), unscaled = new Vector3(1, 1, 1);
+  return {
+    bones,
+    add(material) {
+      const mesh = new SkinnedMesh(geometry, material);
+      mesh.bindMode = DetachedBindMode;
+      mesh.bind(skeleton, new Matrix4());
+      mesh.frustumCulled = false;
+      return mesh;
+    },
+    move(b, places, turns, j) {
+      spot.fromArray(places, 3 * j);
+      turn.set(turns[4 * j + 1], turns[4 * j + 2], turns[4 * j + 3], turns[4 * j]);
+      bones[b].matrixWorld.compose(spot, turn, unscaled);
+    },
+  };
 };

@@ -1,11 +1,12 @@
 // An ES module without dependencies, with which another page or a game runs and draws a character. hobble.d.ts documents it.
 import { createCharacter as createMoved } from "./character.js";
-import { unpackBody } from "./math.js";
+import { createBones, unpackBody } from "./math.js";
 
 const FLAT = () => 0;
 
-// data: content of character.json. place: [x, z] in cm, and heading: yaw in radians, where the character starts.
-export const createCharacter = (data, { place = [0, 0], heading = 0 } = {}) => {
+// data: content of character.json. place: [x, z] in cm, and heading: yaw in radians, where the character starts. variation, seed: how much its
+// steps differ, and in which way.
+export const createCharacter = (data, { place = [0, 0], heading = 0, variation = 0, seed = 0 } = {}) => {
   const { spec } = data, moved = createMoved(spec, place, heading), J = spec.names.length;
   const character = { joints: spec.names, gaits: spec.gaits, channels: {}, parts: {}, places: new Float64Array(3 * J), turns: new Float64Array(4 * J) };
   for (const channel of spec.channels) {
@@ -19,6 +20,7 @@ export const createCharacter = (data, { place = [0, 0], heading = 0 } = {}) => {
     Object.assign(character, { contacts: [...moved.contacts], phase: moved.phase, root: [...moved.root] });
   };
   copyState();
+  moved.vary(variation, seed);
 
   // Sets the values of a channel. values: column -> value. Columns that are not in `values` go back to their value at the start.
   character.setChannel = (name, values = {}) => {
@@ -44,19 +46,6 @@ export const createCharacter = (data, { place = [0, 0], heading = 0 } = {}) => {
 
 // The body for three.js: {mesh, pose(character)}. `pose` moves the mesh to the pose of the character. THREE: the caller's three.js.
 export const createFigure = (THREE, data, material = new THREE.MeshStandardMaterial({ color: 0xd6d6d2, roughness: .8 })) => {
-  const { geometry, inverses, keep } = unpackBody(THREE, data.body), bones = keep.map(() => new THREE.Bone());
-  const mesh = new THREE.SkinnedMesh(geometry, material), spot = new THREE.Vector3(), turn = new THREE.Quaternion(), unscaled = new THREE.Vector3(1, 1, 1);
-  mesh.bindMode = THREE.DetachedBindMode;
-  mesh.bind(new THREE.Skeleton(bones, inverses), new THREE.Matrix4());
-  mesh.frustumCulled = false;
-  return {
-    mesh,
-    pose({ places, turns }) {
-      keep.forEach((j, b) => {
-        spot.fromArray(places, 3 * j);
-        turn.set(turns[4 * j + 1], turns[4 * j + 2], turns[4 * j + 3], turns[4 * j]);
-        bones[b].matrixWorld.compose(spot, turn, unscaled);
-      });
-    },
-  };
+  const body = unpackBody(THREE, data.body), { add, move } = createBones(THREE, body);
+  return { mesh: add(material), pose({ places, turns }) { body.keep.forEach((j, b) => move(b, places, turns, j)); } };
 };

@@ -1,5 +1,5 @@
 // Reads the state of Play from a link. Anybody can write a link, so every part is checked.
-import { bvhText, createActor } from "./actor.js";
+import { bvhText, createActor, createTicker } from "./actor.js";
 import { bodyChannel, find, material, save, valueKey } from "./base.js";
 import { startGallery } from "./gallery.js";
 import { glbFile } from "./glb.js";
@@ -230,13 +230,16 @@ const SIDE = 95; // cm between two figures
 const createPlay = (stage, playables) => {
   const canvas = find("play-view"), ground = find("play-ground"), selects = [find("play-first"), find("play-second")];
   const names = Object.keys(playables), player = { actors: [], target: null };
-  // due: how many frames have to run; it grows with time. last: time of the last picture, ms, or null. shown: when the readings were last
-  // updated, ms. ready: false until the page is set up.
-  let panels = [], sliders, last = null, due = 0, shown = 0, ready = false;
+  const ticker = createTicker();
+  // shown: when the readings were last updated, ms. ready: false until the page is set up.
+  let panels = [], sliders, shown = 0, ready = false;
   const currentGround = () => GROUNDS.get(ground.value), groundHeight = (x, z) => currentGround().height(x, z);
 
   const view = createView(canvas, START, (now) => {
-    move(now);
+    for (let n = ticker.frames(now); n > 0; n--) {
+      player.target = steering.target();
+      player.actors.forEach((actor) => actor.frame(player.target, sliders.values));
+    }
     const middle = [0, 1, 2].map((i) => player.actors.reduce((sum, { rig }) => sum + rig.places[i], 0) / player.actors.length);
     const { target } = player, [vx, vz] = target ? target.velocity : [0, 0], walks = target && !steering.byItself && !target.facing && Math.hypot(vx, vz) > .5;
     const lookAt = chase.follow(now, middle, walks ? [vx, vz] : null);
@@ -249,16 +252,7 @@ const createPlay = (stage, playables) => {
   });
   view.framing = { size: 2.1, aside: 0, up: -.02 };
   const steering = createSteering(stage, view.orbit), chase = createChase(view.orbit, canvas);
-  // Runs the frames that are due at time `now`.
-  const move = (now) => {
-    due = Math.min(4, due + (last === null ? 1 : (now - last) * .06));
-    last = now;
-    for (; due >= 1; due--) {
-      player.target = steering.target();
-      player.actors.forEach((actor) => actor.frame(player.target, sliders.values));
-    }
-  };
-  view.onHidden = () => { last = null; chase.rest(); steering.release(); };
+  view.onHidden = () => { ticker.rest(); chase.rest(); steering.release(); };
 
   const createActors = () => {
     player.actors.forEach((actor) => actor.remove());
@@ -268,8 +262,10 @@ const createPlay = (stage, playables) => {
       ? { place: [(i ? -1 : 1) * SIDE / 2, 0], tint: i ? "second" : "predicted" } : {}));
     panels = player.actors.map((actor, i) => createPanel(find("play-panel"), actor, two ? who[i] : ""));
     panels.forEach(({ box }, i) => box.classList.toggle("second", two && i === 1));
+    vary();
     start();
   };
+  const variation = find("play-variation"), vary = () => player.actors.forEach(({ character }) => character.vary(Number(variation.value), 7));
   const start = () => {
     player.actors.forEach((actor) => actor.start(groundHeight));
     chase.reset();
@@ -322,13 +318,9 @@ const createPlay = (stage, playables) => {
 
   // Buttons
 
-  find("play-inputs").addEventListener("click", (event) => {
-    view.inputs = !view.inputs;
-    event.currentTarget.setAttribute("aria-pressed", String(view.inputs));
-    sliders.say(view.inputs ? "These are inputs of the network. Squares: ground heights, red above the path, blue below it. Needles: joint velocities." : "");
-  });
   find("play-reset").addEventListener("click", () => { start(); view.orbit.reset(); });
   ground.addEventListener("change", start);
+  variation.addEventListener("input", vary);
   selects.forEach((select) => select && select.addEventListener("change", createActors));
   find("play-share").addEventListener("click", () => {
     history.replaceState(null, "", address());

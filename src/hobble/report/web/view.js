@@ -103,12 +103,13 @@ export const views = [];
 // Levels of quality, best first. scale: pixels drawn for each CSS pixel, at most. shadow: size of the shadow map, or 0 for no shadows. balls: how
 // many round parts of bodies darken the ground. The levels from SOFTWARE on are for a processor that draws without a graphics card.
 const LEVELS = [
-  { scale: 2, shadow: 768, balls: 24 }, { scale: 1, shadow: 512, balls: 16 }, { scale: .8, shadow: 0, balls: 12 }, { scale: .6, shadow: 0, balls: 8 }, { scale: .42, shadow: 0, balls: 6 },
+  { scale: 2, shadow: 768, balls: 24 }, { scale: 1, shadow: 512, balls: 16 }, { scale: .8, shadow: 0, balls: 12 },
+  { scale: .6, shadow: 0, balls: 8 }, { scale: .42, shadow: 0, balls: 6 }, { scale: .3, shadow: 0, balls: 4 },
 ];
 const SOFTWARE = 3;
-const SLOW = 50, PATIENCE = 24; // if more than PATIENCE pictures take longer than SLOW ms, the quality goes down a level
+const ON_TIME = 60, PATIENCE = 1000; // if pictures that follow one another are later than ON_TIME by PATIENCE in all, ms, the quality goes down a level
 const requested = new URLSearchParams(location.search).get("quality");
-let level = 0, slow = 0;
+let level = 0, late = 0;
 
 // A WebGL context without smooth edges. software: whether the processor draws.
 const probe = (canvas) => {
@@ -179,14 +180,13 @@ export const createView = (canvas, home, draw, { marks = 4000 } = {}) => {
   const context = canvas.getContext("2d"), scene = new Scene(), camera = new PerspectiveCamera(30, 1, 10, 6000);
   const lights = createLights(scene);
   // seen: whether the canvas is on the screen. waiting: whether a picture was requested.
-  // drawnAt: time of the last picture, ms. drawnFor: level of quality for which the size was set, or -1.
-  let scale = 1, seen = false, waiting = false, drawnAt = 0, drawnFor = -1;
+  // drawnAt: time of the last picture, ms. goesOn: whether it asked for this one. drawnFor: level of quality for which the size was set, or -1.
+  let scale = 1, seen = false, waiting = false, drawnAt = 0, goesOn = false, drawnFor = -1;
   // framing: size of the body in the picture, and its shift as a share of the picture's width (aside) and height (up).
-  const view = { scene, W: 0, H: 0, paint: {}, milliseconds: 0, framing: { size: 1.75, aside: 0, up: 0 }, balls: 12, inputs: false, onHidden: () => {} };
+  const view = { scene, W: 0, H: 0, paint: {}, milliseconds: 0, framing: { size: 1.75, aside: 0, up: 0 }, balls: 12, onHidden: () => {} };
   view.simple = Boolean(getRenderer(canvas)) && level >= SOFTWARE;
-  view.land = createLand(scene);
-  view.marks = createMarks(scene, { most: marks });
-  view.marksInFront = createMarks(scene, { most: marks / 10, over: true });
+  view.land = createLand(scene, view.simple);
+  view.marks = createMarks(scene, marks);
 
   const paint = (now) => {
     if (drawnFor < 0) return; // the browser has not laid out the canvas yet
@@ -198,19 +198,18 @@ export const createView = (canvas, home, draw, { marks = 4000 } = {}) => {
       return;
     }
     if (drawnFor !== level) setSize();
-    // Lower the quality if pictures keep coming slowly.
-    slow = now - drawnAt > SLOW && now - drawnAt < 1000 ? slow + 1 : Math.max(0, slow - 2);
+    // Lower the quality if pictures keep coming late. One very late picture may be the first after a pause, so it counts as one second.
+    if (goesOn) late = Math.max(0, late + Math.min(1000, now - drawnAt) - ON_TIME);
     drawnAt = now;
-    if (slow > PATIENCE && level + 1 < LEVELS.length && !requested) { level++; slow = 0; }
+    if (late > PATIENCE && level + 1 < LEVELS.length && !requested) { level++; late = 0; }
     view.marks.clear();
-    view.marksInFront.clear();
     draw(now, view);
+    goesOn = waiting;
     const before = performance.now(), [w, h] = [canvas.width, canvas.height], glCanvas = gl.domElement;
     if (glCanvas.width < w || glCanvas.height < h) gl.setSize(Math.max(glCanvas.width, w), Math.max(glCanvas.height, h), false);
     gl.setViewport(0, 0, w, h);
     gl.setScissor(0, 0, w, h);
     view.marks.upload();
-    view.marksInFront.upload();
     gl.render(scene, camera);
     // Draw the sky first, so that saved pictures and films have one.
     const sky = context.createLinearGradient(0, 0, 0, h), [r, g, b] = view.paint.sky, [u, v, t] = view.paint.zenith;
