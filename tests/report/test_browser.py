@@ -208,8 +208,8 @@ def test_every_chart_is_printed_in_light_colours(tab: Browser) -> None:
 def test_the_page_prints_no_console_message_and_makes_no_request(tab: Browser) -> None:
     """Runs last, after all tests above have used the page.
 
-    To draw a heatmap, plotly asks whether the browser draws pixels with sharp edges. It does so with an inline
-    style, which the page's policy refuses. Plotly then draws each cell by itself.
+    To draw a heatmap, plotly asks whether the browser draws pixels with sharp edges. It does so with an
+    inline style, which the page's policy refuses. Plotly then draws each cell by itself.
     """
     assert [said for said in tab.console if not said.startswith("Applying inline style")] == []
     assert [url for url in tab.requests if not url.startswith(("file:", "data:", "blob:", "about:"))] == []

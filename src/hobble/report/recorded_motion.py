@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from hobble.core.files import map_npz, to_base64
+from hobble.core.files import load_npz, map_npz, to_base64
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 from hobble.figure.mesh import body_mesh, mesh_key
