@@ -144,7 +144,7 @@ def _with_missing_roles(known: dict[str, Array]) -> dict[str, Array]:
     """
     out = dict(known)
     leg = float(np.linalg.norm(out["hips"] - out["left_heel"]))
-    out.setdefault("head", out["hips"] + [0.0, 0.7 * leg, 0.0])
+    out.setdefault("head", out["hips"] + [0.0, 0.56 * leg, 0.0])
     for side, sign in zip(SIDES, (1.0, -1.0), strict=True):
         way = 0.72 * (out["head"] - out["hips"])
         out.setdefault(f"{side}_shoulder", out["hips"] + way + [sign * 0.2 * leg, 0.0, 0.0])
