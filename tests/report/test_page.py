@@ -139,7 +139,7 @@ def hostile(
     material: ReportMaterial, character: dict[str, Any], network: Network, script: str
 ) -> tuple[str, str]:
     """A page in which a clip, the trained link and the data set have a name of markup, and the link."""
-    (link,) = network.trained_labels("injury")
+    link = network.trained_labels("injury")[0]
 
     def renamed(value: Any) -> Any:
         text = json.dumps(json_data(value))
