@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 
 import numpy as np
@@ -19,7 +18,6 @@ from hobble.labels.label_files import (
     read_phase,
     whole_frame,
 )
-from hobble.motion.edit import sample_times
 
 AT_120 = SourceTime(240, 120.0)
 
@@ -28,22 +26,6 @@ AT_120 = SourceTime(240, 120.0)
 @settings(max_examples=100, deadline=None)
 def test_a_cycle_starts_at_half_the_frame_number_of_a_120_hz_file(number):
     assert whole_frame(SourceTime(20_000, 120.0).to_clip_frame(number)) == number // 2
-
-
-@pytest.mark.parametrize("fps", [23.976, 1 / 0.00833, 1 / 0.01667])
-def test_a_frame_rate_that_is_not_whole_is_not_rounded(fps):
-    """Labels and frames are at the same moments even after ten minutes."""
-    times = sample_times(72_000, fps, 60.0)
-    time = SourceTime(72_000, fps)
-    np.testing.assert_allclose(time.source_frames_of_clip(len(times)), times, atol=1e-6)
-    np.testing.assert_allclose(time.to_clip_frame(times[-1] + 1), len(times) - 1, atol=1e-6)
-
-
-def test_footsteps_count_from_one(write):
-    steps = read_footsteps(write("a_footsteps.txt", "11 21\r\n31 41 *\r\n\r\n51"), AT_120)
-    assert steps[:2].tolist() == [[5.0, 10.0, 0.0], [15.0, 20.0, 1.0]]
-    assert steps[2, 0] == 25.0
-    assert math.isnan(steps[2, 1])
 
 
 @pytest.mark.parametrize(
@@ -66,15 +48,6 @@ def test_wrong_footsteps_are_refused_with_their_line(write, text, line, word):
     with pytest.raises(InputError, match=word) as caught:
         read_footsteps(path, AT_120)
     assert (caught.value.path, caught.value.line) == (path, line)
-
-
-def test_gait_shares_are_constant_between_equal_keys_and_fade_between_others(write):
-    shares = read_gait_keys(write("a_gait.txt", "1 stand\n41 stand\n82 run\n122 crawl\n"), AT_120, 120)
-    assert (shares[:21, 0] == 1).all()
-    assert shares[20:41, 0] == pytest.approx(np.linspace(1, 0, 21))
-    assert shares[20:41, 2] == pytest.approx(np.linspace(0, 1, 21))
-    assert shares[61:, 3] == pytest.approx(1)
-    assert shares.sum(axis=1) == pytest.approx(1)
 
 
 @pytest.mark.parametrize(
@@ -107,20 +80,6 @@ def test_a_clip_cut_at_the_start_uses_the_matching_part_of_its_files(write):
     np.testing.assert_allclose(keys, moved)
 
 
-def test_phase_between_rows_is_interpolated_the_short_way_round(write):
-    path = write("a.phase", "0.8\n0.9\n0.1\n0.2\n")
-    phase = read_phase(path, SourceTime(4, 30.0), 7)
-    assert phase == pytest.approx([0.8, 0.85, 0.9, 0.0, 0.1, 0.15, 0.2])
-
-
-def test_the_eight_columns_of_a_gait_file_become_six(write):
-    rows = np.eye(8)
-    text = "\n".join(" ".join(f"{x:.5f}" for x in row) for row in rows)
-    shares = read_gait(write("a.gait", text), SourceTime(8, 60.0), 8)
-    assert shares.argmax(axis=1).tolist() == [0, 1, 2, 2, 3, 4, 3, 5]
-    assert shares.sum(axis=1).tolist() == [1] * 8
-
-
 @pytest.mark.parametrize(
     ("text", "line", "word"),
     [
@@ -135,14 +94,6 @@ def test_wrong_phase_files_are_refused(write, text, line, word):
     with pytest.raises(InputError, match=word) as caught:
         read_phase(write("a.phase", text), SourceTime(4, 60.0), 4)
     assert caught.value.line == line
-
-
-def test_binary_and_missing_files_are_refused(tmp_path: Path):
-    (tmp_path / "a.phase").write_bytes(b"\x80\x81\xff")
-    with pytest.raises(InputError, match="not a text file"):
-        read_phase(tmp_path / "a.phase", AT_120, 120)
-    with pytest.raises(InputError, match="no such file"):
-        read_footsteps(tmp_path / "b_footsteps.txt", AT_120)
 
 
 @pytest.mark.shared

@@ -47,10 +47,3 @@ def test_only_a_long_pause_separates_two_bouts_of_walking(walker, pause, bouts):
     assert len(events) - (bouts - 1) == len(found(clip)[1])
     cycles, _ = find_cycles(rows_of_landings(events), len(paused), "right", "drop")
     assert any(a < both_down < b for a, b in cycles) == (bouts == 1)
-
-
-@pytest.mark.parametrize("frames", [1, 2, 3, 30])
-def test_very_short_clips_have_at_most_one_landing_and_no_cycle(walker, frames):
-    clip = walker(frames=frames, start=5)
-    assert len(found(clip)[1]) <= 1
-    assert find_cycles(rows_of_landings(found(clip)[1]), frames, "right", "drop")[0].shape == (0, 2)

@@ -41,22 +41,6 @@ def test_hand_made_files_replace_labels_found_from_motion(walker, options, write
     assert (labels.gait.argmax(axis=1)[60:] == 1).all()
 
 
-def test_label_files_of_a_looped_clip_are_ignored_with_a_note(walker, options, write):
-    clip = walker()
-    files = [write("w_footsteps.txt", FOOTSTEPS), write("w_gait.txt", "1 jog\n")]
-    labels, report = label_clip(clip, files, {**MOTION, "loops": 2}, "walk", "rocky", options)
-    assert (report.phase_source, report.gait_source) == ("automatic", "automatic")
-    assert report.warnings == (
-        "w_footsteps.txt, w_gait.txt not used: their frame numbers are those of one cycle, but the clip "
-        "repeats this cycle",
-    )
-    unread = label_clip(
-        clip, files, {**MOTION, "loops": 2}, "walk", "rocky", options.model_copy(update={"files": False})
-    )
-    assert unread[1].warnings == ()
-    np.testing.assert_array_equal(unread[0].phase, labels.phase)
-
-
 def test_a_phase_file_overrides_footsteps_and_a_gait_file_overrides_keys(walker, options, write):
     clip = walker()
     phase = np.linspace(0, 20, 1200) % 1.0
@@ -77,19 +61,6 @@ def test_a_phase_file_overrides_footsteps_and_a_gait_file_overrides_keys(walker,
     assert np.diff(landed) == pytest.approx(1199 / 20 / 2, abs=0.01)
 
 
-def test_left_zero_shifts_phase_and_starts_cycles_with_the_left_foot(walker, options, write):
-    clip = walker()
-    files = [write("w_footsteps.txt", FOOTSTEPS)]
-    right, _ = label_clip(clip, files, MOTION, None, "rocky", options)
-    left, report = label_clip(
-        clip, files, MOTION, None, "rocky", options.model_copy(update={"phase_zero": "left"})
-    )
-    assert report.phase_zero == "left"
-    assert apart(left.phase, right.phase + 0.5).max() < 1e-12
-    assert left.cycles.tolist() == [[100, 160], [280, 340]]
-    assert left.phase[100] == 0
-
-
 def test_a_mirrored_clip_has_the_labels_that_mirrored_files_would_give(walker, options, write):
     clip = walker()
     labels, report = label_clip(clip, [write("w_footsteps.txt", FOOTSTEPS)], MOTION, None, "flat", options)
@@ -102,11 +73,6 @@ def test_a_mirrored_clip_has_the_labels_that_mirrored_files_would_give(walker, o
     assert (mirrored.contacts == labels.contacts[:, [2, 3, 0, 1]]).all()
     assert (mirrored.gait == labels.gait).all()
     assert other.clip == "walker_mirror"
-
-
-def test_a_clip_without_a_whole_cycle_gets_a_warning(walker, options):
-    _, report = label_clip(walker(frames=120), [], MOTION, "walk", "flat", options)
-    assert "no whole gait cycle" in report.warnings[0]
 
 
 def test_labels_survive_their_file_and_the_picture_is_drawn(walker, options, tmp_path):

@@ -8,7 +8,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hobble.labels.phase import (
-    IDLE_RATE,
     dropped_frames,
     find_cycles,
     footsteps_of_phase,
@@ -22,33 +21,6 @@ STEPS = np.array([[70.0, 95.0, 0], [120.0, 150.0, 0], [175.0, 200.0, 0], [230.0,
 
 def apart(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return np.abs((a - b + 0.5) % 1.0 - 0.5)
-
-
-def test_phase_is_zero_where_the_right_foot_lands_and_a_half_where_the_left_does():
-    phase, known = phase_of_footsteps(STEPS, 300)
-    assert phase[[70, 120, 175, 230]] == pytest.approx(0)
-    assert phase[[95, 150, 200]] == pytest.approx(0.5)
-    assert phase[135] == pytest.approx(0.25)
-    assert phase[180] == pytest.approx(0.1)
-    assert np.flatnonzero(known).tolist() == list(range(70, 231))
-
-
-def test_an_unknown_phase_advances_slowly():
-    phase, known = phase_of_footsteps(STEPS, 300)
-    assert not known[240:].any()
-    assert np.diff(phase[231:])[1:] == pytest.approx(IDLE_RATE)
-    assert np.diff(phase[:60]) == pytest.approx(IDLE_RATE)
-    nothing, known = phase_of_footsteps(np.zeros((0, 3)), 50)
-    assert np.diff(nothing) == pytest.approx(IDLE_RATE)
-    assert not known.any()
-
-
-def test_cycles_run_from_line_to_line_and_share_their_boundary_frames():
-    cycles, dropped = find_cycles(STEPS, 300, "right", "drop")
-    assert cycles.tolist() == [[70, 120], [120, 175], [175, 230]]
-    assert dropped == 0
-    cycles, _ = find_cycles(STEPS, 300, "left", "drop")
-    assert cycles.tolist() == [[95, 150], [150, 200]]
 
 
 MARGINS = [("extend", 1, 164, 3), ("extend", 0.5, 164, 3), ("extend", 0, 164, 2), ("extend", 1, 163, 2)]
@@ -71,12 +43,6 @@ def test_a_marked_line_drops_the_cycles_on_both_sides_of_it(line, kept):
     whole = find_cycles(STEPS, 300, "right", "drop")[0]
     assert find_cycles(steps, 300, "right", "drop")[0].tolist() == whole[kept].tolist()
     assert dropped_frames(steps, 300).sum() == (0 if line == 3 else whole[line, 1] - whole[line, 0])
-
-
-def test_no_cycle_runs_over_a_pause():
-    steps = np.array([[70.0, 95, 0], [np.nan, np.nan, 1], [270.0, 300, 0], [330.0, 360, 0]])
-    assert find_cycles(steps, 500, "right", "drop")[0].tolist() == [[270, 330]]
-    assert find_cycles(steps, 500, "left", "drop")[0].tolist() == [[300, 360]]
 
 
 def test_landings_become_rows_that_end_where_a_foot_lands_twice():
@@ -132,11 +98,3 @@ def test_mirroring_footsteps_shifts_phase_by_half_a_cycle(case):
     np.testing.assert_equal(twice, steps)
     left = find_cycles(steps, frames, "left", "drop")[0]
     assert find_cycles(mirrored_footsteps(steps), frames, "right", "drop")[0].tolist() == left.tolist()
-
-
-def test_a_dropped_line_stays_dropped_in_the_mirror():
-    steps = STEPS.copy()
-    steps[1, 2] = 1
-    mirrored = mirrored_footsteps(steps)
-    marked = mirrored[mirrored[:, 2] == 1]
-    assert marked[:, 0].tolist() == [150.0]

@@ -19,10 +19,8 @@ LEG, ARM = ("UpLeg", "Leg", "Foot", "ToeBase"), ("Shoulder", "Arm", "ForeArm", "
 SIDES = {"L": "Left", "R": "Right"}
 
 
-def human(
-    name: str, trunk: str, leg: str, arm: str, order: str = "LR", hips: str = "", more: str = ""
-) -> str:
-    """A rig by names. name: of a limb's joint, with {n} for the word and {L} or {l} for the side's.
+def human(name: str, trunk: str, leg: str, arm: str) -> str:
+    """A rig by names. name: of a limb's joint, with {n} for the word and {l} for the side's letter.
 
     trunk: `name=joint` from the hips to the head. leg, arm: the words of the four joints of each.
     """
@@ -32,20 +30,19 @@ def human(
         lines.append(f"{joint}|{last}|{place}")
         last = joint
     chest = next(joint for joint, place in chain if place == "Spine1")
-    for side in order:
+    for letter, side in SIDES.items():
         for words, parts, top in ((leg, LEG, chain[0][0]), (arm, ARM, chest)):
             last = top
             for word, part in zip(words.split(), parts, strict=True):
-                own = name.format(n=word, S=SIDES[side], L=side, l=side.lower(), J="左右"["LR".index(side)])
-                lines.append(f"{own}|{last}|{SIDES[side]}{part}")
+                own = name.format(n=word, l=letter.lower())
+                lines.append(f"{own}|{last}|{side}{part}")
                 last = own
     return "\n".join(lines)
 
 
-TRUNK = "{}=Hips {}=Spine {}=Spine1 {}=Neck1 {}=Head"
 PLAIN = human(
     "{n}_{l}",
-    TRUNK.format("hips", "spine", "chest", "neck", "head"),
+    "hips=Hips spine=Spine chest=Spine1 neck=Neck1 head=Head",
     "thigh shin foot toe",
     "shoulder upper_arm forearm hand",
 )
@@ -64,13 +61,6 @@ GAME = "".join(
     f"\nthigh_twist_{s}|thigh_{s}|{side}UpLeg+0,-20,0\nik_hand_{s}|root|{side}Hand\nik_foot_{s}|root|{side}Foot"
     for s, side in (("l", "Left"), ("r", "Right"))
 )
-# As Rigify has it: a second leg that only moves the first, a longer chain to the heel than to the ball.
-MECHANISM = "".join(
-    f"\nmch_thigh_{s}|hips|{side}UpLeg\nmch_shin_{s}|mch_thigh_{s}|{side}Leg\nmch_foot_{s}|mch_shin_{s}|{side}Foot"
-    f"\nheel_{s}|foot_{s}|{side}Foot+0,-6,-5\nheel_end_{s}|heel_{s}|{side}Foot+{6 * x},-6,-14"
-    for s, side, x in (("l", "Left", 1), ("r", "Right", -1))
-)
-
 # As the Master Motor Map of KIT has it: several joints in one place, one for each axis.
 KIT = "\n".join(
     f"{name}|{parent}|{joint}"

@@ -138,17 +138,6 @@ def test_uneven_ground_stays_where_it_is(walk, bvh, make):
     np.testing.assert_allclose(clip.root[:, 1], walk.root[::2, 1] + 40, atol=1e-6)
 
 
-def test_the_facing_direction_can_be_set(walk, bvh, make):
-    path = bvh(walk)
-    as_it_is, report = make(path)
-    assert report["facing"] == pytest.approx(0, abs=1)
-    clip, report = make(path, facing=90.0)
-    assert report["facing"] == pytest.approx(90.0)
-    np.testing.assert_allclose(clip.root[0], as_it_is.root[0], atol=1e-9)
-    assert clip.root[-1, 0] - clip.root[0, 0] > 190
-    np.testing.assert_allclose(clip.positions[..., 1], as_it_is.positions[..., 1], atol=1e-9)
-
-
 def tilted(clip, axis, degrees):
     return turned(clip, quat.from_axis_angle(np.asarray(axis), np.radians(degrees)))
 

@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+import re
+import shutil
+
 import pytest
 
 from hobble.cli.__main__ import main
-from hobble.motion.look import ClipSummary, format_table, shared_warnings, summarise_clips
+from hobble.core.bvh import write_bvh
+from hobble.motion.look import PICTURES, WRONG, ClipSummary, format_table, shared_warnings, summarise_clips
+from hobble.motion.skeleton_file import load_skeleton
 
 
 @pytest.fixture
@@ -19,7 +24,7 @@ def seen(root, folder):
 
 
 def test_a_normal_walk_has_steps_and_no_warning(root, folder):
-    (clip,) = seen(root, folder).clips
+    (clip,), _ = seen(root, folder)
     assert (clip.rig, clip.fps) == ("holden31", 120)
     assert clip.cadence == pytest.approx(120, abs=15)  # two steps a second
     assert clip.speed == pytest.approx(100, abs=5)
@@ -29,7 +34,7 @@ def test_a_normal_walk_has_steps_and_no_warning(root, folder):
 def test_duplicates_and_files_without_a_clip_are_reported(root, folder):
     (folder / "again.bvh").write_bytes((folder / "healthy.bvh").read_bytes())
     (folder / "helthy_injuries.txt").write_text("frames:600\n")
-    text = format_table(seen(root, folder))
+    text = format_table(*seen(root, folder))
     assert "again and healthy are the same file" in text
     assert (
         "helthy_injuries.txt belongs to no clip and is not read. If it belongs to healthy, rename it." in text
@@ -39,7 +44,7 @@ def test_duplicates_and_files_without_a_clip_are_reported(root, folder):
 
 def test_a_refused_file_is_listed_with_its_message(root, folder):
     (folder / "broken.bvh").write_text("HIERARCHY\n")
-    assert "broken  REFUSED" in format_table(seen(root, folder))
+    assert "broken  REFUSED" in format_table(*seen(root, folder))
 
 
 def test_a_warning_of_many_clips_is_printed_once():
@@ -51,8 +56,21 @@ def test_a_warning_of_many_clips_is_printed_once():
     assert shared_warnings(clips[:4]) == (clips[:4], [])
 
 
-def test_a_draft_of_a_skeleton_file_is_printed(folder, capsys):
-    assert main(["rig", str(folder / "healthy.bvh")]) == 0
+def test_a_wrong_map_is_refused_with_the_joint_and_a_picture(root, walker, tmp_path, capsys) -> None:
+    """Here the left arm follows the right one."""
+    maps = tmp_path / "skeletons"
+    shutil.copytree(root / "config/skeletons", maps)
+    file = maps / "mixamo55.yaml"
+    text = file.read_text().replace("    LeftArm: LeftArm\n", "    LeftArm: RightArm\n")
+    file.write_text(text.replace("    RightArm: RightArm\n", "    RightArm: LeftArm\n"))
+    clip = tmp_path / "clip.bvh"
+    write_bvh(clip, walker(load_skeleton(file).skeleton, 120, 60.0), decimals=6)
+    given = ["look", str(clip), "--skeletons", str(maps), "--picture", str(tmp_path / "apart.svg")]
+    assert main(given) == 1
     said = capsys.readouterr().out
-    assert "  left_knee: 'LeftLeg'\n" in said
-    assert "  'LeftLeg': {parent: 'LeftUpLeg', offset: [0, -41, 0]}\n" in said
+    found = re.search(r"the (left|right) (upper arm|forearm|elbow) is \d+ degrees off its source", said)
+    assert found, said
+    assert "--picture apart.svg" in said
+    drawn = (tmp_path / "apart.svg").read_text()
+    assert found[0] in drawn
+    assert {"upper arm": 1, "forearm": 1, "elbow": 2}[found[2]] * 4 * PICTURES == drawn.count(WRONG)

@@ -68,11 +68,3 @@ def test_the_sample_is_spread_over_the_clips_after_those_with_a_warning():
     assert np.diff(some).max() < 3 * 10_000 / module.MOST_READ
     assert choose_clips([False] * 20) == list(range(20))
     assert choose_clips([]) == []
-
-
-def test_very_many_duplicates_are_counted(walker, holden31):
-    clip = walker(holden31, 240, 60.0)
-    reports, labels = many(50)
-    page = look_page("mine", reports, labels, lambda n: (clip, np.ones((10, 4))))
-    assert page.count("are the same motion") == module.MOST_NOTES - 1  # and that nobody stands
-    assert f"And {50 * 49 // 2 + 1 - module.MOST_NOTES} more notes" in page

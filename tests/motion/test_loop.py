@@ -10,9 +10,7 @@ import pytest
 from hobble.core import quat
 from hobble.core.errors import HobbleError
 from hobble.motion.edit import loop_clip
-from hobble.motion.retarget import plan, retarget_clip
-from hobble.motion.root import root_frames, vectors_to_root
-from hobble.motion.skeleton_file import load_skeleton
+from hobble.motion.root import root_frames
 
 
 def part(clip, first, last):
@@ -21,13 +19,6 @@ def part(clip, first, last):
 
 def speeds(clip):
     return np.linalg.norm(np.diff(clip.positions, axis=0), axis=-1).max(axis=1)
-
-
-def bone(clip, start, end, frames):
-    """Unit vectors (frames, 3) from one joint to another, as seen from the root."""
-    way = clip.positions[:, clip.skeleton.role(end)] - clip.positions[:, clip.skeleton.role(start)]
-    way = vectors_to_root(root_frames(clip, 5), way)[:frames]
-    return way / np.linalg.norm(way, axis=-1, keepdims=True)
 
 
 def seams(clip, cycle):
@@ -75,34 +66,3 @@ def test_a_data_set_can_ask_for_loops(walk, bvh, make):
     assert clip.root[-1, 0] > 380
     with pytest.raises(HobbleError, match="walk: 2 frames are too few"):
         make(bvh(part(walk, 0, 3)), loops=4, accept_doubt=True)
-
-
-@pytest.mark.shared
-@pytest.mark.parametrize("file", ["Walk_LLL", "LUL_Backwards", "Jog_LLA"])
-def test_injured_cycles_loop_without_a_jerk(shared, make, file):
-    path = shared / f"mocap/ferre/Injured_{file}.bvh"
-    once, _ = make(path)
-    clip, report = make(path, loops=8)
-    assert seams(clip, report["cycle_frames"]) <= 1.5 * speeds(once).max()
-
-
-@pytest.mark.shared
-@pytest.mark.parametrize(("file", "degrees"), [("Walk_LLL", 6), ("Run_LLL", 8), ("Walk_RUL", 10)])
-def test_legs_move_as_in_the_retargeting_by_the_authors(shared, root, make, file, degrees):
-    """Their loops of the same motion on 31 joints; their arms hang from shrugged shoulders.
-
-    Mean angle between their leg bones and ours: 4.4, 5.7 and 8.2 degrees.
-    """
-    folder = root / "config" / "skeletons"
-    theirs, _ = make(shared / f"mocap/ferre/Injured_{file}_extended_converted.bvh", proportions="clip")
-    ours, _ = make(shared / f"mocap/ferre/Injured_{file}.bvh", skeleton="mixamo55")
-    rig = load_skeleton(folder / "mixamo55.yaml")
-    pairs = {theirs_: mine for mine, theirs_ in rig.maps["holden31"].items()}
-    ours = retarget_clip(ours, plan(ours.skeleton, theirs.skeleton, pairs))
-    apart = []
-    for side in ("left", "right"):
-        for a, b in (("hip", "knee"), ("knee", "heel")):
-            ways = (bone(clip, f"{side}_{a}", f"{side}_{b}", len(ours) - 1) for clip in (ours, theirs))
-            cosine = np.clip(np.sum(np.multiply(*ways), axis=-1), -1, 1)
-            apart.append(np.degrees(np.arccos(cosine)).mean())
-    assert np.mean(apart) < degrees

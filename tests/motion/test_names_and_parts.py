@@ -11,7 +11,6 @@ import pytest
 from hobble.core.errors import InputError
 from hobble.core.skeleton import Skeleton
 from hobble.motion.body import pointing_fingers
-from hobble.motion.names import side_of_pair
 
 FLIP = np.array([-1.0, 1.0, 1.0])
 
@@ -61,22 +60,6 @@ def test_a_rig_whose_names_tell_no_sides_is_refused_until_handedness_is_set(orig
         here = wrists(right, side)
         assert np.linalg.norm(here - wrists(known, side)[: len(here)], axis=-1).mean() < 2
         assert np.linalg.norm(wrists(left, other) * FLIP - here, axis=-1).mean() < 2
-
-
-@pytest.mark.parametrize(
-    ("name", "other", "side"),
-    [
-        ("lfemur", "rfemur", "left"),
-        ("rtibia", "ltibia", "right"),
-        ("左足", "右足", "left"),
-        ("LeftLeg", "RightLeg", "left"),
-        ("arm1", "arm2", None),
-        ("lfemur", "rtibia", None),
-        ("leg", "leg", None),
-    ],
-)
-def test_a_pair_of_names_that_differ_in_one_letter_has_sides(name, other, side):
-    assert side_of_pair(name, other) == side
 
 
 def hand(wrist: str, *fingers: tuple[str, float]) -> Skeleton:

@@ -11,24 +11,16 @@ from hobble.core import quat
 from hobble.core.bvh import write_bvh
 from hobble.core.errors import InputError
 from tests.motion import other_rigs as rigs
-from tests.motion.other_rigs import PLAIN, TRUNK, human, rigged
+from tests.motion.other_rigs import PLAIN, rigged
 from tests.motion.scramble import X, compare, outcome, source_of
 
 SLOW = pytest.mark.slow
-JAPANESE = human(
-    "{J}{n}",
-    TRUNK.format("センター", "上半身", "上半身2", "首", "頭"),
-    "足 ひざ 足首 つま先",
-    "肩 腕 ひじ 手首",
-)
 RIGS = {
-    "Japanese": (JAPANESE, {}),
     "KIT, a joint for each axis": (rigs.KIT, {}),
     "game with targets for feet, Z up": (
         "root|-|ground\n" + PLAIN.replace("hips|-|", "hips|root|") + rigs.GAME,
         {"z_up": True},
     ),
-    "legs of a mechanism, and heels": (PLAIN + rigs.MECHANISM, {}),
     "skirt, hair, wings and tail, without names": (rigs.nameless(PLAIN + rigs.CLOTHES), {"rest": "one axis"}),
 }
 

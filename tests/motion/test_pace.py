@@ -12,6 +12,8 @@ from scipy.ndimage import gaussian_filter1d
 from hobble.core import quat
 from hobble.core.clip import Clip
 from hobble.core.errors import InputError
+from hobble.motion.look import summarise_clips
+from hobble.motion.options import ClipMotion
 
 
 def of_values(change):
@@ -120,3 +122,18 @@ def positions_alone(text: str) -> str:
 def test_channels_without_angles_in_degrees_are_refused(bvh, walk, make, edit, said):
     with pytest.raises(InputError, match=said):
         make(bvh(walk, edit=edit))
+
+
+@pytest.mark.shared
+@pytest.mark.parametrize(
+    "clip",
+    ["07_01", "16_21", *(pytest.param(k, marks=pytest.mark.slow) for k in ("105_29", "02_03", "16_36"))],
+)
+@pytest.mark.parametrize(("rate", "times"), [(60, 0.5), (120, 1.0), (240, 2.0)])
+def test_a_rate_that_is_wrong_by_two_is_noted_with_the_true_rate(shared, root, clip, rate, times):
+    file, maps = shared / f"mocap/cmu/{clip}.bvh", root / "config/skeletons"
+    options = ClipMotion(source_fps=float(rate))
+    (seen,), _ = summarise_clips(file, maps / "holden31.yaml", maps, options)
+    noted = [warning for warning in seen.warnings if "source_fps" in warning]
+    assert len(noted) == (times != 1.0)
+    assert all(note.endswith("(source_fps: 120).") for note in noted)

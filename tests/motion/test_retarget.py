@@ -84,12 +84,6 @@ def test_the_same_proportions_come_out_exactly(walk, rigs):
     assert quat.angle(again.rotations, walk.rotations).max() < 1e-4
 
 
-def test_a_figure_whose_legs_nothing_moves_is_refused(walk, rigs):
-    pairs = {n: n for n in walk.skeleton.joints if n != "LeftLeg"}
-    with pytest.raises(HobbleError, match=r"no joint of holden31 moves LeftLeg \(left_knee\) of holden31"):
-        plan(walk.skeleton, rigs["holden31"].skeleton, pairs)
-
-
 def test_a_leg_of_length_0_is_refused_in_source_and_target(walk, rigs):
     own = rigs["holden31"].skeleton
     offsets = own.offsets.copy()
@@ -100,33 +94,6 @@ def test_a_leg_of_length_0_is_refused_in_source_and_target(walk, rigs):
             HobbleError, match="the bone from RightLeg to RightFoot of holden31 has no length"
         ):
             plan(source, target, pairs)
-
-
-def test_the_path_is_scaled_by_the_legs(walk, rigs):
-    tall = replace(rigs["holden31"].skeleton, offsets=rigs["holden31"].skeleton.offsets * 1.5)
-    how = plan(walk.skeleton, tall, {name: name for name in walk.skeleton.joints})
-    made = retarget_clip(walk, how)
-    assert how.scale == pytest.approx(1.5)
-    np.testing.assert_allclose(made.positions, 1.5 * walk.positions, atol=1e-6)
-
-
-def test_a_rest_pose_with_splayed_legs_gives_straight_legs(walk, holden31):
-    """In the rest pose of CMU's rigs the legs are apart. The retargeted legs must follow the motion and not
-    that pose.
-    """
-    offsets = holden31.offsets.copy()
-    for side, sign in (("Left", 1), ("Right", -1)):
-        turn = quat.from_axis_angle(np.array([0, 0, 1.0]), 0.35 * sign)
-        for bone in ("Leg", "Foot"):
-            j = holden31.index(side + bone)
-            offsets[j] = quat.rotate(turn, offsets[j])
-    splayed = replace(holden31, offsets=offsets)
-    names = {name: name for name in holden31.joints}
-    away = retarget_clip(walk, plan(holden31, splayed, names))
-    apart = np.linalg.norm(away.positions - walk.positions, axis=-1)
-    assert apart.max() < 0.1
-    back = retarget_clip(away, plan(splayed, holden31, names))
-    np.testing.assert_allclose(back.positions, walk.positions, atol=0.1)
 
 
 def test_foreign_rigs_are_recognised_by_their_names(walker, rigs, bvh, make):
@@ -168,19 +135,3 @@ def test_feet_of_real_clips_slide_no_more_than_before_in_every_direction(shared,
             frames = standing(clip, role)
             before = slide(clip, role)[frames].sum() * how.scale
             assert slide(made, role)[frames].sum() <= 1.2 * before, (end, role)
-
-
-@pytest.mark.shared
-@pytest.mark.parametrize("file", ["105_10", "105_16", "08_03"])
-def test_nearly_straight_legs_bend_smoothly(shared, make, file):
-    """With other feet, the leg is too short for the target of the ankle. The hips come down instead of
-    straightening the knee.
-    """
-    source, _ = make(shared / f"mocap/cmu/{file}.bvh", proportions="clip")
-    made, report = make(shared / f"mocap/cmu/{file}.bvh")
-    for side in ("left", "right"):
-        before, after = (
-            np.linalg.norm(np.diff(c.positions[:, c.skeleton.role(f"{side}_knee")], 2, axis=0), axis=-1)
-            for c in (source, made)
-        )
-        assert after.max() < report["scale"] * before.max() + 5

@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from hobble.core.errors import InputError
-from hobble.motion.make import rig_in_file
-from hobble.motion.read import read_bvh
+from hobble.motion.read import decode_channels, read_bvh
 from hobble.motion.skeleton_file import draft_skeleton_file, guess_roles, load_skeleton
 
 
@@ -108,7 +107,7 @@ def test_a_joint_of_a_wrong_role_shows_in_the_motion(shared, root, tmp_path, par
     from hobble.motion.options import ClipMotion
 
     clip, folder = shared / "mocap/patients/SubjectA1_Cycle1.bvh", tmp_path / "skeletons"
-    rig = rig_in_file(read_bvh(clip))
+    rig = decode_channels(read_bvh(clip))[0].skeleton
     text = draft_skeleton_file(rig, guess_roles(rig))
     for part, joint in parts.items():
         if joint is None:

@@ -286,7 +286,7 @@ def test_the_saved_bvh_is_the_motion_that_was_played(
     (tmp_path / "played.bvh").write_text(tab.run(f"Hobble.bvh({json.dumps(spec)}, {json.dumps(frames)})"))
     file = read_bvh(tmp_path / "played.bvh")
     assert frame_rate(file.frame_time, file.frame_time_text) == 60
-    read = decode_channels(file)
+    read, _ = decode_channels(file)
     order = [file.names.index(name) for name in holden31.joints]
     skeleton = replace(holden31, offsets=read.offsets[order])
     _, back = forward_kinematics(skeleton, read.rotations[:, order], read.root)

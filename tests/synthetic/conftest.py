@@ -15,8 +15,7 @@ import pytest
 import yaml
 
 from hobble.core.skeleton import Skeleton
-from hobble.motion.make import raw_clip
-from hobble.motion.read import read_bvh
+from hobble.motion.read import decode_channels, read_bvh
 from hobble.synthetic.generate_clip import write_clip
 from hobble.synthetic.options import Synthetic
 
@@ -38,7 +37,7 @@ class Files:
     def bvh(self) -> tuple[list[str], float, Array]:
         """Joint names, frame time, (F, J, 3) positions of every frame of the file."""
         bvh = read_bvh(self.folder / f"{self.name}.bvh")
-        clip = raw_clip(bvh)
+        clip, _ = decode_channels(bvh)
         return list(clip.skeleton.joints), bvh.frame_time, clip.positions
 
     @cached_property

@@ -39,9 +39,10 @@ from hobble.labels.options import LabelOptions
 from hobble.motion.edit import loop_clip, mirror_clip, resample
 from hobble.motion.limbs import Doubt, find_body
 from hobble.motion.look import format_table, picture_of_file, summarise_clips
-from hobble.motion.make import clip_problems, load_source, make_clip, raw_clip, rig_in_file
+from hobble.motion.make import clip_problems, load_source, make_clip
 from hobble.motion.options import accept
 from hobble.motion.other_formats import read_motion
+from hobble.motion.read import decode_channels
 from hobble.motion.skeleton_file import (
     draft_skeleton_file,
     find_skeleton,
@@ -92,10 +93,10 @@ def look(options: argparse.Namespace) -> int:
     folder = options.skeletons or skeleton_folder()
     if options.picture:
         write_text(options.picture, picture_of_file(options.folder, target, folder, settings))
-    summary = summarise_clips(options.folder, target, folder, settings, progress)
-    clips = [{key: value for key, value in vars(clip).items() if key != "digest"} for clip in summary.clips]
-    print_result(options, {"clips": clips, "notes": summary.notes}, format_table(summary))
-    return int(any(clip.refused for clip in summary.clips))
+    summaries, notes = summarise_clips(options.folder, target, folder, settings, progress)
+    clips = [{key: value for key, value in vars(clip).items() if key != "digest"} for clip in summaries]
+    print_result(options, {"clips": clips, "notes": notes}, format_table(summaries, notes))
+    return int(any(clip.refused for clip in summaries))
 
 
 @command(
@@ -115,10 +116,10 @@ def rig(options: argparse.Namespace) -> int:
 
 def skeleton_draft(file: Path) -> str:
     """A draft of a skeleton file for the rig of a BVH file, with `?` for roles whose joint is not known."""
-    bvh = read_motion(file)
-    skeleton = rig_in_file(bvh)
+    clip, _ = decode_channels(read_motion(file))
+    skeleton = clip.skeleton
     try:
-        body, _ = find_body(skeleton.joints, skeleton.parents, raw_clip(bvh).positions)
+        body, _ = find_body(skeleton.joints, skeleton.parents, clip.positions)
         roles = body.roles(skeleton.joints)
     except Doubt as doubt:
         print(f"{file}: {doubt}. The roles are guessed from the names of the joints.", file=sys.stderr)

@@ -66,19 +66,17 @@ def read_phase(path: Path, time: SourceTime, frames: int) -> Array:
     Between two values the phase is interpolated the shorter way round the cycle. Raises InputError for a
     value that is not a number in 0..1, and for a wrong number of rows.
     """
-    rows = _read_matrix(path, time, 1)[:, 0]
-    before, after, share = _neighbouring_rows(rows, time, frames)
-    step = (after - before + 0.5) % 1.0 - 0.5
-    return np.where(share > 0, (before + share * step) % 1.0, before)
+    rows = np.unwrap(_read_matrix(path, time, 1)[:, 0], period=1.0)
+    phase = _at_clip_frames(rows, time, frames) % 1.0
+    return np.where(phase > 1 - 1e-9, 0.0, phase)
 
 
 def read_gait(path: Path, time: SourceTime, frames: int) -> Array:
     """(frames, 6) gait shares from a file with the 8 columns FILE_GAITS. Raises like `read_phase`."""
     rows = _read_matrix(path, time, len(FILE_GAITS))
-    before, after, share = _neighbouring_rows(rows, time, frames)
     # (8, 6): which of GAITS each column adds to.
     added = np.eye(len(GAITS))[[GAITS.index(GAIT_OF_FILE_GAIT.get(name, name)) for name in FILE_GAITS]]
-    return (before + share[:, None] * (after - before)) @ added
+    return np.stack([_at_clip_frames(column, time, frames) for column in rows.T], axis=1) @ added
 
 
 def read_footsteps(path: Path, time: SourceTime) -> Array:
@@ -201,17 +199,9 @@ def _read_matrix(path: Path, time: SourceTime, columns: int) -> Array:
     return np.array(rows, float)
 
 
-def _neighbouring_rows(rows: Array, time: SourceTime, frames: int) -> tuple[Array, Array, Array]:
-    """For each frame of the clip: the row before it, the row after it, and its place between them (0..1).
-
-    rows: (R, ...) a row for each source frame. The results are (frames, ...), (frames, ...) and (frames,).
-    """
-    when = np.clip(time.source_frames_of_clip(frames), 0, len(rows) - 1)
-    # A time that misses a whole source frame only by a rounding error counts as this frame.
-    nearest = np.round(when)
-    when = np.where(np.abs(when - nearest) < 1e-6, nearest, when)
-    before = np.floor(when).astype(int)
-    return rows[before], rows[np.minimum(before + 1, len(rows) - 1)], when - before
+def _at_clip_frames(rows: Array, time: SourceTime, frames: int) -> Array:
+    """(frames,) the values of `rows` (R,), one for each source frame, at the frames of the clip."""
+    return np.interp(time.source_frames_of_clip(frames), np.arange(len(rows)), rows)
 
 
 # Writes automatic labels as files that people can correct: `_footsteps.txt`, `_gait.txt`, `.phase`.

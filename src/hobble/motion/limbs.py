@@ -92,8 +92,6 @@ class MovingRig:
     names: Sequence[str]
     parents: Sequence[int]
     positions: Array = field(repr=False)
-    # (joint, parent) -> result of `_twins_below`, because comparing names takes long.
-    _twins: dict[tuple[int, int], list[int]] = field(default_factory=dict, init=False, repr=False)
 
     @cached_property
     def lengths(self) -> Array:
@@ -152,11 +150,8 @@ class MovingRig:
 
     def _twins_below(self, joint: int, parent: int) -> list[int]:
         """Those children of `parent` whose names say that they are the counterpart of `joint`."""
-        if (joint, parent) not in self._twins:
-            name = self.names[joint]
-            below = [j for j in self.children[parent] if j != joint and are_twins(name, self.names[j])]
-            self._twins[joint, parent] = below
-        return self._twins[joint, parent]
+        name = self.names[joint]
+        return [j for j in self.children[parent] if j != joint and are_twins(name, self.names[j])]
 
     def equal_chains(self, a: int, b: int) -> tuple[float, tuple[int, ...], tuple[int, ...]]:
         """The longest equal chains of bones that start with the bones that end at joints `a` and `b`.

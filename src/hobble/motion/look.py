@@ -8,7 +8,6 @@ import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -18,13 +17,14 @@ from hobble.core.clip import Clip
 from hobble.core.clip_files import clips_in, unused_file_notes
 from hobble.core.errors import HobbleError, InputError
 from hobble.core.quat import Array
-from hobble.motion.body import SIDES, TRUNK
+from hobble.motion.body import path_between
 from hobble.motion.duplicates import ClipDigest, clip_digest, duplicate_pairs
+from hobble.motion.edit import resample
 from hobble.motion.make import fit_skeleton, load_source, make_clip
 from hobble.motion.options import ClipMotion
 from hobble.motion.other_formats import MOTION_SUFFIXES, read_motion
 from hobble.motion.physics import standing_seconds, step_count
-from hobble.motion.retarget import ANGLES, BONES, most_different
+from hobble.motion.retarget import ANGLES, BONES, compare_motions, most_different
 from hobble.motion.root import facing_directions
 from hobble.motion.skeleton_file import load_skeleton
 
@@ -63,34 +63,33 @@ class ClipSummary:
     digest: ClipDigest | None = field(default=None, repr=False)
 
 
-@dataclass(frozen=True)
-class FolderSummary:
-    """The summaries of a folder's clips, and notes (sentences) that concern several of them."""
-
-    clips: tuple[ClipSummary, ...]
-    notes: tuple[str, ...]
-
-
 def summarise_clips(
     folder: Path,
     skeleton: Path,
     skeleton_folder: Path,
     options: ClipMotion | None = None,
     progress: Callable[[Iterable[Path]], Iterable[Path]] = iter,
-) -> FolderSummary:
-    """Summarise each BVH file of a folder. Raises InputError if there is none.
+) -> tuple[list[ClipSummary], list[str]]:
+    """Summaries of the BVH files of a folder, and notes on several of them. Raises InputError without a file.
 
     folder: the folder, or one BVH file. skeleton: file of the skeleton to which the clips are retargeted.
     skeleton_folder: the folder of the skeleton files. options: how the files are read (the section `motion`
     of a data set). progress: shows how far the work has come, while it hands on the files.
     """
-    files = list(clips_in(folder, MOTION_SUFFIXES).values())
-    clips = tuple(
-        _summary_of_file(file, skeleton, skeleton_folder, options or ClipMotion()) for file in progress(files)
-    )
-    unused = () if folder.is_file() else tuple(unused_file_notes(folder, [file.stem for file in files]))
+    clips, files = [], list(clips_in(folder, MOTION_SUFFIXES).values())
+    for file in progress(files):
+        try:
+            made = make_clip(
+                file, skeleton, skeleton_folder, file.stem, skeleton.stem, options or ClipMotion()
+            )
+            clips.append(summary_of_clip(*made))
+        except HobbleError as error:
+            # In the table, the message follows the clip's name.
+            refused = str(error).split("\n")[0].removeprefix(str(file)).lstrip(":, ")
+            clips.append(ClipSummary(file.stem, refused=refused))
+    unused = [] if folder.is_file() else unused_file_notes(folder, [file.stem for file in files])
     short, common = shared_warnings(clips)
-    return FolderSummary(tuple(short), (*common, *duplicate_notes(clips), *standing_notes(clips), *unused))
+    return short, [*common, *duplicate_notes(clips), *standing_notes(clips), *unused]
 
 
 def shared_warnings(clips: Sequence[ClipSummary]) -> tuple[list[ClipSummary], list[str]]:
@@ -103,15 +102,6 @@ def shared_warnings(clips: Sequence[ClipSummary]) -> tuple[list[ClipSummary], li
     common = {warning: times for warning, times in count.items() if times >= MANY}
     short = [replace(clip, warnings=tuple(w for w in clip.warnings if w not in common)) for clip in clips]
     return short, [f"{times} of {len(clips)} clips: {warning}" for warning, times in common.items()]
-
-
-def _summary_of_file(file: Path, skeleton: Path, skeleton_folder: Path, options: ClipMotion) -> ClipSummary:
-    try:
-        clip, report = make_clip(file, skeleton, skeleton_folder, file.stem, skeleton.stem, options)
-    except HobbleError as error:
-        # In the table, the message follows the clip's name.
-        return ClipSummary(file.stem, refused=str(error).split("\n")[0].removeprefix(str(file)).lstrip(":, "))
-    return summary_of_clip(clip, report)
 
 
 def summary_of_report(report: Mapping[str, Any]) -> ClipSummary:
@@ -171,12 +161,12 @@ def standing_notes(clips: Sequence[ClipSummary]) -> list[str]:
     ]
 
 
-def format_table(folder: FolderSummary) -> str:
-    """The summary of a folder as text: a line for each clip, then the notes."""
-    width = max(4, *(len(clip.name) for clip in folder.clips))
+def format_table(clips: Sequence[ClipSummary], notes: Sequence[str]) -> str:
+    """What `summarise_clips` returns as text: a line for each clip, then the notes."""
+    width = max(4, *(len(clip.name) for clip in clips))
     columns = f"{'rig':10} {'fps':>5} {'s':>6} {'hips':>5} {'cm/s':>5} {'steps':>5} {'/min':>4} {'stands':>6}"
     lines = [f"{'clip':{width}} {columns}  largest difference"]
-    for clip in folder.clips:
+    for clip in clips:
         if clip.refused:
             lines.append(f"{clip.name:{width}} REFUSED {clip.refused}")
             continue
@@ -189,7 +179,7 @@ def format_table(folder: FolderSummary) -> str:
             f"{clip.hip_height:5.0f} {clip.speed:5.0f} {clip.steps:5d} {clip.cadence:4.0f} "
             f"{clip.standing:6.1f}  {remarks}"
         )
-    return "\n".join([*lines, *folder.notes])
+    return "\n".join([*lines, *notes])
 
 
 # The page about a data set before training: a line for each clip, with a small walking figure. If there are
@@ -251,14 +241,6 @@ def make_figure(clip: Clip) -> dict[str, Any]:
     return {"p": flat.tolist(), "b": bones, "f": round(len(frames) * clip.fps / shown, 2)}
 
 
-def foot_down_share(contacts: Array) -> float:
-    """The share of frames in which a heel or toe is on the ground.
-
-    contacts: (F, 4), whether each of both heels and toes is on the ground (1 or 0).
-    """
-    return float((np.asarray(contacts) > 0.5).any(axis=1).mean())
-
-
 def look_page(
     name: str,
     reports: Sequence[Mapping[str, Any]],
@@ -280,7 +262,7 @@ def look_page(
         clip, contacts = read(n)
         summaries[n] = summary_of_clip(clip, reports[n])
         figures.append(make_figure(clip))
-        foot_down[n] = foot_down_share(contacts)
+        foot_down[n] = float((np.asarray(contacts) > 0.5).any(axis=1).mean())
     short, common = shared_warnings(summaries)
     # Only if all clips were read is it certain that nobody stands in them.
     notes = standing_notes(short) if len(chosen) == len(short) else [SAMPLED.format(len(chosen))]
@@ -310,7 +292,10 @@ def choose_clips(warned: Sequence[bool]) -> list[int]:
 
 
 def _row(summary: ClipSummary, labels: Mapping[str, Any], foot_down: float | None) -> str:
-    """A row of the table, with a cell for each column. foot_down: None if the clip was not read."""
+    """A row of the table, with a cell for each column.
+
+    foot_down: share of frames in which a heel or toe is on the ground; None if the clip was not read.
+    """
     gaits = ", ".join(f"{gait} {s:.1f}" for gait, s in labels["seconds"].items() if s >= 0.05)
     difference = "not retargeted"
     if summary.largest_difference:
@@ -332,13 +317,9 @@ def _row(summary: ClipSummary, labels: Mapping[str, Any], foot_down: float | Non
 
 # Draws a clip beside the retargeted motion, as stick figures from the side and from the front.
 
-
-# Roles of the joints along a leg and along an arm.
-LIMBS = (("hips", "hip", "knee", "heel", "toe"), ("chest", "shoulder", "elbow", "wrist"))
 PICTURES = 6  # poses of the clip in each row of the picture
 WIDE, HIGH, EDGE = 150, 260, 46  # pixels: width and height of one figure, and the margin for captions
-COLOURS = {"left": "#2b6cb0", "right": "#8a8a8a", "": "#333333"}  # of the limbs' bones; "": trunk and head
-WRONG = "#d62828"  # colour of the bones that differ most
+COLOUR, WRONG = "#2b6cb0", "#d62828"  # of a bone, and of the bones that differ most
 
 
 def picture_of_file(bvh: Path, skeleton: Path, skeleton_folder: Path, options: ClipMotion) -> str:
@@ -352,11 +333,12 @@ def picture_of_file(bvh: Path, skeleton: Path, skeleton_folder: Path, options: C
     """
     target = load_skeleton(skeleton, skeleton.stem)
     source = load_source(read_motion(bvh), target, skeleton_folder, options)
-    fitted = fit_skeleton(source, target.skeleton, options)
-    if fitted.difference is None:
+    made, scale, _, _ = fit_skeleton(source, target.skeleton, options)
+    if scale is None:
         problem = f"already has the bones of {target.skeleton.name}, so there is no retargeting to draw"
         raise InputError(bvh, problem)
-    return retarget_picture(fitted.source, fitted.clip, *most_different(fitted.difference))
+    before = resample(source.clip, options.fps)
+    return retarget_picture(before, made, *most_different(compare_motions(before, made)))
 
 
 def retarget_picture(source: Clip, result: Clip, part: str, degrees: float) -> str:
@@ -367,31 +349,26 @@ def retarget_picture(source: Clip, result: Clip, part: str, degrees: float) -> s
     it differs on average.
     """
     frames = np.linspace(0, min(len(source), len(result)) - 1, PICTURES).round().astype(int)
-    rows = [
-        (f"{name}, from the {view}", _draw_figures(clip, frames, part, view))
-        for view in ("side", "front")
-        for name, clip in (("source", source), ("result", result))
-    ]
+    both = (("source", source), ("result", result))
+    rows = [(name, clip, view) for view in ("side", "front") for name, clip in both]
     width, height = PICTURES * WIDE + 2 * EDGE, len(rows) * HIGH + 2 * EDGE
     title = f"{source.name}: the {part} is {degrees:.0f} degrees off its source on average (red)"
-    out = [
+    texts: list[tuple[float, float, str]] = [(EDGE, 28, html.escape(title))]
+    for n, (name, _, view) in enumerate(rows):
+        texts.append((EDGE, EDGE + n * HIGH + 16, f"{name}, from the {view}"))
+    for k, frame in enumerate(frames):
+        texts.append((EDGE + WIDE * (k + 0.25), height - 14, f"{frame / result.fps:.2f} s"))
+    lines = [f'<text x="{x:g}" y="{y:g}">{text}</text>' for x, y, text in texts]
+    lines += [
+        f'<g transform="translate({EDGE + WIDE * (k + 0.5):g},{EDGE + (n + 1) * HIGH - 14})">{figure}</g>'
+        for n, (_, clip, view) in enumerate(rows)
+        for k, figure in enumerate(_draw_figures(clip, frames, part, view))
+    ]
+    return (
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height}" width="{width}" '
-        f'font-family="sans-serif" font-size="14"><rect width="100%" height="100%" fill="white"/>',
-        f'<text x="{EDGE}" y="28" font-size="18">{html.escape(title)}</text>',
-    ]
-    for number, (name, figures) in enumerate(rows):
-        top = EDGE + number * HIGH
-        out.append(f'<text x="{EDGE}" y="{top + 16}">{html.escape(name)}</text>')
-        out += [
-            f'<g transform="translate({EDGE + WIDE * (k + 0.5):g},{top + HIGH - 14})">{figure}</g>'
-            for k, figure in enumerate(figures)
-        ]
-    captions = [
-        f'<text x="{EDGE + WIDE * (k + 0.5):g}" y="{height - 14}" text-anchor="middle">'
-        f"{frame / result.fps:.2f} s</text>"
-        for k, frame in enumerate(frames)
-    ]
-    return "\n".join([*out, *captions, "</svg>\n"])
+        'font-family="sans-serif" font-size="14"><rect width="100%" height="100%" fill="white"/>'
+        + "\n".join([*lines, "</svg>\n"])
+    )
 
 
 def _draw_figures(clip: Clip, frames: Array, part: str, view: str) -> list[str]:
@@ -400,31 +377,25 @@ def _draw_figures(clip: Clip, frames: Array, part: str, view: str) -> list[str]:
     A figure's lowest point is at y = 0, and its hips are at x = 0. part: the joint or limb in red. view:
     "side" or "front".
     """
-    at = clip.part(frames).at_roles()
-    ahead = facing_directions(clip.skeleton, clip.positions[frames], 0.0)
+    skeleton, positions = clip.skeleton, clip.positions[frames]
+    ahead = facing_directions(skeleton, positions, 0.0)
     rightward = ahead if view == "side" else np.cross([0.0, 1.0, 0.0], ahead)  # to the right in the picture
-    heights = np.stack(list(at.values()))[..., 1]
-    scale = (HIGH - 50) / max(float(np.median(np.ptp(heights, axis=0))), 1e-9)  # pixels a cm
-    lowest = heights.min(axis=0)
-    # Role -> (PICTURES, 2) pixels to the right of the hips and, as y points down in an SVG, below the floor.
-    pixels = {
-        role: scale * np.stack([np.sum((p - at["hips"]) * rightward, axis=-1), lowest - p[:, 1]], axis=-1)
-        for role, p in at.items()
-    }
+    heights = positions[..., 1]
+    scale = (HIGH - 50) / max(float(np.median(np.ptp(heights, axis=1))), 1e-9)  # pixels a cm
+    x = np.sum((positions - positions[:, [skeleton.role("hips")]]) * rightward[:, None], axis=-1) * scale
+    y = (heights.min(axis=1, keepdims=True) - heights) * scale  # y points down in an SVG
     side, _, name = part.partition(" ")
-    ends = ANGLES.get(name) or BONES.get(name) or ()
-    in_part = set(pairwise(role if role == "head" else f"{side}_{role}" for role in ends))
-    chains = [("", TRUNK)] + [
-        (s, (first, *(f"{s}_{r}" for r in rest))) for s in SIDES for first, *rest in LIMBS
-    ]
-    lines = [""] * len(frames)
-    for limb, chain in chains:
-        for a, b in pairwise(role for role in chain if role in pixels):
-            colour, thick = (WRONG, 6) if (a, b) in in_part else (COLOURS[limb], 3)
-            for k in range(len(frames)):
-                (x1, y1), (x2, y2) = pixels[a][k], pixels[b][k]
-                lines[k] += (
-                    f'<line x1="{x1:.1f}" y1="{y1:.1f}" x2="{x2:.1f}" y2="{y2:.1f}" stroke="{colour}" '
-                    f'stroke-width="{thick}" stroke-linecap="round"/>'
+    ends = [role if role == "head" else f"{side}_{role}" for role in {**ANGLES, **BONES}[name]]
+    red = path_between(skeleton.parents, skeleton.role(ends[0]), skeleton.role(ends[-1]))
+    out = []
+    for k in range(len(frames)):
+        bones = []
+        for j, p in enumerate(skeleton.parents):
+            if p >= 0:
+                colour, thick = (WRONG, 6) if j in red and p in red else (COLOUR, 3)
+                bones.append(
+                    f'<line x1="{x[k, p]:.1f}" y1="{y[k, p]:.1f}" x2="{x[k, j]:.1f}" y2="{y[k, j]:.1f}" '
+                    f'stroke="{colour}" stroke-width="{thick}" stroke-linecap="round"/>'
                 )
-    return lines
+        out.append("".join(bones))
+    return out

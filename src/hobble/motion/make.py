@@ -7,17 +7,17 @@ pose. The zero pose of a rig is the one in which all rotations are zero.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from hobble.core.clip import Clip
 from hobble.core.errors import InputError
 from hobble.core.skeleton import Skeleton, rest_positions
-from hobble.motion.axes import RigAxes, straighten, turned_about_vertical
+from hobble.motion.axes import straighten, turned_about_vertical
 from hobble.motion.body import Body, body_by_roles, match_joints
 from hobble.motion.edit import facing_angle, loop_clip, repair_defects, resample
 from hobble.motion.ground import put_on_floor, tilt_problem
@@ -25,20 +25,18 @@ from hobble.motion.limbs import on_four_legs
 from hobble.motion.options import ACCEPT, ClipMotion, MotionOptions, Problem, accept
 from hobble.motion.other_formats import read_motion
 from hobble.motion.physics import pace_problem, rate_problem
-from hobble.motion.read import MOST_JOINT_POSES, Bvh, Decoded, check_angles, decode_channels, frame_rate
+from hobble.motion.read import MOST_JOINT_POSES, Bvh, check_angles, decode_channels, frame_rate
 from hobble.motion.rest_pose import why_not_standing, with_upright_rest
-from hobble.motion.retarget import compare_motions, difference_problems, knee_problem, plan, retarget_clip
-from hobble.motion.rig import (
-    LENGTH_OF_LEG,
-    RigMatch,
-    below_hips,
-    body_in_file,
-    clean_names,
-    decode_below,
-    find_hips,
-    likely_unit,
-    match_rig,
+from hobble.motion.retarget import (
+    KNEE_AHEAD,
+    KNEE_BACKWARD,
+    compare_motions,
+    difference_problems,
+    knee_problem,
+    plan,
+    retarget_clip,
 )
+from hobble.motion.rig import LENGTH_OF_LEG, RigMatch, below_hips, body_in_file, likely_unit, match_rig
 from hobble.motion.skeleton_file import KnownSkeleton, load_skeleton
 
 STILL = 0.1  # cm: a joint that stays this close to its offset counts as fixed to its parent
@@ -73,12 +71,13 @@ def make_clip(
         file = _cut(file, *options.frames)
     source = load_source(file, target, skeleton_folder, options)
     _check_length(file, source.clip, target.skeleton, options)
-    fitted = fit_skeleton(source, target.skeleton, options)
-    made, repairs, loops = fitted.clip, source.repairs + fitted.repairs, options.loops
-    problems = clip_problems(made, source.clip.fps, fitted.scale, options)
-    if fitted.difference is not None:
-        problems = [*difference_problems(file.path, fitted.difference, source.match.rig), *problems]
-    doubts = fitted.unsure + accept(file.path, problems, options)
+    made, scale, changes, doubts = fit_skeleton(source, target.skeleton, options)
+    repairs, loops = source.repairs + changes, options.loops
+    problems, difference = clip_problems(made, source.clip.fps, scale or 1.0, options), None
+    if scale is not None:
+        difference = compare_motions(resample(source.clip, options.fps), made)
+        problems = [*difference_problems(file.path, difference, source.match.rig), *problems]
+    doubts = doubts + accept(file.path, problems, options)
     if loops > 1:
         made = loop_clip(made, loops, options.heading)
         frames = len(made) // loops
@@ -93,23 +92,17 @@ def make_clip(
         "sha256": file.sha256,
         "bytes": file.bytes,
         "source_frames": len(file),
-        "source_start": source.first_frame,
+        **source.found,
         "source_fps": source.clip.fps,
         "frames": len(made),
         "seconds": round(len(made) / made.fps, 3),
         "facing": round(float(np.degrees(facing_angle(made, 0))), 1) + 0.0,
-        "unit": source.unit,
-        "unit_name": source.unit_name,
-        "up": source.axes.up,
-        "handedness": source.axes.handedness,
-        "rest_facing": source.axes.facing,
         "rig": source.match.rig,
-        "stance": source.rest_source,
         "roles": dict(source.match.roles),
         "loops": loops,
         "cycle_frames": len(made) // loops,
-        "scale": fitted.scale,
-        "retarget": fitted.difference,
+        "scale": 1.0 if scale is None else round(scale, 6),
+        "retarget": difference,
         "unsure": doubts,
         "repairs": repairs,
         "notes": source.notes,
@@ -130,12 +123,12 @@ def clip_problems(
     """What speaks against a clip: its motion, knees, pace, tilt and frame rate.
 
     source_fps: frame rate of its file. scale: size of the clip's figure / size of the captured person.
-    `defects: leave` switches the checks of knees, pace and tilt off. The check of the knees is also off if
-    the user has set the handedness, and the check of the tilt if the user has set the axis that points up.
+    `defects: leave` switches the checks of knees, pace and tilt off. The check of the tilt is also off if the
+    user has set the axis that points up.
     """
     found: list[Problem | None] = [_no_motion_problem(clip)]
     if options.defects != "leave":
-        found.append(knee_problem(clip) if options.handedness == "auto" else None)
+        found.append(knee_problem(clip, KNEE_AHEAD if options.handedness == "auto" else KNEE_BACKWARD))
         found.append(pace_problem(clip))
         found.append(tilt_problem(clip) if options.up == "auto" else None)
     return [*found, rate_problem(clip, source_fps, scale)]
@@ -189,29 +182,24 @@ def _check_finite(file: Bvh, clip: Clip) -> None:
 class FileMotion:
     """A file's motion at the file's own frame rate, in centimetres, right-handed, with Y up.
 
-    It is on the file's own rig, or, if `has_standing_rig`, on a rig that has only the joints of the body and
-    a standing rest pose.
+    It is on the file's own rig if this is a known skeleton with its rest pose, and else on a rig that has
+    only the joints of the body and a standing rest pose.
 
     match: which known skeleton the rig is, if any, and which of the rig's joints each joint of the target
-    follows. unit, unit_name: cm per unit of the file, and the unit in words. axes: which of the file's axes
-    points up, and where the figure faces. rest_source: where the rest pose comes from, in words.
-    has_moving_joints: whether any joint of the body except the hips moves relative to its parent. repairs,
-    notes, unsure: sentences on what was repaired, on what else users should know, and on what is uncertain
-    about the rest pose. first_frame: the file's frame (from 0) at which the clip begins.
+    follows. found: entries of the report: `unit`, `unit_name`, `up`, `handedness`, `rest_facing`, `stance`
+    (where the rest pose comes from, in words), and `source_start` (the file's frame, from 0, at which the
+    clip begins). has_moving_joints: whether any joint of the body except the hips moves relative to its
+    parent. repairs, notes, unsure: sentences on what was repaired, on what else users should know, and on
+    what is uncertain.
     """
 
     clip: Clip
     match: RigMatch
-    unit: float
-    unit_name: str
-    axes: RigAxes
-    rest_source: str
+    found: dict[str, Any]
     has_moving_joints: bool
-    has_standing_rig: bool
     repairs: list[str]
     notes: list[str]
-    unsure: list[str] = field(default_factory=list)
-    first_frame: int = 0
+    unsure: list[str]
 
 
 def load_source(
@@ -242,99 +230,74 @@ def load_source(
             mended, notes = mended + floor_repairs, notes + floor_notes
     if mended and options.defects == "refuse":
         raise InputError(file.path, mended[0], fix="Set motion.defects: repair to repair it this way.")
-    return replace(
-        source, clip=clip, first_frame=first, repairs=counted + source.repairs + mended, notes=notes
-    )
+    found, repairs = {**source.found, "source_start": first}, counted + source.repairs + mended
+    return replace(source, clip=clip, found=found, repairs=repairs, notes=notes)
 
 
 def _load_rig(file: Bvh, target: KnownSkeleton, folder: str | Path, options: ClipMotion) -> FileMotion:
-    """A file's motion along Hobble's axes, on the rig of a known skeleton or with a standing rest pose.
-
-    The match of a rig with another rest pose than that of its known skeleton only tells the parts of the
-    body.
-    """
-    hips = find_hips(clean_names(file.names), target, folder)
-    known = match_rig(rig_in_file(below_hips(file, hips)), target, folder)
-    # The match has `followed_joints` if a map leads from the known skeleton to the target.
-    is_known = known is not None and known.has_known_rest_pose and bool(known.followed_joints)
-    decoded = decode_below(file, hips) if is_known else decode_channels(file)
-    raw = raw_clip(below_hips(file, hips) if is_known else file, decoded)
-    if is_known and known is not None:
-        body, how_found = body_by_roles(replace(raw.skeleton, roles=known.roles)), list[str]()
+    """A file's motion along Hobble's axes, on the rig of a known skeleton or with a standing rest pose."""
+    whole, repairs = decode_channels(file)
+    clip, notes = below_hips(whole, target, folder)
+    known = match_rig(clip.skeleton, target, folder)
+    if known is not None and known.is_usable:
+        match = known
+        body = body_by_roles(replace(clip.skeleton, roles=known.roles))
     else:
-        body, how_found = body_in_file(file.path, raw, known, options.handedness)
-    leg = _leg_length(file, raw, body)
-    standing = is_known or why_not_standing(body, LENGTH_OF_LEG / leg * rest_positions(raw.skeleton)) is None
-    if not standing and on_four_legs(body, raw.positions):
+        # The match of a rig with another rest pose than its skeleton file only tells the parts of the body.
+        body, notes = body_in_file(file.path, whole, known, options.handedness)
+        clip = whole
+        match = known or RigMatch(UNKNOWN_RIG, body.roles(clip.skeleton.joints))
+    leg = _leg_length(file, clip, body)
+    stands = (
+        match.is_usable or why_not_standing(body, LENGTH_OF_LEG / leg * rest_positions(clip.skeleton)) is None
+    )
+    if not stands and on_four_legs(body, clip.positions):
         fix = "Only clips of figures with two legs can be used."
         raise InputError(file.path, "the figure goes on four legs", fix=fix)
-    unit, unit_name, doubts = _unit(leg, options.unit)
-    roles = known.roles if is_known and known else body.roles(raw.skeleton.joints)
-    clip = _scaled(file, replace(raw.skeleton, roles=roles), decoded, unit, options)
+    unit, unit_name, unsure = _unit(leg, options.unit)
+    roles = match.roles if match.is_usable else body.roles(clip.skeleton.joints)
+    clip = _scaled(clip, unit, options.source_fps or frame_rate(file.frame_time, file.frame_time_text))
+    clip = replace(clip, skeleton=replace(clip.skeleton, roles=roles))
+    has_moving_joints = _has_moving_joints(clip, body)
     try:
-        clip, axes, note, in_doubt = straighten(clip, options.up, options.handedness, standing)
+        clip, axes, note, in_doubt = straighten(clip, options.up, options.handedness, stands)
     except ValueError as error:
         fix = "Set motion.up in the data set to Y or Z (option --up)."
         raise InputError(file.path, f"the up axis is in doubt: {error}", fix=fix) from None
-    told = [note] if note else []
-    source = FileMotion(
-        clip,
-        known or RigMatch(UNKNOWN_RIG, roles),
-        unit,
-        unit_name,
-        # The standing rest pose that replaces another one faces +Z.
-        axes if standing else replace(axes, facing="+Z"),
-        rest_source="its zero pose",
-        has_moving_joints=_has_moving_joints(decoded, body, unit),
-        has_standing_rig=False,
-        repairs=decoded.repairs,
-        notes=decoded.notes + ([] if in_doubt else told) + how_found,
-        unsure=doubts + (told if in_doubt else []),
-    )
-    return source if is_known else _with_standing_rig(file, source, body, target, options)
+    if note:
+        (unsure if in_doubt else notes).append(note)
+    found = {"unit": unit, "unit_name": unit_name, "up": axes.up, "handedness": axes.handedness}
+    # The standing rest pose that replaces another one faces +Z.
+    found |= {"rest_facing": axes.facing if stands else "+Z", "stance": "its zero pose"}
+    if not match.is_usable:
+        clip, match, found["stance"], doubts = _standing(
+            file.path, clip, body, match, target.skeleton, options
+        )
+        unsure = unsure + doubts
+    return FileMotion(clip, match, found, has_moving_joints, repairs, notes, unsure)
 
 
-def _with_standing_rig(
-    file: Bvh, source: FileMotion, body: Body, target: KnownSkeleton, options: ClipMotion
-) -> FileMotion:
-    """The motion on a rig that has only the joints of the body and a standing rest pose that faces +Z."""
-    match = source.match
+def _standing(
+    path: Path, clip: Clip, body: Body, match: RigMatch, target: Skeleton, options: ClipMotion
+) -> tuple[Clip, RigMatch, str, list[str]]:
+    """The motion on a rig that has only the joints of the body and a standing rest pose that faces +Z.
+
+    Also returns its match with the target, where the rest pose comes from, and doubts.
+    """
     # A rig with the target's own joint names is matched with the target by these names, and any other rig by
     # the parts of the body.
-    named = match.followed_joints if match.rig == target.skeleton.name else {}
-    index = source.clip.skeleton.index
-    upright = with_upright_rest(source.clip, body, target.skeleton, [index(j) for j in named.values()])
+    named = match.followed_joints if match.rig == target.name else {}
+    upright = with_upright_rest(clip, body, target, [clip.skeleton.index(j) for j in named.values()])
     if upright.height_error > MOST_HEIGHT_ERROR and not options.accept_doubt:
         raise InputError(
-            file.path,
+            path,
             " ".join(upright.doubts),
             fix="Use a clip in which both feet stand flat, or one with a zero pose (all rotations zero) in "
             f"which a person could stand. {ACCEPT}",
         )
     rig = upright.clip.skeleton
-    followed = named or match_joints(rig, upright.body, target.skeleton, body_by_roles(target.skeleton))
-    return replace(
-        source,
-        clip=upright.clip,
-        match=RigMatch(match.rig, rig.roles, False, followed),
-        rest_source=upright.rest_source,
-        has_standing_rig=True,
-        unsure=source.unsure + upright.doubts,
-    )
-
-
-def raw_clip(file: Bvh, decoded: Decoded | None = None) -> Clip:
-    """A file's motion in its own unit and axes, for uses in which the frame rate does not matter: it is 1."""
-    found = decoded or decode_channels(file)
-    return Clip(file.path.stem, rig_in_file(file), 1.0, found.rotations, found.root, found.translations)
-
-
-def rig_in_file(file: Bvh) -> Skeleton:
-    """The joints of a file as a skeleton, in the file's unit. Prefixes like "mixamorig:" are left out."""
-    names = clean_names(file.names)
-    new_name = dict(zip(file.names, names, strict=True))
-    ends = {new_name[name]: sites[0] for name, sites in file.end_sites.items()}
-    return Skeleton(file.path.stem, names, file.parents, file.offsets, end_sites=ends)
+    followed = named or match_joints(rig, upright.body, target, body_by_roles(target))
+    return upright.clip, RigMatch(match.rig, rig.roles, followed), upright.rest_source, upright.doubts
 
 
 def _leg_length(file: Bvh, clip: Clip, body: Body) -> float:
@@ -352,14 +315,12 @@ def _leg_length(file: Bvh, clip: Clip, body: Body) -> float:
     return float(np.median(sum(lengths)) / 2)
 
 
-def _has_moving_joints(decoded: Decoded, body: Body, unit: float) -> bool:
+def _has_moving_joints(clip: Clip, body: Body) -> bool:
     """Whether any joint of the body except its hips moves relative to its parent."""
-    if decoded.translations is None:
+    if clip.translations is None:
         return False
-    limb_joints = [j for limbs in (body.arms, body.legs) for limb in limbs.values() for j in limb]
-    joints = [*body.trunk, *body.neck, body.head, *(j for j in limb_joints if j is not None)]
-    local = decoded.translations[:, joints]
-    return bool(np.abs(local - np.median(local, axis=0)).max() * unit > STILL)
+    local = clip.translations[:, [j for j in body.joints if j != body.hips]]
+    return bool(np.abs(local - np.median(local, axis=0)).max() > STILL)
 
 
 def _unit(leg: float, unit: str | float) -> tuple[float, str, list[str]]:
@@ -379,52 +340,43 @@ def _unit(leg: float, unit: str | float) -> tuple[float, str, list[str]]:
     return LENGTH_OF_LEG / leg, "unknown", [doubt]
 
 
-def _scaled(file: Bvh, rig: Skeleton, decoded: Decoded, unit: float, options: ClipMotion) -> Clip:
-    """The decoded motion as a clip in centimetres, at the file's frame rate. unit: cm per file unit."""
-    fps = options.source_fps or frame_rate(file.frame_time, file.frame_time_text)
-    offsets = decoded.offsets * unit
+def _scaled(clip: Clip, unit: float, fps: float) -> Clip:
+    """The clip in centimetres, at another frame rate. unit: cm per unit of the clip."""
+    rig, moved = clip.skeleton, clip.translations
+    offsets = rig.offsets * unit
     offsets[0] = 0.0
     ends = {joint: (x * unit, y * unit, z * unit) for joint, (x, y, z) in rig.end_sites.items()}
     skeleton = replace(rig, offsets=offsets, end_sites=ends)
-    translations = None if decoded.translations is None else decoded.translations * unit
-    return Clip(file.path.stem, skeleton, fps, decoded.rotations, decoded.root * unit, translations)
+    moved = None if moved is None else moved * unit
+    return replace(clip, skeleton=skeleton, fps=fps, root=clip.root * unit, translations=moved)
 
 
-class Fitted(NamedTuple):
-    """A clip on the joints of the target.
-
-    source: the clip before, at the same frame rate. scale: length of the clip's path / length of the source's
-    path. difference: how the clip differs from the source (see `compare_motions`), or None if it was not
-    retargeted. repairs, unsure: sentences on what was changed, and on what is uncertain.
-    """
-
-    clip: Clip
-    source: Clip
-    scale: float
-    difference: dict[str, Any] | None
-    repairs: list[str]
-    unsure: list[str]
-
-
-def fit_skeleton(source: FileMotion, target: Skeleton, options: MotionOptions) -> Fitted:
+def fit_skeleton(
+    source: FileMotion, target: Skeleton, options: MotionOptions
+) -> tuple[Clip, float | None, list[str], list[str]]:
     """Put a file's motion on the target skeleton, at the frame rate of the options.
+
+    Returns the clip; its scale, which is the length of its path / length of the source's path, or None if it
+    was not retargeted; and sentences on what was changed, and on what is uncertain.
 
     With `proportions: clip`, the clip keeps its own bone lengths if it has the target's joints and its bones
     point in the same directions in the rest pose.
     """
     match, moved = source.match, "Movements of joints relative to their parents were "
     clip, kept = resample(source.clip, options.fps), options.proportions == "clip"
-    before = replace(clip, skeleton=replace(clip.skeleton, roles=match.roles))
-    if match.is_target_skeleton:
+    if (
+        match.rig == target.name
+        and match.has_known_rest_pose
+        and set(clip.skeleton.joints) == set(target.joints)
+    ):
         reordered = _reordered(clip, target)
         has_equal_offsets = np.abs(reordered.skeleton.offsets - target.offsets).max() <= SAME
         if has_equal_offsets or kept:
             reordered = replace(reordered, skeleton=target) if has_equal_offsets else reordered
-            repairs = [f"{moved}kept."] if source.has_moving_joints else []
-            return Fitted(reordered, before, 1.0, None, repairs, [])
+            return reordered, None, [f"{moved}kept."] if source.has_moving_joints else [], []
     followed_joints, unsure = match.followed_joints, source.unsure
-    # Retargeting needs a rest pose that stands. If `has_standing_rig` is True, `load_source` has made one.
-    if not source.has_standing_rig:
+    # Retargeting needs a rest pose that stands. Rigs that are no known skeleton have got one.
+    if match.has_known_rest_pose:
         joints_to_keep = {clip.skeleton.index(name) for name in followed_joints.values()}
         standing = with_upright_rest(clip, body_by_roles(clip.skeleton), target, joints_to_keep)
         clip, unsure = standing.clip, unsure + standing.doubts
@@ -440,8 +392,7 @@ def fit_skeleton(source: FileMotion, target: Skeleton, options: MotionOptions) -
         repairs.append(
             f"{why}, so it could not keep its own bone lengths. It got the bone lengths of {target.name}."
         )
-    made = retarget_clip(clip, how)
-    return Fitted(made, before, round(how.scale, 6), compare_motions(clip, made, how.scale), repairs, unsure)
+    return retarget_clip(clip, how), how.scale, repairs, unsure
 
 
 def _reordered(clip: Clip, target: Skeleton) -> Clip:

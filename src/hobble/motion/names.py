@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from functools import lru_cache
 
 # Words for left and right, in several languages.
 LEFT, RIGHT = (
@@ -94,6 +95,7 @@ def side_of_pair(name: str, other: str) -> str | None:
     return {("l", "r"): "left", ("r", "l"): "right"}.get(unlike[0]) if len(unlike) == 1 else None
 
 
+@lru_cache(65536)  # comparing names takes long
 def are_twins(name: str, other: str) -> bool:
     """Whether two names say that the joints are the same part of the body, one left and one right.
 

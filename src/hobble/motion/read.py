@@ -11,7 +11,7 @@ import hashlib
 import io
 import re
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NoReturn
@@ -19,8 +19,10 @@ from typing import Any, NoReturn
 import numpy as np
 
 from hobble.core import quat
+from hobble.core.clip import Clip
 from hobble.core.errors import InputError
 from hobble.core.quat import Array
+from hobble.core.skeleton import Skeleton
 from hobble.core.untrusted import read_bytes
 
 # Limits. One hour at 60 Hz on the largest known rig (191 joints) has 41 million joint poses (frames times
@@ -354,25 +356,6 @@ def _explain(path: Path, body: bytes, width: int, first_line: int) -> NoReturn:
     raise InputError(path, problem, line=line, frame=frame, fix=EXPORT)
 
 
-@dataclass(frozen=True)
-class Decoded:
-    """F frames of J joints, in the file's unit.
-
-    rotations: (F, J, 4) quaternions, relative to the parents. root: (F, 3) positions of the root. offsets:
-    (J, 3) constant positions relative to the parents. translations: (F, J, 3) positions relative to the
-    parents in each frame, or None if no joint but the root moves relative to its parent. repairs: sentences
-    on how the position channels of joints other than the root were read. notes: sentences on oddities that
-    need no repair.
-    """
-
-    rotations: Array = field(repr=False)
-    root: Array = field(repr=False)
-    offsets: Array = field(repr=False)
-    translations: Array | None = field(repr=False)
-    repairs: list[str]
-    notes: list[str]
-
-
 def frame_rate(frame_time: float, text: str) -> float:
     """Frames a second for a file's frame time.
 
@@ -414,128 +397,87 @@ def _columns(bvh: Bvh) -> list[tuple[int, int, str]]:
     return [(j, "XYZ".index(name[0]), name[1:]) for j, names in enumerate(bvh.channels) for name in names]
 
 
-def decode_channels(bvh: Bvh) -> Decoded:
-    """Rotations and positions of a BVH file.
+def clean_names(names: Sequence[str]) -> tuple[str, ...]:
+    """Joint names without a prefix like "mixamorig:"; unchanged if two names would become equal."""
+    short = tuple(name.rpartition(":")[2].strip() for name in names)
+    return short if len(set(short)) == len(short) and all(short) else tuple(names)
+
+
+def decode_channels(bvh: Bvh) -> tuple[Clip, list[str]]:
+    """The motion of a BVH file in the file's own unit and axes, at one frame a second.
+
+    Also returns sentences on position channels of joints other than the root that contradict their OFFSETs.
+    Names of joints lose their prefixes (see `clean_names`).
 
     A position channel replaces its component of the joint's OFFSET, as all current programs intend. If the
     position channels of a joint below the root are about zero although its OFFSET is not, their values are
     added to the OFFSET instead. A joint whose position stays within a thousandth of the longest bone of its
     offset does not move relative to its parent.
     """
-    still = 1e-3 * float(np.linalg.norm(bvh.offsets[1:], axis=-1).max(initial=0.0))
     rotations = np.broadcast_to(quat.IDENTITY, (len(bvh), len(bvh.names), 4)).copy()
+    local = np.broadcast_to(bvh.offsets, (len(bvh), *bvh.offsets.shape)).copy()
+    has_channel = np.zeros(bvh.offsets.shape, bool)
     columns: list[list[int]] = [[] for _ in bvh.names]  # the rotation columns of each joint
-    for column, (j, _, kind) in enumerate(_columns(bvh)):
+    for column, (j, axis, kind) in enumerate(_columns(bvh)):
         if kind == "rotation":
             columns[j].append(column)
+        else:
+            local[:, j, axis], has_channel[j, axis] = bvh.values[:, column], True
     # Joints with the same order of rotations are converted together, which is faster.
     groups: dict[str, list[int]] = {}
-    for j, names in enumerate(bvh.channels):
-        groups.setdefault("".join(name[0] for name in names if "rot" in name), []).append(j)
+    for j, channels in enumerate(bvh.channels):
+        groups.setdefault("".join(name[0] for name in channels if "rot" in name), []).append(j)
     for order, members in groups.items():
         own = np.array([columns[j] for j in members], int)
         for first in range(0, len(bvh) if order else 0, BLOCK):
             angles = np.radians(bvh.values[first : first + BLOCK, own])
             rotations[first : first + BLOCK, members] = quat.from_euler(angles, order)
-    return Decoded(quat.continuous(rotations), *_decode_positions(bvh, still), _notes_on_wraps(bvh))
+    root = local[:, 0].copy()
+    local[:, 0], has_channel[0] = bvh.offsets[0], False
+    offsets, translations, repairs = _judge_channels(bvh, local, has_channel)
+    names = clean_names(bvh.names)
+    ends = {names[bvh.names.index(name)]: sites[0] for name, sites in bvh.end_sites.items()}
+    rig = Skeleton(bvh.path.stem, names, bvh.parents, offsets, end_sites=ends)
+    clip = Clip(bvh.path.stem, rig, 1.0, quat.continuous(rotations), root, translations)
+    return clip, repairs
 
 
-def _notes_on_wraps(bvh: Bvh) -> list[str]:
-    """A sentence on angles that jump by more than half a turn, as they do when they wrap at 360 degrees.
-
-    The list is empty if no angle jumps.
-    """
-    joints = [j for j, _, kind in _columns(bvh) if kind == "rotation"]
-    angles = bvh.values[:, [kind == "rotation" for _, _, kind in _columns(bvh)]]
-    jumps = np.abs(np.diff(angles, axis=0)) > 180.0
-    if not jumps.any():
-        return []
-    frame, column = (int(x) for x in np.argwhere(jumps)[0])
-    times = int(jumps.any(axis=1).sum())
-    return [
-        f"Angles jump by up to a whole turn from one frame to the next, {times} times (first "
-        f"{bvh.names[joints[column]]} between frames {frame + 1} and {frame + 2}). The rotations themselves "
-        "are smooth."
-    ]
-
-
-def _decode_positions(bvh: Bvh, still: float) -> tuple[Array, Array, Array | None, list[str]]:
-    """The fields `root`, `offsets`, `translations`, `repairs` of `Decoded`.
-
-    still: a joint whose position stays this close to its offset does not move relative to its parent.
-    """
-    root = np.broadcast_to(bvh.offsets[0], (len(bvh), 3)).copy()
-    below_root = []
-    for column, (j, axis, kind) in enumerate(_columns(bvh)):
-        if kind == "position" and j == 0:
-            root[:, axis] = bvh.values[:, column]
-        elif kind == "position":
-            below_root.append((j, axis, column))
-    if not below_root:
-        return root, bvh.offsets, None, []
-    local = np.broadcast_to(bvh.offsets, (len(bvh), *bvh.offsets.shape)).copy()
-    has_channel = np.zeros(bvh.offsets.shape, bool)
-    for j, axis, column in below_root:
-        local[:, j, axis] = bvh.values[:, column]
-        has_channel[j, axis] = True
-    return root, *_judge_channels(bvh, local, has_channel, still)
-
-
-def _judge_channels(
-    bvh: Bvh, local: Array, has_channel: Array, still: float
-) -> tuple[Array, Array | None, list[str]]:
+def _judge_channels(bvh: Bvh, local: Array, has_channel: Array) -> tuple[Array, Array | None, list[str]]:
     """Judges which position channels carry motion, which only repeat an offset, and which contradict it.
 
-    Returns the fields `offsets`, `translations` and `repairs` of `Decoded`. local: (F, J, 3) positions
-    relative to the parents; where channels must be added to the OFFSETs, this array is changed. has_channel:
-    (J, 3) bool, which components of the positions come from channels. still: as in `_decode_positions`.
+    Returns the offsets (J, 3), the positions (F, J, 3) relative to the parents (None if no joint but the root
+    moves relative to its parent), and sentences on repairs. local: (F, J, 3) these positions as they are
+    written; where channels must be added to the OFFSETs, this array is changed. has_channel: (J, 3) bool,
+    which components of the positions come from channels.
     """
     joints = np.flatnonzero(has_channel.any(axis=1)).tolist()
+    if not joints:
+        return bvh.offsets, None, []
+    # A joint whose position stays this close to its offset does not move relative to its parent.
+    still = 1e-3 * float(np.linalg.norm(bvh.offsets[1:], axis=-1).max(initial=0.0))
     median = np.median(local, axis=0)
-    added = _joints_to_add(bvh.offsets, median, has_channel, still)
-    repairs = []
+    # The channels of a joint are about zero if they are at most a tenth as long as its OFFSET. If they
+    # replaced it, the bone would be far shorter, so they must be added to it.
+    channel_length, offset_length = (np.linalg.norm(v * has_channel, axis=1) for v in (median, bvh.offsets))
+    about_zero = channel_length <= np.clip(0.1 * offset_length, still, 10 * still)
+    added = np.flatnonzero((offset_length > still) & about_zero).tolist()
+    for values in (local, median):
+        values[..., added, :] += bvh.offsets[added] * has_channel[added]
+    moving = [j for j in joints if np.abs(local[:, j] - median[j]).max() > still]
+    wrong = [j for j in joints if j not in moving and np.abs(median[j] - bvh.offsets[j]).max() > still]
+    offsets, repairs = bvh.offsets.copy(), []
+    offsets[wrong] = median[wrong]
     if added:
-        if np.abs(local[:, joints] * has_channel[joints]).max() <= still:
-            dropped = f"The position channels of {len(joints)} joints are zero and were dropped."
-            return bvh.offsets, None, [dropped]
-        for values in (local, median):
-            values[..., added, :] += bvh.offsets[added] * has_channel[added]
         repairs.append(
             f"The position channels of {_list_names(bvh, added)} are about zero, but the OFFSETs are not. "
             "The channels were added to the OFFSETs."
         )
-    moving = [j for j in joints if np.abs(local[:, j] - median[j]).max() > still]
-    wrong = [j for j in joints if j not in moving and np.abs(median[j] - bvh.offsets[j]).max() > still]
-    offsets = bvh.offsets.copy()
-    offsets[wrong] = median[wrong]
     if wrong:
         repairs.append(
             f"The OFFSET of {_list_names(bvh, wrong)} contradicts its position channels, which never change. "
             "The values of the channels were used."
         )
-    have = f"{len(joints)} joints below the root"
-    if moving:
-        others = "" if len(moving) == len(joints) else ", those of the others do not"
-        change = f"Those of {_list_names(bvh, moving)} change{others}."
-        return offsets, local, [*repairs, f"{have} have position channels. {change}"]
-    same = f"The position channels of {have} only repeat their offsets and were dropped."
-    return offsets, None, [*repairs, same]
-
-
-def _joints_to_add(offsets: Array, median: Array, has_channel: Array, still: float) -> list[int]:
-    """Joints whose position channels are about zero although their offsets are not.
-
-    The channels of such a joint must be added to its offset: if they replaced it, the bone would be far
-    shorter than its OFFSET. "About zero" means at most a tenth of the offset's length. This limit is raised
-    to `still` if it is less, and lowered to 10 times `still` if it is more.
-
-    median: (J, 3) median, over the frames, of the positions relative to the parents. has_channel: (J, 3)
-    bool, which components of the positions come from channels.
-    """
-    channel_length = np.linalg.norm(median * has_channel, axis=1)
-    offset_length = np.linalg.norm(offsets * has_channel, axis=1)
-    about_zero = channel_length <= np.clip(0.1 * offset_length, still, 10 * still)
-    return np.flatnonzero((offset_length > still) & about_zero).tolist()
+    return offsets, local if moving else None, repairs
 
 
 def _list_names(bvh: Bvh, joints: list[int]) -> str:

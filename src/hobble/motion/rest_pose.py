@@ -24,7 +24,7 @@ from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton, local_rotations
 from hobble.motion.axes import AHEAD, LEFT, UP, aligned, degrees_between, pointed_along, snapped, unit
 from hobble.motion.body import SIDES, Body, across, middle, path_to_root
-from hobble.motion.body_sample import BRIEF, RAISED, SHORT, BodySample, outward, spine_shares
+from hobble.motion.body_sample import RAISED, SHORT, BodySample, outward, spine_shares
 
 # Largest angles, in degrees, by which parts of a standing person differ from a direction. Legs are compared
 # with down, trunk and head with up, and feet with straight ahead. Up is the direction from the hips to the
@@ -34,8 +34,6 @@ LEG, TRUNK, HEAD, FOOT = 40.0, 40.0, 50.0, 50.0
 # figure has at least one stretched leg.
 STRETCHED = 0.8
 UPRIGHT_LEAN = 25.0  # degrees: the trunk of an upright figure leans less than this
-# Degrees: a figure stoops if its trunk leans more than this. The straight trunk of a sprinter leans up to 35.
-STOOPED_LEAN = 40.0
 FEWEST_UPRIGHT = 0.05  # least share of the moments that must be upright
 # Degrees: the moments are chosen that lean less than this plus the 5 % quantile (FEWEST_UPRIGHT) of the lean.
 SPREAD = 15.0
@@ -47,9 +45,8 @@ TRUSTED, TRUSTED_HAND = 30.0, 60.0
 SHRUG = 12.0  # degrees: if a clavicle's frame differs from the chest's by less, it gets the chest's frame
 # Radians by which the first bone of a person's neck leans forward. NECK: from the vertical, in a standing
 # zero pose. NECK_OF_HEAD: from the line that goes from chest to head. Both are means over seven subjects of
-# CMU. Each _ERROR is the standard deviation.
-NECK, NECK_ERROR = np.radians(5.4), np.radians(2.6)
-NECK_OF_HEAD, NECK_OF_HEAD_ERROR = np.radians(5.6), np.radians(3.9)
+# CMU, with standard deviations of 2.6 and 3.9 degrees.
+NECK, NECK_OF_HEAD = np.radians(5.4), np.radians(5.6)
 # BALL: offset from an ankle to the ball of its foot, as a share of the length of thigh plus shank, for a foot
 # that stands and points to +Z. TOES_OUT: radians by which feet point outward. Both are means over seven
 # subjects of the CMU database. The standard deviations are .006 (height) and .010 (length) for BALL, and 2
@@ -58,14 +55,9 @@ BALL, TOES_OUT = np.array([0.0, -0.034, 0.136]), np.radians(5.0)
 # cm: if the offset of a joint from its parent changes by more than this during the clip, the new clip stores
 # the offsets of every frame.
 MOVES = 0.1
-# Radians. If standing feet are steeper or flatter than in the zero pose by this or more, this is reported. In
+# Degrees. If standing feet are steeper or flatter than in the zero pose by this or more, this is reported. In
 # the data set `patients` the difference is at most 9 degrees.
-UNLIKE_ZERO = np.radians(12.0)
-# cm between the 5th and 95th percentile of the heights of feet that stand flat. Above this, the ground is
-# uneven, and how steep the feet are tells nothing about the rig. On flat ground the value is up to 3, in
-# CMU's walks on uneven ground 9 to 18.
-UNEVEN = 6.0
-POSITION_ERROR = 3.0  # cm: mean error of the positions of hips and head in clips of bows and squats
+UNLIKE_ZERO = 12.0
 APART = 10.0  # degrees: a larger difference between the two standing feet is reported
 NOTED = 1.0  # cm: an uncertainty of the height (two standard deviations) above this is reported
 
@@ -114,11 +106,10 @@ def with_upright_rest(
         _use_zero_pose(frames, zero, sample)
     further = _add_further_joints(frames, clip, sample, others)
     new_clip, new_body = _with_rest_pose(clip, sample, trunk, frames, further)
-    doubts = [_lean_doubt(sample, zero), _stoop_doubt(sample, zero), _zero_doubt(sample, zero)]
     height_error = 0.0 if zero else _height_error(sample)
-    doubts.append(_feet_doubt(sample, zero, height_error))
+    doubts = _feet_doubts(sample, zero, height_error)
     source = "its zero pose" if zero else f"its motion, because in its zero pose {problem}"
-    return UprightMotion(new_clip, new_body, source, [doubt for doubt in doubts if doubt], height_error)
+    return UprightMotion(new_clip, new_body, source, doubts, height_error)
 
 
 def why_not_standing(body: Body, rest: Array) -> str | None:
@@ -521,61 +512,6 @@ def _clip_from_world(clip: Clip, skeleton: Skeleton, rotations: Array, positions
 # What is uncertain, in sentences
 
 
-def _lean_doubt(sample: BodySample, zero: Frames | None) -> str | None:
-    """A warning that it is uncertain how far the chest leans, if the rig has no neck, else None."""
-    if not _lacks_neck(sample):
-        return None
-    # cm from chest to shoulders. An error of the lean moves the shoulders by angle times distance.
-    distance = np.mean([sample.length(sample.body.chest, arm[1]) for arm in sample.body.arms.values()])
-    error = 2 * (NECK_ERROR if zero else NECK_OF_HEAD_ERROR) * float(distance)
-    return (
-        "The rig has no joint for the neck, so it is uncertain how far the chest leans: arms may lie "
-        f"{error:.0f} cm too far forward or back."
-    )
-
-
-def _stoop_doubt(sample: BodySample, zero: Frames | None) -> str | None:
-    """A warning if the figure nearly always stoops or squats and its zero pose is no stance, else None."""
-    if zero or np.mean(_leans(sample) < STOOPED_LEAN) >= FEWEST_UPRIGHT:
-        return None
-    return (
-        "The figure is almost never upright, and nobody could stand in its zero pose. So it is uncertain how "
-        f"far its pelvis tilts. Hips, trunk and arms may lie {POSITION_ERROR:g} cm too far forward or back."
-    )
-
-
-def _zero_doubt(sample: BodySample, zero: Frames | None) -> str | None:
-    """A warning if standing feet are steeper or flatter in the motion than in the zero pose, else None.
-
-    They may differ because the figure stands on its toes or leans in the zero pose. On uneven ground, feet
-    stand at any angle, so there is no warning.
-    """
-    measured = sample.feet_tilt.measured
-    sides = [side for side in measured if sample.is_upright_while_flat(side)]
-    if not zero or not sides:
-        return None
-    feet = {side: sample.body.legs[side][2:] for side in sides}
-    heights = [sample.positions[sample.flat_moments(side), toe, 1] for side, (_, toe) in feet.items()]
-    # Radians by which a foot points further down while it stands than in the zero pose. A runner's foot is
-    # steeper than flat by RAISED.
-    differences = []
-    for side, (heel, toe) in feet.items():
-        x, y, z = quat.rotate(quat.inv(zero[heel]), sample.bone(heel, toe))
-        raised = RAISED if sample.figure_runs else 0.0
-        differences.append(measured[side] - raised - np.arctan2(-y, np.hypot(x, z)))
-    difference = float(np.mean(differences))
-    if np.ptp(np.percentile(np.concatenate(heights), [5, 95])) > UNEVEN or abs(difference) < UNLIKE_ZERO:
-        return None
-    degrees, compared = np.degrees(abs(difference)), "steeper" if difference > 0 else "flatter"
-    sentence = f"Its feet stand {degrees:.0f} degrees {compared} in the motion than in its zero pose"
-    if degrees > TRUSTED:
-        return f"{sentence}. The angle in the motion was used, so feet may be tilted by some degrees."
-    high = abs(difference) * np.mean([sample.length(*foot) for foot in feet.values()])
-    return (
-        f"{sentence}. If they are not flat in the zero pose, the figure stands {high:.1f} cm too high or low."
-    )
-
-
 def _height_error(sample: BodySample) -> float:
     """Centimetres (two standard deviations) by which the figure may stand too high or low.
 
@@ -587,26 +523,34 @@ def _height_error(sample: BodySample) -> float:
     return float(2 * np.mean([sample.length(*foot) for foot in feet]) * sample.feet_tilt.error)
 
 
-def _feet_doubt(sample: BodySample, zero: Frames | None, height_error: float) -> str | None:
-    """A sentence on what is uncertain about how the feet stand, or None."""
-    tilts = list(sample.feet_tilt.measured.values())
+def _feet_doubts(sample: BodySample, zero: Frames | None, height_error: float) -> list[str]:
+    """Sentences on what is uncertain about how the feet stand. zero: the frames of the zero pose."""
+    tilts = sample.feet_tilt.measured
     if len(tilts) < len(SIDES):
         further = "" if zero else ", and toes and ankles may lie some centimetres off"
-        return (
+        return [
             "The rig has no joints for the balls of the feet. Joints were added where people have the balls, "
             f"so the figure may stand 3 cm too high or low{further}."
-        )
+        ]
+    if zero:
+        raised = RAISED if sample.figure_runs else 0.0  # a runner's foot is steeper than flat
+        feet = {side: sample.body.legs[side][2:] for side in SIDES if sample.is_upright_while_flat(side)}
+        bones = {s: quat.rotate(quat.inv(zero[a]), sample.bone(a, b)) for s, (a, b) in feet.items()}
+        steeper = [tilts[side] - raised + np.arctan2(y, np.hypot(x, z)) for side, (x, y, z) in bones.items()]
+        degrees = float(np.degrees(np.mean(steeper))) if steeper else 0.0
+        if abs(degrees) < UNLIKE_ZERO:
+            return []
+        high = np.radians(abs(degrees)) * np.mean([sample.length(*foot) for foot in feet.values()])
+        return [
+            f"Its feet stand {abs(degrees):.0f} degrees {'steeper' if degrees > 0 else 'flatter'} in the "
+            f"motion than in its zero pose, so the figure may stand {high:.1f} cm too high or low."
+        ]
     if height_error < NOTED:
-        return None
-    why = "nobody could stand in the zero pose (all rotations zero) of its file"
-    if sample.seconds < BRIEF:
-        why += f" and {sample.seconds:.2f} s are too short for a step of each foot"
-    if sample.is_on_tiptoe(tilts):
-        why += " and the figure squats, perhaps on tiptoe"
-    one, other = np.degrees(tilts)
-    if abs(one - other) > APART:
-        why += f" and its feet stand at different angles ({one:.0f} and {other:.0f} degrees)"
-    return (
-        f"The height of the ankles is uncertain, because {why}. It was estimated from the feet while they "
-        f"stand, so the figure may stand {height_error:.1f} cm too high or low."
-    )
+        return []
+    one, other = np.degrees(list(tilts.values()))
+    apart = f" and its feet stand at different angles ({one:.0f} and {other:.0f} degrees)"
+    return [
+        "The height of the ankles is uncertain, because nobody could stand in the zero pose (all rotations "
+        f"zero) of its file{apart if abs(one - other) > APART else ''}. It was estimated from the feet while "
+        f"they stand, so the figure may stand {height_error:.1f} cm too high or low."
+    ]

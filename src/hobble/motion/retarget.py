@@ -13,7 +13,7 @@ joint above.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -71,7 +71,7 @@ class Retarget:
     (2,) cm by which the hip joint is higher above the ball of the foot than in the scaled source, if the leg
     bends as it does there; left, then right. The hips rise by the mean. If the legs of a figure are not
     equally long, the balls of the feet go down or up by the rest, so that no knee bends for it. In clips,
-    `_with_level_pelvis` makes the rest small.
+    `level_pelvis` makes the rest small.
     """
 
     source: Skeleton = field(repr=False)
@@ -180,20 +180,36 @@ def _drivers(target: Skeleton, joints: Array) -> tuple[Array, Array]:
 
 def retarget_clip(clip: Clip, how: Retarget) -> Clip:
     """The clip's motion on the target skeleton. how: what `plan` returns for the two skeletons."""
-    # World rotations of the target, from those of the source. Only those of `how.joints` are set.
-    rotations = np.empty((len(clip), len(how.target.joints), 4))
-    rotations[:, how.joints] = quat.mul(clip.global_rotations[:, how.follows], how.turns)
-    how = _with_level_pelvis(_with_measured_lifts(how, clip, rotations), clip, rotations)
+    rotations = follow(how, clip.global_rotations)
+    how = _with_measured_lifts(how, clip, rotations)
+    at, balls = clip.at_roles(), [clip.positions[:, how.source.role(f"{s}_toe")] * how.scale for s in SIDES]
+    left = at["left_hip"] - at["right_hip"]
+    lean = float(np.mean(np.arcsin(np.clip(unit(left)[:, 1], -1.0, 1.0))))
+    how = level_pelvis(how, rotations, left, lean, [_standing_height(ball) for ball in balls])
     for side in SIDES:
         heel, toe = (clip.positions[:, how.source.role(f"{side}_{part}")] for part in ("heel", "toe"))
         ankle, ball = how.target.role(f"{side}_heel"), how.target.role(f"{side}_toe")
         foot = quat.rotate(rotations[:, ankle], how.driver_offsets[ball])
         tilt = steady_heels(foot, heel * how.scale, toe * how.scale, clip.fps)
         rotations[:, ankle] = quat.mul(tilt, rotations[:, ankle])
-    hips = _bend_legs(how, clip, rotations)
+    swings = [_swing(ball, clip.fps) for ball in balls]
+    around = 2 * round(0.25 * clip.fps) + 1
+    heights = [ball[:, 1] - lowest(ball[:, 1], around) for ball in balls]
+    reach = max(1, round(SMOOTH * clip.fps))
+    hips = bend_legs(how, clip.positions, rotations, swings, heights, lambda drop: smooth_above(drop, reach))
     root = hips + quat.rotate(rotations[:, how.target.role("hips")], how.driver_offsets[0])
     local = quat.continuous(local_rotations(how.target, rotations[:, how.drivers]))
     return Clip(clip.name, how.target, clip.fps, local, root)
+
+
+def follow(how: Retarget, rotations: Array) -> Array:
+    """(..., J, 4) world rotations of the target's joints; only those of `how.joints` are set.
+
+    rotations: (..., J, 4) of the source's joints in the world.
+    """
+    out = np.empty((*rotations.shape[:-2], len(how.target.joints), 4))
+    out[..., how.joints, :] = quat.mul(rotations[..., how.follows, :], how.turns)
+    return out
 
 
 def _with_measured_lifts(how: Retarget, clip: Clip, rotations: Array) -> Retarget:
@@ -211,50 +227,71 @@ def _with_measured_lifts(how: Retarget, clip: Clip, rotations: Array) -> Retarge
     return replace(how, lifts=lifts)
 
 
-def _with_level_pelvis(how: Retarget, clip: Clip, rotations: Array) -> Retarget:
+def _standing_height(ball: Array) -> float:
+    """Height of the ball of a foot while it stands, cm. ball: (F, 3) its positions."""
+    slow = np.linalg.norm(np.gradient(ball, axis=0), axis=-1) if len(ball) > 1 else np.zeros(len(ball))
+    return float(np.median(ball[slow <= np.quantile(slow, 0.25), 1]))
+
+
+def _swing(ball: Array, fps: float) -> Array:
+    """(F,) how much a foot swings, from 0 to 1. ball: (F, 3) positions of its ball."""
+    speed = np.zeros(len(ball))
+    if len(ball) > 1:
+        speed = np.linalg.norm(np.gradient(gaussian(ball, SMOOTH * fps), axis=0), axis=-1) * fps
+    return smoothstep((speed - SWING[0]) / (SWING[1] - SWING[0]))
+
+
+def level_pelvis(
+    how: Retarget, rotations: Array, left: Array, lean: float = 0.0, heights: Sequence[float] = (0.0, 0.0)
+) -> Retarget:
     """The plan with `lifts` that let the feet stand equally high; the pelvis is turned by the difference.
 
     If the figure's legs are not equally long, its pelvis leans to the shorter leg while its feet are level.
     Legs of equal length then have level feet only with a level pelvis. So the pelvis is turned until the feet
-    are level, but it does not lean to the other side by more than LEVEL. rotations: (F, J, 4) of the target's
-    joints in the world, of which those of the pelvis are changed.
+    are level, but it does not lean to the other side by more than LEVEL.
+
+    rotations: (..., J, 4) of the target's joints in the world, of which those of the pelvis are changed.
+    left: (..., 3) from the source's right hip to its left. lean: radians by which this line leans on average.
+    heights: cm, of the balls of both feet while they stand.
     """
-    at = clip.at_roles()
-    heights = []  # of the standing ball of each foot, cm
-    for side in SIDES:
-        ball = at[f"{side}_toe"] * how.scale
-        slow = np.linalg.norm(np.gradient(ball, axis=0), axis=-1) if len(ball) > 1 else np.zeros(len(ball))
-        heights.append(float(np.median(ball[slow <= np.quantile(slow, 0.25), 1])))
     if abs(heights[0] - heights[1]) > UNEVEN:
         return how
-    left = at["left_hip"] - at["right_hip"]
-    rest = rest_positions(how.target)
-    width = float(np.linalg.norm(rest[how.target.role("left_hip")] - rest[how.target.role("right_hip")]))
-    lean = float(np.mean(np.arcsin(np.clip(unit(left)[:, 1], -1.0, 1.0))))
+    rest, role = rest_positions(how.target), how.target.role
+    width = float(np.linalg.norm(rest[role("left_hip")] - rest[role("right_hip")]))
     needed = np.arcsin(np.clip((how.lifts[0] - how.lifts[1] - heights[0] + heights[1]) / width, -0.3, 0.3))
     sign = np.sign(needed)
     turn = sign * np.clip(LEVEL - sign * lean, 0.0, abs(needed))
-    parents, hips = how.target.parents, how.target.role("hips")
-    tops = [parents[how.target.role(f"{side}_hip")] for side in SIDES]
+    parents, hips = how.target.parents, role("hips")
+    tops = [parents[role(f"{side}_hip")] for side in SIDES]
     pelvis = sorted({j for top in tops for j in path_between(parents, hips, top)})
     ahead = unit(np.cross(left, UP))
-    by = quat.normalize(quat.from_axis_angle(ahead, np.full(len(ahead), turn)))
-    rotations[:, pelvis] = quat.mul(by[:, None], rotations[:, pelvis])
+    by = quat.normalize(quat.from_axis_angle(ahead, np.full(ahead.shape[:-1], turn)))
+    rotations[..., pelvis, :] = quat.mul(by[..., None, :], rotations[..., pelvis, :])
     return replace(how, lifts=how.lifts - 0.5 * width * np.sin(turn) * np.array([1.0, -1.0]))
 
 
-def _bend_legs(how: Retarget, clip: Clip, rotations: Array) -> Array:
+def bend_legs(
+    how: Retarget,
+    source: Array,
+    rotations: Array,
+    swings: Sequence[Array],
+    heights: Sequence[Array],
+    smooth: Callable[[Array], Array],
+) -> Array:
     """Turn thighs and shanks so that the balls of the feet are where they are in the scaled source.
 
-    rotations: (F, J, 4) of the target's joints in the world, which are changed. Returns the positions (F, 3)
-    of the hips, which come down smoothly where a leg would be too straight.
+    source: (..., J, 3) positions of the source's joints. rotations: (..., J, 4) of the target's joints in the
+    world, which are changed. swings: for each foot (...) how much it swings, 0 to 1. heights: for each foot
+    (...) how high it is above the ground, cm. smooth: makes the drop of the hips smooth over time.
+
+    Returns the positions (..., 3) of the hips, which come down where a leg would be too straight.
     """
-    hips = _hips_position(how, clip.positions, rotations)
-    legs = [_Leg(how, clip.positions, rotations, hips, side) for side in SIDES]
+    hips = _hips_position(how, source, rotations)
+    legs = [_Leg(how, source, rotations, hips, side) for side in SIDES]
     too_high = [np.maximum(excess, 0.0) * weight for excess, weight in (leg.excess(SPARED) for leg in legs)]
-    drop = smooth_above(np.maximum(*too_high), max(1, round(SMOOTH * clip.fps)))[:, None] * UP
-    for leg in legs:
-        leg.bend(leg.start - drop, clip.fps)
+    drop = smooth(np.maximum(*too_high))[..., None] * UP
+    for leg, swing, height in zip(legs, swings, heights, strict=True):
+        leg.bend(leg.start - drop, swing, height)
     return hips - drop
 
 
@@ -290,9 +327,9 @@ class _Leg:
             above = how.drivers[how.target.parents[joint]]
             self.start = self.start + quat.rotate(rotations[..., above, :], how.driver_offsets[joint])
             joint = above
-        self.toe = source[..., how.source.role(roles[3]), :] * how.scale
-        self.toe = self.toe + (np.mean(how.lifts) - how.lifts[SIDES.index(side)]) * UP
-        self.ankle = self.toe - quat.rotate(rotations[..., heel, :], how.driver_offsets[ball])
+        toe = source[..., how.source.role(roles[3]), :] * how.scale
+        toe = toe + (np.mean(how.lifts) - how.lifts[SIDES.index(side)]) * UP
+        self.ankle = toe - quat.rotate(rotations[..., heel, :], how.driver_offsets[ball])
         hip_at, knee_at, heel_at = (source[..., how.source.role(role), :] for role in roles[:3])
         length = np.linalg.norm(knee_at - hip_at, axis=-1) + np.linalg.norm(heel_at - knee_at, axis=-1)
         self.stretch = np.linalg.norm(heel_at - hip_at, axis=-1) / length
@@ -317,30 +354,20 @@ class _Leg:
         thigh, shank = np.linalg.norm(self.thigh), np.linalg.norm(self.shank)
         return np.sqrt(thigh**2 + shank**2 + 2 * thigh * shank * np.cos(bend))
 
-    def _swinging_ankle(self, start: Array, fps: float) -> Array:
-        """(F, 3) where the ankle must be. While the foot swings, the knee bends as in the source.
+    def bend(self, start: Array, swing: Array, height: Array) -> None:
+        """Turn thigh and shank so that the ankle reaches its position. The foot keeps its rotation.
 
         While the foot stands, the ball stays where it is in the source, and a foot of another size bends the
-        knee by some degrees more or less. In a swing, the ball may be elsewhere, but not below
-        half its height.
+        knee by some degrees more or less. In a swing, the knee bends as in the source, and the ball may be
+        elsewhere, but not below half its height.
+
+        start: (..., 3) where the leg begins after the hips came down. swing, height: see `bend_legs`.
         """
         line = self.ankle - start
         distance = np.linalg.norm(line, axis=-1)
-        speed = np.zeros(len(line))
-        if len(line) > 1:
-            speed = np.linalg.norm(np.gradient(gaussian(self.toe, SMOOTH * fps), axis=0), axis=-1) * fps
-        swings = smoothstep(np.clip((speed - SWING[0]) / (SWING[1] - SWING[0]), 0.0, 1.0))
-        height = self.toe[:, 1] - lowest(self.toe[:, 1], 2 * round(0.25 * fps) + 1)
-        down = np.maximum(-line[:, 1] / np.maximum(distance, 1e-9), 0.1)
-        shift = np.minimum(swings * (self._reach(self.knee_bend) - distance), 0.5 * height / down)
-        return self.ankle + unit(line) * shift[:, None]
-
-    def bend(self, start: Array, fps: float) -> None:
-        """Turn thigh and shank so that the ankle reaches its position. The foot keeps its rotation.
-
-        start: (F, 3) where the leg begins after the hips came down.
-        """
-        ankle = self._swinging_ankle(start, fps)
+        down = np.maximum(-line[..., 1] / np.maximum(distance, 1e-9), 0.1)
+        shift = np.minimum(swing * (self._reach(self.knee_bend) - distance), 0.5 * height / down)
+        ankle = self.ankle + unit(line) * shift[..., None]
         upper, lower = self.rotations[..., self.hip, :], self.rotations[..., self.knee, :]
         pole = _knee_direction(upper, lower, self.thigh, self.shank, self.forward)
         lengths = float(np.linalg.norm(self.thigh)), float(np.linalg.norm(self.shank))
@@ -390,52 +417,38 @@ BONES = {  # limb -> roles of its two ends, without the side
 SHAPE_DEPENDENT = ("hip", "ankle")
 # Degrees: the report tells of a joint whose median difference is larger.
 NOTED_CONSTANTS = {"knee": 5.0, "elbow": 5.0, "hip": 10.0, "ankle": 45.0}
-STANCE_SPEED = 0.6  # cm a frame at 60 Hz: the ball of a standing foot is slower than this
 # A clip is refused if the mean cosine of the angle between where a bent knee points and where the body faces
 # is less than this. In 172 clips of the data sets `cmu`, `styles` and `patients`, of Ferre et al. and of
 # Holden et al. (2017), it is 0.57 or more.
 KNEE_AHEAD = 0.25
-KNEE_BACKWARD = -0.3  # a knee bends backward if the same cosine is less than this
+KNEE_BACKWARD = -0.3  # the limit if the user has set the handedness, which then may be wrong
 BENT_KNEE = 20.0  # degrees: a knee that bends less does not show where it points
 # Cosine of the angle between a thigh and the body's down. Who sits, kneels or squats lifts a thigh further
 # and may point the knee aside.
 LIFTED_THIGH = 0.5
 
 
-def compare_motions(source: Clip, result: Clip, scale: float) -> dict[str, Any]:
-    """How much the result of retargeting differs from its source, frame by frame.
+def compare_motions(source: Clip, result: Clip) -> dict[str, Any]:
+    """How much the result of retargeting differs from its source, frame by frame, in degrees.
 
-    scale: leg length of the result / leg length of the source.
-
-    Returns a dictionary with these keys. All angles are in degrees.
-
-    angles: joint, such as "left knee" -> dictionary. `source` and `result` are the 5th, 50th and 95th
-    percentile of the joint's angle in each clip. `constant` is the median difference. For joints in
-    SHAPE_DEPENDENT it is subtracted before `apart`, the mean absolute difference, is computed.
-
-    directions: limb, such as "left thigh" -> mean angle between its directions in source and result.
-
-    feet: side -> dictionary. The source's positions are multiplied by `scale` for it. `higher` is how many cm
-    higher the ball of the foot is in the result than in the source, on average. `slide_source` and
-    `slide_result` are its mean speeds over the ground while the source's foot stands, cm a second, or None if
-    that foot never stands.
-
-    knees: side -> mean cosine of the angle between where the result's bent knee points and where its body
-    faces, or None for a knee that hardly bends.
+    Returns a dictionary with two keys. angles: joint, such as "left knee" -> dictionary. `constant` is the
+    median difference of the joint's angle. For joints in SHAPE_DEPENDENT it is subtracted before `apart`, the
+    mean absolute difference, is computed. directions: limb, such as "left thigh" -> mean angle between its
+    directions in source and result.
     """
     before, after = ({role: at[: len(result)] for role, at in c.at_roles().items()} for c in (source, result))
-    angles, directions, feet = {}, {}, {}
+    angles, directions = {}, {}
     for side in SIDES:
         for name, parts in ANGLES.items():
-            old, new = (_bend(at, side, parts) for at in (before, after))
-            angles[f"{side} {name}"] = _compare_angle(old, new, name in SHAPE_DEPENDENT)
+            more = _bend(after, side, parts) - _bend(before, side, parts)
+            constant = float(np.median(more))
+            apart = np.abs(more - (constant if name in SHAPE_DEPENDENT else 0.0)).mean()
+            angles[f"{side} {name}"] = {"constant": round(constant, 2), "apart": round(float(apart), 2)}
         for name, ends in BONES.items():
             start, end = (f"{side}_{part}" for part in ends)
             apart = degrees_between(*(at[end] - at[start] for at in (before, after)))
             directions[f"{side} {name}"] = round(float(apart.mean()), 2)
-        feet[side] = _compare_foot(before[f"{side}_toe"] * scale, after[f"{side}_toe"], result.fps)
-    knees = {side: _knee_cosine(after, side) for side in SIDES}
-    return {"angles": angles, "directions": directions, "feet": feet, "knees": knees}
+    return {"angles": angles, "directions": directions}
 
 
 def difference_problems(path: Path, differences: dict[str, Any], rig: str) -> list[Problem]:
@@ -444,38 +457,49 @@ def difference_problems(path: Path, differences: dict[str, Any], rig: str) -> li
     path: the source's file. differences: what `compare_motions` returns. rig: name of the source's rig.
     """
     name, degrees = most_different(differences)
-    fix = (
-        f"Look at both (`hobble look {path} --picture apart.svg` draws them side by side), "
-        f"and correct the roles of its rig. `hobble rig {path}` writes a draft for "
-        "config/skeletons/."
-    )
     out = []
     if degrees > MOST_DIFFERENCE:
         out.append(
-            Problem(f"the {name} is {degrees:.0f} degrees off its source on average (rig: {rig})", fix)
+            Problem(
+                f"the {name} is {degrees:.0f} degrees off its source on average (rig: {rig})",
+                f"Look at both (`hobble look {path} --picture apart.svg` draws them side by side), and "
+                f"correct the roles of its rig. `hobble rig {path}` writes a draft for config/skeletons/.",
+            )
         )
-    cosines = differences["knees"].values()
-    if sum(cosine is not None and cosine < KNEE_BACKWARD for cosine in cosines) == 2:
-        out.append(Problem(f"both knees bend backward (rig: {rig})", fix))
-    constants = {joint: angle["constant"] for joint, angle in differences["angles"].items()}
-    for joint, constant in constants.items():
-        if abs(constant) > NOTED_CONSTANTS[joint.partition(" ")[2]]:
-            more = "more" if constant > 0 else "less"
-            out.append(Problem(f"the {joint} bends {abs(constant):.0f} degrees {more} than in the file"))
+    for joint, angle in differences["angles"].items():
+        if abs(angle["constant"]) > NOTED_CONSTANTS[joint.partition(" ")[2]]:
+            more = "more" if angle["constant"] > 0 else "less"
+            out.append(
+                Problem(f"the {joint} bends {abs(angle['constant']):.0f} degrees {more} than in the file")
+            )
     return out
 
 
-def knee_problem(clip: Clip) -> Problem | None:
-    """A knee that, while it is bent, does not point forward."""
+def knee_problem(clip: Clip, least: float) -> Problem | None:
+    """A knee that, while it is bent, does not point forward.
+
+    The mean cosine of the angle between where the knee points and where the body faces is less than `least`.
+    A frame counts by how much further than BENT_KNEE the knee bends, since a nearly straight leg hardly shows
+    where its knee points, and not at all if the thigh is lifted. A knee of which less than a tenth of the
+    frames count is not judged.
+    """
     at = clip.at_roles()
+    # The body's left times its up gives its forward.
+    up = unit(at["head"] - at["hips"])
+    ahead = unit(np.cross(at["left_hip"] - at["right_hip"], up))
     for side in SIDES:
-        cosine = _knee_cosine(at, side, at["head"] - at["hips"])
-        if cosine is not None and cosine < KNEE_AHEAD:
-            bends = _bend(at, side, ANGLES["knee"])
+        bends = _bend(at, side, ANGLES["knee"])
+        hip, knee, heel = (at[f"{side}_{part}"] for part in ("hip", "knee", "heel"))
+        lifted = np.sum(unit(hip - knee) * up, axis=-1) < LIFTED_THIGH
+        weight = np.where(lifted, 0.0, np.maximum(bends - BENT_KNEE, 0.0))
+        points = unit(bend_direction(hip, knee, heel))
+        cosine = np.sum(points * ahead, axis=-1) @ weight / max(weight.sum(), 1e-9)
+        if np.mean(weight > 0) >= 0.1 and cosine < least:
             return Problem(
                 f"the {side} knee points {np.degrees(np.arccos(cosine)):.0f} degrees away from forward while "
                 f"it is bent (by up to {bends.max():.0f} degrees, at {bends.argmax() / clip.fps:.1f} s), so "
-                "the rotation channels may be declared in another order than they were written",
+                "the rotation channels may be declared in another order than they were written, or in "
+                "coordinates of the other handedness",
                 "Export the clip again.",
             )
     return None
@@ -491,18 +515,6 @@ def most_different(differences: dict[str, Any]) -> tuple[str, float]:
     return name, apart[name]
 
 
-def _compare_angle(before: Array, after: Array, depends_on_shape: bool) -> dict[str, Any]:
-    """What `compare_motions` returns in `angles` for one joint. before, after: (F,) its angles, degrees."""
-    constant = float(np.median(after - before))
-    apart = after - before - (constant if depends_on_shape else 0.0)
-    return {
-        "source": [round(float(x), 1) for x in np.percentile(before, [5, 50, 95])],
-        "result": [round(float(x), 1) for x in np.percentile(after, [5, 50, 95])],
-        "constant": round(constant, 2),
-        "apart": round(float(np.abs(apart).mean()), 2),
-    }
-
-
 def _bend(at: dict[str, Array], side: str, parts: tuple[str, ...]) -> Array:
     """(F,) degrees between the two bones that connect three joints: 0 if the bones are in line.
 
@@ -510,32 +522,3 @@ def _bend(at: dict[str, Array], side: str, parts: tuple[str, ...]) -> Array:
     """
     a, b, c = (at[part] if part == "head" else at[f"{side}_{part}"] for part in parts)
     return degrees_between(b - a, c - b)
-
-
-def _compare_foot(source: Array, result: Array, fps: float) -> dict[str, float | None]:
-    """What `compare_motions` returns in `feet`. source, result: (F, 3) of the ball, at the result's scale."""
-    speeds = [np.linalg.norm(np.diff(at[:, [0, 2]], axis=0), axis=-1) for at in (source, result)]
-    stance = np.linalg.norm(np.diff(source, axis=0), axis=-1) * fps / 60.0 < STANCE_SPEED
-    slides = [round(float(speed[stance].mean() * fps), 2) if stance.any() else None for speed in speeds]
-    higher = round(float(np.mean(result[:, 1] - source[:, 1])), 2)
-    return {"higher": higher, "slide_source": slides[0], "slide_result": slides[1]}
-
-
-def _knee_cosine(
-    at: dict[str, Array], side: str, up: Array | tuple[float, ...] = (0.0, 1.0, 0.0)
-) -> float | None:
-    """Mean cosine of the angle between where a knee points and where the body faces, while the knee is bent.
-
-    A frame counts by how much further than BENT_KNEE the knee bends, since a nearly straight leg hardly shows
-    where its knee points, and not at all if the thigh is lifted. None if less than a tenth of the frames
-    count. at: role -> (F, 3) positions. up: (3,) or (F, 3), the direction up along the body.
-    """
-    # The body's left times its up gives its forward.
-    ahead = unit(np.cross(at["left_hip"] - at["right_hip"], up))
-    hip, knee, heel = (at[f"{side}_{part}"] for part in ("hip", "knee", "heel"))
-    lifted = np.sum(unit(hip - knee) * unit(np.asarray(up)), axis=-1) < LIFTED_THIGH
-    weight = np.where(lifted, 0.0, np.maximum(_bend(at, side, ANGLES["knee"]) - BENT_KNEE, 0.0))
-    if np.mean(weight > 0) < 0.1:
-        return None
-    outward = bend_direction(hip, knee, heel)  # where the knee points
-    return round(float(np.sum(unit(outward) * ahead, axis=-1) @ weight / weight.sum()), 2)

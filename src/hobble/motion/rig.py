@@ -6,8 +6,7 @@ is the known skeleton to which clips are retargeted. A role is the body part of 
 
 from __future__ import annotations
 
-import re
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from pathlib import Path
@@ -18,12 +17,10 @@ from hobble.core import quat
 from hobble.core.clip import Clip
 from hobble.core.errors import InputError
 from hobble.core.quat import Array
-from hobble.core.skeleton import Skeleton, forward_kinematics, rest_positions
-from hobble.core.untrusted import read_text
+from hobble.core.skeleton import Skeleton, rest_positions
 from hobble.motion.axes import body_axes, unit
 from hobble.motion.body import ARM, LEG, SIDES, Body, body_by_roles, path_between, path_to_root, with_fingers
 from hobble.motion.limbs import Doubt, TwoFigures, find_body
-from hobble.motion.read import Bvh, Decoded, decode_channels
 from hobble.motion.skeleton_file import KnownSkeleton, load_skeleton
 
 # Name of a unit of length -> centimetres. The unit of CMU files is an inch / 0.45.
@@ -33,8 +30,6 @@ LEG_RANGE = (35.0, 125.0)  # cm: length of thigh plus shank, from small children
 # A rig is taken for a known skeleton only if at least this share of the rig's joint names occur in that
 # skeleton.
 LEAST_SHARED_NAMES = 0.75
-# Finds the names of joints (and other indented keys) in the text of a skeleton file.
-NAME = re.compile(r"^ +['\"]?([^\s'\":{}][^'\":{}]*)['\"]?\s*:", re.MULTILINE)
 # Role at the end of a bone, without the side -> degrees. Two rest poses count as equal if no bone's direction
 # differs by more than this.
 MOST_APART = {"elbow": 20.0, "wrist": 25.0, "knee": 35.0, "heel": 35.0, "toe": 35.0}
@@ -50,96 +45,62 @@ class RigMatch:
     """Which known skeleton a clip's rig is, and how it maps to the target.
 
     rig: name of the known skeleton, or UNKNOWN_RIG of `hobble.motion.make`. roles: role -> name of the
-    clip's joint. is_target_skeleton: whether the clip has the target's own joints and an equal rest pose.
-    followed_joints: name of a target joint -> name of the clip's joint that it follows. has_known_rest_pose:
-    whether the clip's rest pose equals that of the known skeleton (as `has_equal_rest_pose` compares them);
-    False if the rig has other joints between hips and head.
+    clip's joint. followed_joints: name of a target joint -> name of the clip's joint that it follows.
+    has_known_rest_pose: whether the clip's rest pose equals that of the known skeleton (as
+    `has_equal_rest_pose` compares them); False if the rig has other joints between hips and head.
     """
 
     rig: str
     roles: Mapping[str, str]
-    is_target_skeleton: bool = False
     followed_joints: Mapping[str, str] = field(default_factory=dict)
     has_known_rest_pose: bool = False
 
+    @property
+    def is_usable(self) -> bool:
+        """Whether the rig is used as it is: it has a known rest pose, and a map leads to the target."""
+        return self.has_known_rest_pose and bool(self.followed_joints)
+
 
 def nearest_skeleton(names: Collection[str], target: KnownSkeleton, folder: str | Path) -> KnownSkeleton:
-    """The skeleton in `folder` that has the most of these joint names; the target if none has more.
+    """The skeleton in `folder` that has the most of these joint names; the target if none has more."""
+    files = (file for file in sorted(Path(folder).glob("*.yaml")) if file.stem != target.skeleton.name)
+    known = [target, *map(load_skeleton, files)]
+    return max(known, key=lambda each: len(set(names) & set(each.skeleton.joints)))
 
-    A skeleton file is not parsed if its text shows that it has no more of these names than the best skeleton
-    so far, because parsing YAML takes longer than reading most clips.
+
+def below_hips(clip: Clip, target: KnownSkeleton, folder: str | Path) -> tuple[Clip, list[str]]:
+    """The clip with its hips as the root, and a note: some programs export joints above the hips.
+
+    The motion of the joints above is added to that of the hips; other joints that are not below them are left
+    out. folder: the folder of the skeleton files. The name of the hips is taken from the known skeleton that
+    has the most of the clip's joint names. A clip without a joint of this name is returned as it is.
     """
-    best, found = len(set(names) & set(target.skeleton.joints)), target
-    for file in sorted(Path(folder).glob("*.yaml")):
-        in_text = set(NAME.findall(read_text(file)))
-        if file.stem == target.skeleton.name or len(set(names) & in_text) <= best:
-            continue
-        other = load_skeleton(file)
-        if (shared := len(set(names) & set(other.skeleton.joints))) > best:
-            best, found = shared, other
-    return found
-
-
-def clean_names(names: Sequence[str]) -> tuple[str, ...]:
-    """Joint names without a prefix like "mixamorig:"; unchanged if two names would become equal."""
-    short = tuple(name.rpartition(":")[2].strip() for name in names)
-    return short if len(set(short)) == len(short) and all(short) else tuple(names)
-
-
-def find_hips(names: Sequence[str], target: KnownSkeleton, folder: str | Path) -> int:
-    """Index of the hips among a clip's joints: not always 0, as some programs export a joint above the hips.
-
-    names: of the clip's joints, the root first. folder: the folder of the skeleton files. The name of the
-    hips is taken from the known skeleton that has the most of the clip's joint names. If the clip has no
-    joint of this name, its root counts as the hips.
-    """
-    if names[0] == target.skeleton.roles["hips"]:
-        return 0
-    hips = nearest_skeleton(names, target, folder).skeleton.roles["hips"]
-    return names.index(hips) if hips in names else 0
-
-
-def below_hips(file: Bvh, hips: int) -> Bvh:
-    """The file with its hips as the root. Joints that are not below them are left out."""
-    if hips == 0:
-        return file
-    return _with_joints(file, [j for j in range(len(file.names)) if hips in path_to_root(file.parents, j)])
-
-
-def decode_below(file: Bvh, hips: int) -> Decoded:
-    """Rotations and positions of the joints of `below_hips`, as if the hips had always been the root.
-
-    The motion of the joints above is added to the motion of the hips.
-    """
-    decoded = decode_channels(below_hips(file, hips))
-    if hips == 0:
-        return decoded
-    above = path_to_root(file.parents, hips)[:0:-1]
-    chain = decode_channels(_with_joints(file, above))
-    skeleton = Skeleton("above", tuple(map(str, above)), tuple(range(-1, len(above) - 1)), chain.offsets)
-    turns, places = forward_kinematics(skeleton, chain.rotations, chain.root, chain.translations)
-    rotations = decoded.rotations.copy()
-    rotations[:, 0] = quat.mul(turns[:, -1], rotations[:, 0])
-    root = places[:, -1] + quat.rotate(turns[:, -1], decoded.root)
-    names = ", ".join(file.names[j] for j in above)
-    note = f"The joints above {file.names[hips]} ({names:.100}) were left out; their motion was added to it."
-    return replace(decoded, rotations=quat.continuous(rotations), root=root, notes=[note, *decoded.notes])
-
-
-def _with_joints(file: Bvh, joints: list[int]) -> Bvh:
-    """The same file with only some of its joints. joints: parents before children; the first is the root."""
-    new_index = {old: i for i, old in enumerate(joints)}
-    starts = np.cumsum([0, *(len(c) for c in file.channels)])  # of each joint's columns in `file.values`
-    names = tuple(file.names[j] for j in joints)
-    return replace(
-        file,
-        names=names,
-        parents=tuple(new_index.get(file.parents[j], -1) for j in joints),
-        offsets=file.offsets[joints],
-        channels=tuple(file.channels[j] for j in joints),
-        values=file.values[:, [column for j in joints for column in range(starts[j], starts[j + 1])]],
-        end_sites={name: sites for name, sites in file.end_sites.items() if name in names},
+    rig = clip.skeleton
+    if rig.joints[0] == target.skeleton.roles["hips"]:
+        return clip, []
+    name = nearest_skeleton(rig.joints, target, folder).skeleton.roles["hips"]
+    if name not in rig.joints[1:]:
+        return clip, []
+    hips = rig.index(name)
+    joints = [j for j in range(len(rig.joints)) if hips in path_to_root(rig.parents, j)]
+    names = tuple(rig.joints[j] for j in joints)
+    rotations = clip.rotations[:, joints]
+    rotations[:, 0] = clip.global_rotations[:, hips]
+    below = replace(
+        clip,
+        skeleton=replace(
+            rig,
+            joints=names,
+            parents=tuple(-1 if j == hips else joints.index(rig.parents[j]) for j in joints),
+            offsets=rig.offsets[joints],
+            end_sites={joint: site for joint, site in rig.end_sites.items() if joint in names},
+        ),
+        rotations=quat.continuous(rotations),
+        root=clip.positions[:, hips],
+        translations=None if clip.translations is None else clip.translations[:, joints],
     )
+    above = ", ".join(rig.joints[j] for j in path_to_root(rig.parents, hips)[:0:-1])
+    return below, [f"The joints above {name} ({above:.100}) were left out; their motion was added to it."]
 
 
 def match_rig(rig: Skeleton, target: KnownSkeleton, folder: str | Path) -> RigMatch | None:
@@ -165,7 +126,7 @@ def match_rig(rig: Skeleton, target: KnownSkeleton, folder: str | Path) -> RigMa
         return RigMatch(skeleton.name, roles)
     followed = {a: b for a, b in joint_pairs(known, target).items() if b in shared}
     alike = has_equal_rest_pose(replace(rig, roles=roles), skeleton)
-    return RigMatch(skeleton.name, roles, alike and has_joints_of_target, followed, alike)
+    return RigMatch(skeleton.name, roles, followed, alike)
 
 
 def has_equal_rest_pose(rig: Skeleton, known: Skeleton) -> bool:
