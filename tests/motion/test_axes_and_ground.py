@@ -108,7 +108,7 @@ def test_a_lying_rest_pose_gives_an_upright_figure(walk, bvh, make, rise):
 
 
 def test_the_axes_can_be_set(walk, bvh, make):
-    clip, report = make(bvh(walk), handedness="left", proportions="clip")
+    clip, report = make(bvh(walk), handedness="left", proportions="clip", accept_doubt=True)
     assert report["handedness"] == "left"
     np.testing.assert_allclose(clip.positions * [-1, 1, 1], walk.positions[::2], atol=1e-4)
     clip, report = make(bvh(walk), up="Z", proportions="clip")
