@@ -31,10 +31,10 @@ class Limits(NamedTuple):
 
 
 # For a leg of 80 cm, a heel comes into contact below 48 cm/s and 2.4 cm. So it is in contact for as long as
-# it is slower than 60 cm/s and lower than 3 cm above its own floor, the median height of its slow frames within
-# a second: to within .1 of the frames on 332 of 336 real clips. A toe rolls and pushes off, so it may be
-# faster, and by as much as it swings. With these limits, a foot is down in the walks of `cmu` for 55 to 65 %
-# of a cycle and for less than half of a jogging cycle.
+# it is slower than 60 cm/s and lower than 3 cm above its own floor, the median height of its slow frames
+# within a second: to within .1 of the frames on 333 of 336 real clips. A toe rolls and pushes off, so it may
+# be faster, and by as much as it swings. With these limits, a foot is down in the walks of `cmu` for 55 to
+# 65 % of a cycle and for less than half of a jogging cycle.
 HEEL = Limits((0.03, 0.035), (0.010, 0.013), (0.0, 0.0))
 TOE = Limits((0.02, 0.035), (0.010, 0.020), (0.18, 0.30))
 # Leg lengths. A person stands on tiptoe if the heel is this much higher above the toe than in the stances in
