@@ -84,8 +84,12 @@ def below_hips(clip: Clip, target: KnownSkeleton, folder: str | Path) -> tuple[C
     hips = rig.index(name)
     joints = [j for j in range(len(rig.joints)) if hips in path_to_root(rig.parents, j)]
     names = tuple(rig.joints[j] for j in joints)
-    rotations = clip.rotations[:, joints]
+    rotations, moved = clip.rotations[:, joints], clip.translations
     rotations[:, 0] = clip.global_rotations[:, hips]
+    if moved is not None:
+        moved = moved[:, joints]
+        moved[:, 0] = 0.0
+        moved = moved if np.ptp(moved, axis=0).max() > 1e-3 * np.abs(rig.offsets).max() else None
     below = replace(
         clip,
         skeleton=replace(
@@ -97,7 +101,7 @@ def below_hips(clip: Clip, target: KnownSkeleton, folder: str | Path) -> tuple[C
         ),
         rotations=quat.continuous(rotations),
         root=clip.positions[:, hips],
-        translations=None if clip.translations is None else clip.translations[:, joints],
+        translations=moved,
     )
     above = ", ".join(rig.joints[j] for j in path_to_root(rig.parents, hips)[:0:-1])
     return below, [f"The joints above {name} ({above:.100}) were left out; their motion was added to it."]
