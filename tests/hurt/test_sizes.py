@@ -60,7 +60,7 @@ def test_a_stiff_leg_swings_low_over_a_straight_sound_leg(captured, hurting, par
     healthy, limping = (mean_curves(one) for one in (clip, hurt))
     # In people's recordings the sound knee is bent by 8 to 10 degrees as the hurt foot passes, as in health.
     bends = [one["knee_flexion_L"][38:43].mean() for one in (limping, healthy)]
-    assert 8 <= bends[0] <= 1.15 * bends[1]
+    assert 8 <= bends[0] <= 1.25 * bends[1]
     # In people's recordings the ankle rises by .68 (antalgic) and .51 (stiff-legged) of the healthy rise.
     rises = [np.ptp(one["ankle_height_R"]) for one in (limping, healthy)]
     assert 0.25 <= rises[0] / rises[1] <= 0.68

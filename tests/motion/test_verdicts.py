@@ -34,9 +34,9 @@ TOLD = {
     "ammarkov/102_01cc": "No unit gives this rig a person's size",
     "npybvh/example": "source_fps: 60",
 }
-# Contacts of heels that differ from `heel_count`: a file that plays at a fifth of its speed, a kick, and a clip
-# of three stances.
-OTHER_HEELS = ("mocapnet/CMU_Sample_05_01", "taeil/124_01_ret_MIXAMO_rest", "mocap/cmu/16_29")
+# Contacts of heels that differ from `heel_count`: a file that plays at a fifth of its speed, and a
+# kick.
+OTHER_HEELS = ("mocapnet/CMU_Sample_05_01", "taeil/124_01_ret_MIXAMO_rest")
 KNEES = 5.0  # degrees by which a knee may bend more or less than in the file, on average
 
 

@@ -22,21 +22,23 @@ class Limits(NamedTuple):
 
     heights: leg lengths above the height of the joint's stance. speeds: leg lengths a frame. swing_shares: a
     limit of speed is at least this share of the joint's speed in the middle of a swing: of the slower of the
-    two swings before and after the stance.
+    two swings before and after the stance. dip: leg lengths by which the stance may be lower than the median
+    height of its slow frames: a captured toe that pushes off may dip some centimetres below the ground.
     """
 
     heights: tuple[float, float]
     speeds: tuple[float, float]
     swing_shares: tuple[float, float]
+    dip: float
 
 
 # For a leg of 80 cm, a heel comes into contact below 48 cm/s and 2.4 cm. So it is in contact for as long as
 # it is slower than 60 cm/s and lower than 3 cm above its own floor, the median height of its slow frames
-# within a second: to within .1 of the frames on 333 of 336 real clips. A toe rolls and pushes off, so it may
+# within a second: to within .1 of the frames on 334 of 336 real clips. A toe rolls and pushes off, so it may
 # be faster, and by as much as it swings. With these limits, a foot is down in the walks of `cmu` for 55 to
 # 65 % of a cycle and for less than half of a jogging cycle.
-HEEL = Limits((0.03, 0.035), (0.010, 0.013), (0.0, 0.0))
-TOE = Limits((0.02, 0.035), (0.010, 0.020), (0.18, 0.30))
+HEEL = Limits((0.03, 0.035), (0.010, 0.013), (0.0, 0.0), 0.0)
+TOE = Limits((0.02, 0.035), (0.010, 0.020), (0.18, 0.30), 0.016)
 # Leg lengths. A person stands on tiptoe if the heel is this much higher above the toe than in the stances in
 # which the foot is flattest. Then the heel is not in contact.
 ON_TIPTOE = 0.05
@@ -73,9 +75,9 @@ def find_stance_contacts(clip: Clip, options: LabelOptions) -> np.ndarray:
     """(F, 4) bool: whether a joint is slow and near the height of its stance.
 
     Between two swings a joint has one stance. The height of the stance is the median height of the joint in
-    the slow frames between these swings. So the rule needs no floor, and works on slopes and stairs. Height
-    and speed have two limits each (hysteresis): otherwise, a short movement would divide a stance into two.
-    All limits are relative to leg length.
+    the slow frames between these swings, or their lowest height if this is at most `Limits.dip` lower. So the
+    rule needs no floor, and works on slopes and stairs. Height and speed have two limits each (hysteresis):
+    otherwise, a short movement would divide a stance into two. All limits are relative to leg length.
     """
     leg = clip.skeleton.leg_length
     height, speed = foot_positions(clip)[..., 1] / leg, _centred_speeds(clip) / leg
@@ -115,7 +117,8 @@ def _find_stances(height: Array, speed: Array, edges: np.ndarray, limits: Limits
         swing_speed = min((speed[p] for p in (a, b) if 0 < p < len(speed)), default=0.0)
         landing, leaving = np.maximum(limits.speeds, np.multiply(limits.swing_shares, swing_speed))
         h, v = height[a:b], speed[a:b]
-        levels.append(np.median(h[v <= max(landing, 1.2 * v.min())]))
+        slow = h[v <= max(landing, 1.2 * v.min())]  # never empty: it has at least the slowest frame
+        levels.append(max(slow.min(), np.median(slow) - limits.dip))
         lands[a:b] = (h < levels[-1] + limits.heights[0]) & (v < landing)
         stays[a:b] = (h < levels[-1] + limits.heights[1]) & (v < leaving)
     down[:] = _stretches_with(stays | lands, lands)

@@ -358,7 +358,7 @@ class ProceduralAnimation:
     ) -> Pose:  # fmt: skip
         """C poses of the network's joints in Hobble's axes as those that the caller gets, see `Pose`."""
         if self._rig is not None:
-            positions, rotations = self._rig(positions, rotations, contacts)
+            positions, rotations = self._rig(positions, rotations)
         if not self._pose_axes.is_native:
             positions = self._pose_axes.points_to_caller(positions)
             rotations = self._pose_axes.rotations_to_caller(rotations)
