@@ -83,7 +83,7 @@ ADDED_CHANGES: dict[str, dict[str, float]] = {
         "lift_sound": 0.3, "push_sound": 0.4, "forward": 2.0, "out": 0.02, "crouch_sound": 4.0,
     },
     "thigh": {
-        "speed": 0.62, "stride": 1.04, "turn": 0.8, "push": 0.4, "vault": 1.0, "lift": 0.1,
+        "speed": 0.58, "stride": 1.05, "turn": 0.8, "push": 0.4, "vault": 1.0, "lift": 0.1,
         "lift_sound": 0.3, "push_sound": 0.45, "out": 0.07, "strike": 0.4, "list": 5.0, "toe_out": 8.0,
         "vault_sound": 0.5, "crouch_sound": 3.0,
     },
@@ -92,7 +92,7 @@ ADDED_CHANGES: dict[str, dict[str, float]] = {
         "push_sound": 0.45, "strike": 0.0, "crouch": 19.0, "list": 2.0,
     },
     "foot": {
-        "speed": 0.66, "stride": 1.03, "turn": 0.8, "push": 0.15, "lift": 0.7, "lift_sound": 0.3,
+        "speed": 0.66, "stride": 1.03, "turn": 0.8, "push": 0.15, "lift": 0.6, "lift_sound": 0.3,
         "push_sound": 0.62, "strike": 1.0, "side": 2.5, "toe_out": 18.0,
     },
     "back": {
@@ -124,7 +124,7 @@ RATIOS = (
 TIMING_FACTOR = 1.85
 # Part -> length of the step onto the hurt foot, as a ratio to the healthy clip. It replaces the ratio of the
 # profiles.
-STEP_RATIO = {"thigh": 0.16, "shank": 0.47, "foot": 0.54}
+STEP_RATIO = {"thigh": 0.2, "shank": 0.44, "foot": 0.58}
 
 
 @functools.cache

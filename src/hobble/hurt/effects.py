@@ -9,7 +9,7 @@ import numpy as np
 from hobble.channels.speed_limits import SUM_NORM
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
-from hobble.core.smooth import gaussian
+from hobble.core.smooth import gaussian, smoothstep
 from hobble.hurt.amounts import GUARD_CHANGES, changes_of_hurt_part
 
 LEFT, RIGHT = 0, 1
@@ -70,21 +70,25 @@ def path_up(skeleton: Skeleton, joint: int, below: int = -1) -> list[int]:
 
 
 HIGHEST_SEVERITY = 10.0
-# strength = (severity / 10) ** STRENGTH_POWER: .55 at 3, .71 at 5, .84 at 7. So an injury of 3 already shows.
-# At 3 a network shows about .7 of what its training clips show.
-STRENGTH_POWER = 0.5
+# strength = (severity / 10) ** STRENGTH_POWER: .63 at 3, .77 at 5, .87 at 7. So an injury of 3 already shows.
+# At 3 and 5 a network shows about .65 of what its training clips show.
+STRENGTH_POWER = 0.38
+# The strength of the change of speed, which a network shows in full: .46 at 3, .64 at 5, .79 at 7.
+SPEED_POWER = 0.65
 # A person guards an injury with the whole body. GUARD_CHANGES grow with guarding ** GUARD_POWER.
 GUARD_POWER = 1.8
-GUARDED_PARTS = ("pelvis", "hip", "thigh", "shank", "foot", "back")
+LEG_PARTS = ("hip", "thigh", "shank", "foot")
+GUARDED_PARTS = ("pelvis", *LEG_PARTS, "back")
+JOIN_FROM, JOIN_AT = 5.0, 7.0  # `join` grows from 0 to 1 between these severities of a part of the leg
 LEAST_RATIO = 0.02  # smaller ratios to the healthy clip are raised to this
 SETTLING_SECONDS = 0.3  # sigma of the Gaussian that smooths changes of severity
 LEAST_SEVERITY = 0.05  # smaller severities count as 0
 WHOLE_BODY = ("speed", "stride", "turn", "back", "head", "forward", "nod")  # changes of the whole body
-# Changes of one side. The last four say how much an arm is held in each way (HELD_ARMS in
-# `hobble.hurt.upper_body`).
+# Changes of one side. `upper` to `guard` say how much an arm is held in each way (HELD_ARMS in
+# `hobble.hurt.upper_body`). `join`, 0 to 1: on stairs the other foot goes first up, this foot first down.
 SIDED = (
     "land", "off", "step", "push", "lift", "strike", "out", "width", "toe_out", "crouch", "vault", "arm",
-    "side", "list", "dip", "upper", "fore", "carry", "guard",
+    "side", "list", "dip", "upper", "fore", "carry", "guard", "join",
 )  # fmt: skip
 SOUND_SUFFIX = "_sound"  # names of changes of the side that is not hurt end with this
 # Factors on the CURVES (see `hobble.hurt.amounts`) that mirror the body. All curves but the first
@@ -159,6 +163,8 @@ def effects_of_severities(
         for name, amount in changes_of_hurt_part(part).items():
             if name == "curves":
                 curves.add(part_strength[:, None, None] * _curves_of_side(np.asarray(amount), side))
+            elif name == "speed":
+                add(name, part_strength ** (SPEED_POWER / STRENGTH_POWER) * amount, side)
             else:
                 add(name, part_strength * amount, side)
         if part in GUARDED_PARTS and guarded.any():
@@ -168,6 +174,9 @@ def effects_of_severities(
             for name, amount in GUARD_CHANGES.items():
                 for each in sides:
                     add(name, share * guarded * part_strength * amount, each)
+        if part in LEG_PARTS:
+            worst = HIGHEST_SEVERITY * np.clip(part_strength, 0.0, 1.0) ** (1 / STRENGTH_POWER)
+            add("join", smoothstep((worst - JOIN_FROM) / (JOIN_AT - JOIN_FROM)), side)
         if part in HELD_ARM_OF_PART and side is not None:
             add(HELD_ARM_OF_PART[part], part_strength, side)
     shown = np.round(HIGHEST_SEVERITY * np.clip(strength, 0.0, 1.0) ** (1 / STRENGTH_POWER), 3)

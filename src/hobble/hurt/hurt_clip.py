@@ -25,8 +25,10 @@ from hobble.hurt.legs import (
     ShortenedPath,
     ground_below,
     hips_height,
+    join_steps,
     knee_flexion,
     move_foot,
+    place_footprints,
     place_leg,
     reach_at_flexion,
     read_leg,
@@ -72,9 +74,9 @@ def hurt_clip(
 
     labels: those of the clip. severity: (F, L), 0 to 10, of the skeleton's L links. name: name of the result;
     None: the clip's name. flat: whether the ground is flat; on other ground, climbs get lower as steps get
-    shorter. zero: the foot that lands at phase 0. margins: which gait cycles near the ends of the clip are
-    labelled, see `MARGINS` in `hobble.labels.phase`. guarding: 0 to 1, or (F,) of these: how much the whole
-    body spares the hurt part.
+    shorter, and on stairs a badly hurt leg goes last up and first down. zero: the foot that lands at phase 0.
+    margins: which gait cycles near the ends of the clip are labelled, see `MARGINS` in
+    `hobble.labels.phase`. guarding: 0 to 1, or (F,) of these: how much the whole body spares the hurt part.
 
     The clip gets longer if the cadence falls. The path keeps its shape, but gets shorter with the steps. If
     all severities are 0, or the clip has fewer than 3 frames, the motion is not changed. Raises HobbleError
@@ -103,7 +105,10 @@ def hurt_clip(
     timing = retime(source, changes)
     feet = [reduce_pitch(source, changes, side) for side in (LEFT, RIGHT)]
     path = shorten(source, changes, timing.stride_ratio, None if flat else ground_below(source, feet))
-    feet = [move_foot(source, changes, path, feet[side], side) for side in (LEFT, RIGHT)]
+    footprints = place_footprints(source, changes, path, feet)
+    if not flat:
+        join_steps(source, changes, feet, footprints)
+    feet = [move_foot(source, changes, feet[side], footprints[side], side) for side in (LEFT, RIGHT)]
     out = _assemble(source, changes, timing, path, feet, name)
     source_frame = np.clip(np.floor(timing.body_frames + 1e-6).astype(int), 0, len(clip) - 1)
     return HurtClip(

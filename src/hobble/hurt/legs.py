@@ -106,6 +106,8 @@ CLEARANCE_CM = 1.3
 # A swing is lowered less if the stances before and after it differ in height. At this difference, it is
 # lowered 1 / e times as much as on flat ground.
 UNEVEN_CM = 4.0
+# Two steps differ by at least this height if they are on different steps of stairs. FOOT_CM: ankle to ball.
+STAIR_CM, FOOT_CM = 5.0, 13.5
 # The lower height of a swing is blended in over this share of its frames, and out over as many at its end.
 BLEND_SHARE = 0.22
 
@@ -199,16 +201,55 @@ def footprints_of(foot: HurtFoot, stances: list[SourceStance]) -> list[Array]:
     return [_median_in_stance(foot.ankle, stance) for stance in stances]
 
 
+def place_footprints(
+    source: HealthyClip, effects: Effects, path: ShortenedPath, feet: Sequence[HurtFoot]
+) -> list[list[Array]]:
+    """The new footprints of both feet that `reduce_pitch` returned: a position (3,), cm, for each stance."""
+    return [
+        [
+            _new_footprint(old, stance.middle, source, effects, path, side)
+            for old, stance in zip(footprints_of(feet[side], stances), stances, strict=True)
+        ]
+        for side, stances in enumerate(source.stances)
+    ]
+
+
+def join_steps(
+    source: HealthyClip, effects: Effects, feet: Sequence[HurtFoot], footprints: list[list[Array]]
+) -> None:
+    """Let a body with a badly hurt leg go step by step on stairs. Changes heights in `footprints`.
+
+    Up the stairs the good foot goes first, and the hurt foot joins it on the same step. Down the stairs the
+    hurt foot goes first, and the good foot joins it.
+    """
+    old = [footprints_of(foot, stances) for foot, stances in zip(feet, source.stances, strict=True)]
+    # On stairs a foot stands level. On a slope its toe is higher or lower than its ankle.
+    toes = [
+        [float(_median_in_stance(foot.ball - foot.ankle, stance)[1]) for stance in stances]
+        for foot, stances in zip(feet, source.stances, strict=True)
+    ]
+    level = [float(np.median(heights)) for heights in toes]
+    events = sorted((s.middle, side, i) for side in (0, 1) for i, s in enumerate(source.stances[side]))
+    for (_, side, i), (when, next_side, k) in itertools.pairwise(events):
+        step = old[next_side][k] - old[side][i]
+        forward, rise = float(np.hypot(step[0], step[2])), float(step[1])
+        tilt = abs(toes[next_side][k] - level[next_side]) / FOOT_CM
+        if next_side == side or abs(rise) < STAIR_CM or tilt > 0.5 * abs(rise) / max(forward, FOOT_CM):
+            continue
+        join = effects.changes["join"][min(round(when), len(source) - 1)]
+        hurt = int(join[1] > join[0])
+        if (next_side == hurt) == (rise > 0):
+            share = min(float(abs(join[1] - join[0])), 1.0)
+            here, there = footprints[side][i], footprints[next_side][k]
+            there[1] += share * (here[1] - there[1])
+
+
 def move_foot(
-    source: HealthyClip, effects: Effects, path: ShortenedPath, foot: HurtFoot, side: int
+    source: HealthyClip, effects: Effects, foot: HurtFoot, new_footprints: list[Array], side: int
 ) -> HurtFoot:
-    """The foot that `reduce_pitch` returned, moved so that it follows the body's new path."""
+    """The foot that `reduce_pitch` returned, moved to new footprints, one for each stance."""
     stances = source.stances[side]
     old_footprints = footprints_of(foot, stances)
-    new_footprints = [
-        _new_footprint(old, stance.middle, source, effects, path, side)
-        for old, stance in zip(old_footprints, stances, strict=True)
-    ]
     yaw = quat.yaw(np.radians(OUTWARD_SIGN[side] * effects.changes["toe_out"][:, side]))
     ankle, least_ball = np.empty_like(foot.ankle), np.empty(len(source))
     ball = source.clip.positions[:, source.clip.skeleton.role(f"{SIDES[side]}_toe"), 1]
