@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 import pytest
 
@@ -9,10 +11,13 @@ from hobble.core import quat
 from hobble.core.clip import Clip
 from hobble.core.errors import HobbleError
 from hobble.core.skeleton import other_side
+from hobble.core.smooth import true_runs
 from hobble.hurt.hurt_clip import hurt_clip
 from hobble.labels.clip_labels import CONTACT_ROLES, LabelReport, Labels
 from hobble.labels.label import mirror_labels
 from hobble.motion.edit import mirror_clip
+from hobble.synthetic.generate_clip import generate_walk
+from tests.hurt.conftest import labelled
 
 SIDES = ("left", "right")
 MADE = ("straight", "turning", "jog", "starting", "uneven")
@@ -134,6 +139,21 @@ def test_hurting_the_mirrored_clip_on_the_other_side_is_the_mirror_of_the_hurt_c
     # off.
     np.testing.assert_allclose(two.root, one.root, atol=0.05)
     assert np.degrees(quat.angle(one.rotations, two.rotations)).max() < 0.5
+
+
+@pytest.mark.parametrize("severity", [0.0, 10.0])
+def test_on_stairs_a_badly_hurt_leg_goes_last_up_and_first_down(holden31, hurting, severity) -> None:
+    made = generate_walk("steps", holden31, 1500, "steps", 60, 1).clip
+    clip, labels, flat = labelled(made, "walk", False)
+    hurt = hurt_clip(clip, labels, hurting(1500, {"RightUpLeg-RightLeg": severity}), flat=flat)
+    stands = []  # middle frame, side and height of the ankle of each stance
+    for side, name in enumerate(SIDES):
+        height = hurt.clip.positions[:, clip.skeleton.role(f"{name}_heel"), 1]
+        down = hurt.labels.contacts[:, 2 * side : 2 * side + 2].any(axis=1)
+        stands += [((a + b) // 2, side, np.median(height[a:b])) for a, b in true_runs(down) if b - a > 6]
+    steps = [(s, y - x) for (_, r, x), (_, s, y) in itertools.pairwise(sorted(stands)) if s != r]
+    first_up, first_down = ({s for s, rise in steps if sign * rise > 5} for sign in (1, -1))
+    assert (first_up, first_down) == (({0}, {1}) if severity else ({0, 1}, {0, 1}))
 
 
 @pytest.mark.parametrize("bad", [-1.0, 10.5, np.nan])

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from hobble.channels.injury.shown import other_names, spoken_links
+from hobble.channels.injury.shown import display
 from hobble.core.skeleton import Skeleton
 from hobble.models.network import Network
 from hobble.runtime import ProceduralAnimation
@@ -48,8 +48,9 @@ def test_a_link_has_three_names(holden31: Skeleton, hurtable: Network) -> None:
         poses.append(pose.positions)
     assert np.array_equal(poses[0], poses[1])
     assert np.array_equal(poses[0], poses[2])
-    names = other_names(holden31, holden31.link_names, ())
+    shown = display(holden31, holden31.link_names, ())
+    names = shown.other_names
     assert (names["left ankle"], names["lower back"]) == ("LeftLeg-LeftFoot", "Hips-LowerBack")
-    spoken = spoken_links(holden31, holden31.link_names)
+    spoken = shown.spoken_names
     assert len(set(spoken)) == len(spoken)
     assert not any(joint in name for joint in holden31.joints for name in spoken if len(joint) > 5)

@@ -5,9 +5,8 @@ a label. "Trained" columns are those that were above 0 in training. A preset is 
 columns. A sweep is a walk in which one column rises from 0 to its highest value. A loop is a walk for a
 looping picture.
 
-A channel may have a module channels/<name>/shown.py with its own WORDS, `shown`, `sweeps` and `loops`. The
-functions here use what this module has, and otherwise return defaults. Neither training nor measurements
-depend on these modules.
+A channel may have a module channels/<name>/shown.py with its own function `display`. Neither training nor
+measurements depend on these modules.
 """
 
 from __future__ import annotations
@@ -23,43 +22,6 @@ from hobble.core.skeleton import Skeleton
 
 
 @dataclass(frozen=True)
-class ChannelWords:
-    """Texts of a channel for the report page. {} stands for the name of a column.
-
-    neutral_button: label of the button that sets all values to 0. slider_step: step of a slider. address_key:
-    name of the values in the address of the page, by default the channel's name. sweep_description:
-    description of a sweep. untrained_note: note on a column that is not trained. headline: headline of the
-    page. network_told: what the network is told if the column is above 0. active_word: a word for a character
-    with a value above 0; if it is empty, the column's name is used.
-    """
-
-    neutral_button: str = "Neutral"
-    slider_step: float = 0.05
-    address_key: str | None = None
-    sweep_description: str = "Walks {} more and more"
-    untrained_note: str = "always 0 in training, so it has no effect"
-    headline: str = "Say how it walks."
-    network_told: str = "{}"
-    active_word: str = ""
-
-
-@dataclass(frozen=True)
-class ChannelDisplay:
-    """How a channel is shown.
-
-    spoken_names: for each column, the name that readers see. sliders: label of a slider -> its column, for
-    the sliders that are there at the start. presets: label of a button -> {column: value}. regions: for each
-    bone of the body, the indices of the columns whose values colour the part that this bone moves; empty if
-    columns do not belong to parts of the body.
-    """
-
-    spoken_names: Sequence[str]
-    sliders: Mapping[str, str]
-    presets: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
-    regions: Sequence[Sequence[int]] = ()
-
-
-@dataclass(frozen=True)
 class SampleWalk:
     """A walk for a looping picture.
 
@@ -71,55 +33,58 @@ class SampleWalk:
     coloured: bool = False
 
 
-def channel_words(name: str) -> ChannelWords:
-    """The texts of the channel `name`."""
-    return _own(name, "WORDS", ChannelWords())
+@dataclass(frozen=True)
+class ChannelDisplay:
+    """How a channel is shown for a skeleton.
+
+    spoken_names: for each column, the name that readers see. sliders: label of a slider -> its column, for
+    the sliders that are there at the start. presets: label of a button -> {column: value}. regions: for each
+    bone of the body, the indices of the columns whose values colour the part that this bone moves; empty if
+    columns do not belong to parts of the body. sweeps: name of each sweep -> the column that rises. loops:
+    walks for looping pictures. other_names: other names of columns, such as those of parts of the body ->
+    column.
+
+    Texts of the page, in which {} stands for the name of a column. neutral_button: label of the button that
+    sets all values to 0. slider_step: step of a slider. address_key: name of the values in the address of
+    the page, by default the channel's name. untrained_note: note on a column that is not trained. headline:
+    headline of the page. network_told: what the network is told if the column is above 0. active_word: a word
+    for a character with a value above 0; if it is empty, the column's name is used.
+    """
+
+    spoken_names: Sequence[str]
+    sliders: Mapping[str, str]
+    sweeps: Mapping[str, str]
+    loops: Sequence[SampleWalk]
+    presets: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    regions: Sequence[Sequence[int]] = ()
+    other_names: Mapping[str, str] = field(default_factory=dict)
+    neutral_button: str = "Neutral"
+    slider_step: float = 0.05
+    address_key: str | None = None
+    untrained_note: str = "always 0 in training, so it has no effect"
+    headline: str = "Say how it walks."
+    network_told: str = "{}"
+    active_word: str = ""
 
 
 def channel_display(
     name: str, skeleton: Skeleton, columns: Sequence[str], trained: Collection[str]
 ) -> ChannelDisplay:
-    """How the channel `name` is shown. By default there is a slider for each trained column.
+    """How the channel `name` is shown. By default each trained column has a slider, a sweep and a loop.
 
     columns: the labels of all columns. trained: the labels of the trained columns.
     """
-    sliders = {column: column for column in columns if column in trained}
-    return _own(name, "shown", ChannelDisplay(tuple(columns), sliders), skeleton, columns, trained)
-
-
-def channel_sweeps(
-    name: str, skeleton: Skeleton, columns: Sequence[str], trained: Collection[str]
-) -> Mapping[str, str]:
-    """Name of each sweep -> the column that rises. By default there is a sweep for each trained column.
-
-    columns, trained: as in `channel_display`.
-    """
-    default = {column.replace(" ", "_"): column for column in columns if column in trained}
-    return _own(name, "sweeps", default, skeleton, columns, trained)
-
-
-def channel_loops(
-    name: str, skeleton: Skeleton, columns: Sequence[str], trained: Collection[str]
-) -> list[SampleWalk]:
-    """Walks for looping pictures.
-
-    By default there is a walk with all values 0, then one for each trained column with its highest value.
-    columns, trained: as in `channel_display`.
-    """
-    highest = {column: channel(name).highest for column in columns if column in trained}
-    neutral = SampleWalk(channel_words(name).neutral_button.lower(), {})
-    default = [neutral, *(SampleWalk(c.replace(" ", "-"), {c: value}) for c, value in highest.items())]
-    return _own(name, "loops", default, skeleton, columns, trained)
-
-
-def other_names(
-    name: str, skeleton: Skeleton | None, columns: Sequence[str], trained: Collection[str]
-) -> Mapping[str, str]:
-    """Other names of the channel's columns, such as those of parts of the body -> column. By default none.
-
-    columns, trained: as in `channel_display`.
-    """
-    return {} if skeleton is None else _own(name, "other_names", {}, skeleton, columns, trained)
+    module = f"hobble.channels.{name}.shown"
+    if importlib.util.find_spec(module) is not None:
+        display: ChannelDisplay = importlib.import_module(module).display(skeleton, columns, trained)
+        return display
+    used, highest = [column for column in columns if column in trained], channel(name).highest
+    return ChannelDisplay(
+        tuple(columns),
+        sliders={column: column for column in used},
+        sweeps={column.replace(" ", "_"): column for column in used},
+        loops=[SampleWalk("neutral", {}), *(SampleWalk(c.replace(" ", "-"), {c: highest}) for c in used)],
+    )
 
 
 def shown_names(skeleton: Mapping[str, Any]) -> Callable[[str], str]:
@@ -133,19 +98,6 @@ def shown_names(skeleton: Mapping[str, Any]) -> Callable[[str], str]:
     names: dict[str, str] = {}  # label of a column of any channel -> the name that readers see
     for each in all_channels():
         columns = each.columns(rig)
-        names |= dict(
-            zip(columns, channel_display(each.name, rig, columns, columns).spoken_names, strict=True)
-        )
+        spoken = channel_display(each.name, rig, columns, columns).spoken_names
+        names |= dict(zip(columns, spoken, strict=True))
     return lambda column: names.get(column, column)
-
-
-def _own(name: str, attribute: str, default: Any, *given: Any) -> Any:
-    """What the module channels/<name>/shown.py says: a value, or what its function returns for `given`.
-
-    default: if there is no such module, or the module has no such attribute.
-    """
-    full_name = f"hobble.channels.{name}.shown"
-    if importlib.util.find_spec(full_name) is None:
-        return default
-    found = getattr(importlib.import_module(full_name), attribute, None)
-    return default if found is None else found(*given) if callable(found) else found

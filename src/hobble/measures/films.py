@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
-from hobble.channels.injury.shown import PARTS_WITH_SLIDER, PARTS_WITHOUT_SLIDER, link_of_part
+from hobble.channels.injury.shown import link_of_part
 from hobble.core.errors import HobbleError
 from hobble.core.files import atomic_path, write_json, write_text
 from hobble.core.quat import Array
@@ -145,11 +145,9 @@ def part_links(network: Network, parts: Sequence[str]) -> list[str]:
     links, trained = network.channels.get(INJURY, ()), network.trained_labels(INJURY)
     if network.skeleton is None or not links:
         raise HobbleError("this network has no injury channel. Use a configuration with `channels: [injury]`")
-    # Part -> roles of the joints at its two ends.
-    ends = {label: roles for label, *roles in (*PARTS_WITH_SLIDER, *PARTS_WITHOUT_SLIDER)}
     chosen = []
     for part in parts:
-        link = link_of_part(network.skeleton, ends[part], links, trained)
+        link = link_of_part(network.skeleton, part, links, trained)
         if link is None:
             raise HobbleError(
                 f"the skeleton of this network has no {part} that can hurt, but a film needs it"

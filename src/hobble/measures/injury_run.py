@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from hobble.channels.injury.shown import link_by_part
+from hobble.channels.injury.shown import SLIDERS, link_of_part
 from hobble.core.quat import Array
 from hobble.measures.measure import MeasureInputs, Outcome
 from hobble.measures.walks import (
@@ -250,7 +250,7 @@ def second_sweep(
     slower of the walks with only one) to 1 (as the faster).
     """
     assert network.skeleton is not None
-    named = link_by_part(network.skeleton, links)
+    named = {label: link for label in SLIDERS if (link := link_of_part(network.skeleton, label, links))}
     pairs = [(named[a], named[b]) for a, b in PAIRS if a in named and b in named]
     # (first link, its severity, second link) of each figure; those without a first link show the second
     # alone.

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from hobble.channels import channel
-from hobble.channels.shown import channel_display, channel_words
+from hobble.channels.shown import channel_display
 from hobble.core.files import to_base64
 from hobble.core.skeleton import Skeleton
 from hobble.engine.hob import character_bytes
@@ -65,7 +65,7 @@ def shown_channels(network: Network, scales: Mapping[str, float]) -> list[dict[s
     skeleton, out, first = network.skeleton, [], 0
     assert skeleton is not None
     for name, columns in network.channels.items():
-        definition, wording, index_of = channel(name), channel_words(name), list(columns).index
+        definition, index_of = channel(name), list(columns).index
         display = channel_display(name, skeleton, columns, network.trained_labels(name))
         presets = [
             {"name": preset, "values": [[index_of(column), value] for column, value in values.items()]}
@@ -75,7 +75,7 @@ def shown_channels(network: Network, scales: Mapping[str, float]) -> list[dict[s
             {
                 "name": name,
                 "title": definition.title,
-                "key": wording.address_key or name,
+                "key": display.address_key or name,
                 "first": first,
                 "columns": list(columns),
                 "trained": list(network.trained_labels(name)),
@@ -85,12 +85,12 @@ def shown_channels(network: Network, scales: Mapping[str, float]) -> list[dict[s
                 "regions": [list(indices) for indices in display.regions],
                 "highest": definition.highest,
                 "start": definition.default,
-                "sliderStep": wording.slider_step,
-                "rest": wording.neutral_button,
-                "never": wording.untrained_note,
-                "headline": wording.headline,
-                "says": wording.network_told,
-                "on": wording.active_word,
+                "sliderStep": display.slider_step,
+                "rest": display.neutral_button,
+                "never": display.untrained_note,
+                "headline": display.headline,
+                "says": display.network_told,
+                "on": display.active_word,
                 "scale": scales.get(name, 1.0),
             }
         )

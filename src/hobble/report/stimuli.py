@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from hobble.channels import channel
-from hobble.channels.shown import SampleWalk, channel_display, channel_loops
+from hobble.channels.shown import SampleWalk, channel_display
 from hobble.core.errors import HobbleError
 from hobble.core.files import write_json
 from hobble.core.quat import Array
@@ -90,7 +90,7 @@ def write_stimuli(
 
 
 def all_loops(network: Network) -> list[tuple[str, str, SampleWalk]]:
-    """(name of the files, channel, walk) of each loop, as `hobble.channels.shown.channel_loops` lists them.
+    """(name of the files, channel, walk) of each loop, as `ChannelDisplay.loops` lists them.
 
     The names of the first channel are used as they are. Names of later channels begin with "<channel>-", and
     their neutral walk is left out, because the first channel has it.
@@ -98,7 +98,7 @@ def all_loops(network: Network) -> list[tuple[str, str, SampleWalk]]:
     assert network.skeleton is not None
     out: list[tuple[str, str, SampleWalk]] = []
     for name, columns in network.channels.items():
-        for loop in channel_loops(name, network.skeleton, columns, network.trained_labels(name)):
+        for loop in channel_display(name, network.skeleton, columns, network.trained_labels(name)).loops:
             if not out or out[0][1] == name:  # the first channel that has loops
                 out.append((loop.name, name, loop))
             elif loop.values:

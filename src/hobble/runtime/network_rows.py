@@ -10,7 +10,7 @@ import numpy as np
 from numba.extending import register_jitable
 
 from hobble.channels import CHANNEL_NAMES, channel
-from hobble.channels.shown import other_names
+from hobble.channels.shown import channel_display
 from hobble.core.compiled import njit
 from hobble.core.quat import Array
 from hobble.models.network import Network
@@ -51,7 +51,7 @@ class ChannelValues:
             for name, column_labels in network.channels.items()
         }
         self._network = network
-        self._names: dict[str, Mapping[str, str]] = {}  # channel -> from `other_names`, once it is needed
+        self._names: dict[str, Mapping[str, str]] = {}  # channel -> other names -> label, once needed
         self.scales = dict(scales)
         self.columns: dict[str, slice] = {}
         start = 0
@@ -109,8 +109,10 @@ class ChannelValues:
         if label in labels:
             return label
         if name not in self._names:
-            network, trained = self._network, self._network.trained_labels(name)
-            self._names[name] = other_names(name, network.skeleton, list(labels), trained)
+            skeleton, trained = self._network.skeleton, self._network.trained_labels(name)
+            self._names[name] = (
+                channel_display(name, skeleton, list(labels), trained).other_names if skeleton else {}
+            )
         if label not in self._names[name]:
             raise UnknownName(f"{name} has no", label, labels)
         return self._names[name][label]

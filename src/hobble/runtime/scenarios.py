@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from hobble.channels import channel
-from hobble.channels.shown import channel_sweeps
+from hobble.channels.shown import channel_display
 from hobble.core.files import save_npz
 from hobble.core.quat import Array
 from hobble.models.network import Network
@@ -72,9 +72,9 @@ def swept_columns(network: Network) -> dict[str, tuple[str, str]]:
     return {
         name: (of_channel, column)
         for of_channel, columns in network.channels.items()
-        for name, column in channel_sweeps(
+        for name, column in channel_display(
             of_channel, skeleton, columns, network.trained_labels(of_channel)
-        ).items()
+        ).sweeps.items()
     }
 
 

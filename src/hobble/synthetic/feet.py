@@ -16,15 +16,14 @@ from hobble.core.smooth import gaussian, interpolate_curve, smooth_above, smooth
 from hobble.synthetic.plan import Ground, PlannedPath
 from hobble.synthetic.style import LEFT, RIGHT, SIDE_SIGN, Style
 
+X_AXIS = np.array([1.0, 0.0, 0.0])
 ANKLE_HEIGHT = 7.0  # cm from the sole up to the ankle joint
 ANKLE_TO_TOE = np.array([0.0, -4.5, 13.5])  # x, y, z from the ankle joint to the toe joint of a flat foot, cm
 # cm and radians: a standing figure keeps a foot in place if it would move and turn by less than these.
 SMALLEST_STEP = (7.0, np.radians(12.0))
 MIN_ANKLE_DISTANCE = 8.0  # cm: least sideways distance between the ankles
-CADENCE_SPREAD, CADENCE_SECONDS = (
-    0.025,
-    0.6,
-)  # standard deviation of the cadence; seconds over which it varies
+CADENCE_SPREAD = 0.025  # standard deviation of the cadence
+CADENCE_SECONDS = 0.6  # seconds over which it varies
 STANDING_SPEED = 12.0  # cm/s: a slower figure counts as standing
 # Points along the foot, cm in front of the ankle, that should all be on the same step of stairs. The last
 # three are in front of the toes, so that the foot does not stand close to the next step.
@@ -34,19 +33,62 @@ SHIFTS = sorted(np.arange(-20.0, 21.0, 2.0), key=abs)
 
 
 @dataclass(frozen=True)
-class PlannedStance:
-    """A foot on the ground from frame `land` to frame `leave`.
+class Stance:
+    """A foot on the ground from frame `land` to frame `leave`. First its toe comes down, then its heel rises.
 
     `land` and `leave` may have fractions. They count frames of the planned path, which begins before the clip
     and ends after it. ankle: (3,) position of the ankle while the foot is flat, cm. turn: (4,) world rotation
     of the flat foot. swings: whether the foot swung to this place. If not, it already stood there.
+
+    land_pitch, off_pitch: pitch as the foot lands and as it leaves, radians. rest_pitch: (F,) pitch of a
+    standing foot, radians; all stances share this array. flat: share of the stance after which the toe is
+    down. heel_off: share of the stance after which the heel leaves the ground. power: exponent of the heel's
+    rise over time.
     """
 
     land: float
     leave: float
     ankle: Array
     turn: Array
-    swings: bool = True
+    swings: bool
+    land_pitch: float
+    off_pitch: float
+    rest_pitch: Array
+    flat: float
+    heel_off: float
+    power: float
+
+    def pitch(self, t: Array | float, lands: bool = True, leaves: bool = True) -> Array:
+        """The pitch, radians, at frames `t` in the stance or just outside it.
+
+        lands: whether the stance begins with a landing. leaves: whether it ends with a swing. Without a
+        landing or a swing, the foot has the pitch of a standing foot at that end.
+        """
+        share = (np.asarray(t, float) - self.land) / (self.leave - self.land)  # of the stance
+        down = share / self.flat
+        rise = np.clip((share - self.heel_off) / (1 - self.heel_off), 0, None)
+        rest = interpolate_curve(self.rest_pitch, t)
+        landing = (self.land_pitch - rest) * (1 - smoothstep(down)) if lands else 0.0
+        leaving = (self.off_pitch - rest) * rise**self.power if leaves else 0.0
+        return np.asarray(rest + landing + leaving)
+
+    def toe_at(self, pitch: Array) -> Array:
+        """(..., 3) position of the toe joint at pitches (...).
+
+        The toe joint stands still while the heel is up, and moves on an arc about the ankle while the toe is
+        up.
+        """
+        rotation = quat.mul(self.turn, quat.from_axis_angle(X_AXIS, -np.maximum(pitch, 0.0)))
+        return self.ankle + quat.rotate(rotation, ANKLE_TO_TOE)
+
+    def ankle_at(self, pitch: Array) -> Array:
+        """(..., 3) position of the ankle at pitches (...).
+
+        The ankle stands still while the toe is up, and moves on an arc about the toe joint while the heel is
+        up.
+        """
+        rotation = quat.mul(self.turn, quat.from_axis_angle(X_AXIS, -np.minimum(pitch, 0)))
+        return self.ankle + quat.rotate(self.turn, ANKLE_TO_TOE) - quat.rotate(rotation, ANKLE_TO_TOE)
 
 
 def phase_curve(style: Style, fps: float, rng: np.random.Generator) -> Array:
@@ -71,7 +113,7 @@ def landing_frames(phase: Array, side: int) -> Array:
 
 def plan_stances(
     path: PlannedPath, style: Style, phase: Array, ground: Ground, rng: np.random.Generator
-) -> tuple[list[PlannedStance], list[PlannedStance]]:
+) -> tuple[list[Stance], list[Stance]]:
     """Two lists: the stances of the left foot and those of the right foot along the path, in order of time.
 
     phase: (F,) from `phase_curve`. rng: for small random shifts of the feet.
@@ -81,7 +123,8 @@ def plan_stances(
     # leaves the ground at phase p + duty, that is, in the frame in which phase - duty is p.
     phase_less_duty = [phase - style.duty[:, side] for side in (LEFT, RIGHT)]
     events = [(land, side) for side in (LEFT, RIGHT) for land in landing_frames(phase, side)[:-1]]
-    planned: tuple[list[PlannedStance], list[PlannedStance]] = ([], [])
+    planned: tuple[list[Stance], list[Stance]] = ([], [])
+    rest_pitch = np.radians(style.rest_pitch)
     for land, side in sorted(events):
         landing_phase = interpolate_curve(phase, land)
         # Here the duty is that of the frame in which the foot leaves, not of the landing. So a walker who has
@@ -91,10 +134,28 @@ def plan_stances(
         previous, other_foot = (planned[s][-1] if planned[s] else None for s in (side, 1 - side))
         ankle, turn = _place_foot(path, style, ground, side, mid_stance, other_foot, rng)
         standing = interpolate_curve(speed, mid_stance) < STANDING_SPEED
-        if previous and standing and _is_same_place(previous, ankle, turn):
-            planned[side].append(PlannedStance(land, leave, previous.ankle, previous.turn, swings=False))
-        else:
-            planned[side].append(PlannedStance(land, leave, ankle, turn))
+        stays = previous is not None and standing and _is_same_place(previous, ankle, turn)
+        if previous is not None and stays:
+            ankle, turn = previous.ankle, previous.turn
+
+        def at(curve: Array, when: float) -> float:
+            return float(interpolate_curve(curve, when))
+
+        planned[side].append(
+            Stance(
+                land,
+                leave,
+                ankle,
+                turn,
+                swings=not stays,
+                land_pitch=np.radians(at(style.land_pitch[:, side], land)),
+                off_pitch=np.radians(at(style.off_pitch[:, side], leave)),
+                rest_pitch=rest_pitch,
+                flat=at(style.flat, land),
+                heel_off=at(style.heel_off[:, side], (land + leave) / 2),
+                power=at(style.roll, leave),
+            )
+        )
     return planned
 
 
@@ -104,7 +165,7 @@ def _place_foot(
     ground: Ground,
     side: int,
     mid_stance: float,
-    other_foot: PlannedStance | None,
+    other_foot: Stance | None,
     rng: np.random.Generator,
 ) -> tuple[Array, Array]:
     """Where a foot stands: near the body's place in mid-stance, but never across the other foot.
@@ -152,11 +213,11 @@ def _plant_foot(ground: Ground, place: Array, yaw: float) -> tuple[Array, Array]
     under_ankle, under_toe = heights(shift + np.array([0.0, ANKLE_TO_TOE[2]]))
     x, z = place + shift * ahead
     pitch = np.arctan2(under_toe - under_ankle, ANKLE_TO_TOE[2])
-    turn = quat.mul(quat.yaw(yaw), quat.from_axis_angle([1.0, 0.0, 0.0], -pitch))
+    turn = quat.mul(quat.yaw(yaw), quat.from_axis_angle(X_AXIS, -pitch))
     return np.array([x, under_ankle + ANKLE_HEIGHT, z]), turn
 
 
-def _is_same_place(old: PlannedStance, ankle: Array, turn: Array) -> bool:
+def _is_same_place(old: Stance, ankle: Array, turn: Array) -> bool:
     """Whether the foot can stay, because its new ankle position (3,) and rotation (4,) are near the old."""
     moved = np.linalg.norm(ankle - old.ankle)
     return bool(moved < SMALLEST_STEP[0] and quat.angle(old.turn, turn) < SMALLEST_STEP[1])
@@ -167,7 +228,6 @@ def _is_same_place(old: PlannedStance, ankle: Array, turn: Array) -> bool:
 # The pitch of a foot is its angle about the X axis, positive if the toe is up.
 
 
-X_AXIS = np.array([1.0, 0.0, 0.0])
 HEEL = np.array([0.0, -4.2, -3.0])  # cm from the ankle joint to the heel, approximately
 READY = 0.95  # after this share of the swing, the foot has the pitch with which it lands
 # Exponents of the time in a swing, which runs from 0 to 1. KICK is below 1, so the foot is highest before the
@@ -193,7 +253,7 @@ class FootPoses:
     toes: Array
 
 
-def move_foot(stances: list[PlannedStance], style: Style, side: int, ground: Ground) -> FootPoses:
+def move_foot(stances: list[Stance], style: Style, side: int, ground: Ground) -> FootPoses:
     """The path of one foot through its stances.
 
     side: LEFT or RIGHT of `hobble.synthetic.style`. In frames before the first landing, and from the last
@@ -202,14 +262,14 @@ def move_foot(stances: list[PlannedStance], style: Style, side: int, ground: Gro
     frames = len(style.duty)
     rotations = np.tile(quat.IDENTITY, (frames, 1))
     foot = FootPoses(np.zeros((frames, 3)), rotations, rotations.copy())
-    rest_pitch = np.radians(style.rest_pitch)
-    rolls = [_Roll.of(stance, style, side, rest_pitch) for stance in stances]
-    for i, (here, there) in enumerate(pairwise(rolls)):
-        stays = not there.stance.swings  # without a swing, the foot stands until the next stance begins
-        leave = there.stance.land if stays else here.stance.leave
-        t = _frames(here.stance.land, leave)
-        pitch = here.pitch(t, lands=here.stance.swings or i == 0, leaves=not stays)
-        _stand(foot, t, here, pitch)
+    for i, (here, there) in enumerate(pairwise(stances)):
+        stays = not there.swings  # without a swing, the foot stands until the next stance begins
+        t = _frames(here.land, there.land if stays else here.leave)
+        pitch = here.pitch(t, lands=here.swings or i == 0, leaves=not stays)
+        foot.ankle[t] = here.ankle_at(pitch)
+        foot.foot[t] = quat.mul(here.turn, quat.from_axis_angle(X_AXIS, -pitch))
+        # While the heel is up, the toes stay flat on the ground.
+        foot.toes[t] = quat.mul(here.turn, quat.from_axis_angle(X_AXIS, -np.maximum(pitch, 0)))
         if not stays:
             _swing(foot, here, there, style, side, ground)
     return foot
@@ -220,89 +280,9 @@ def _frames(start: float, end: float) -> np.ndarray:
     return np.arange(int(np.ceil(start)), int(np.ceil(end)))
 
 
-@dataclass(frozen=True)
-class _Roll:
-    """A stance, and the pitch of the foot in it: the toe comes down, the foot is flat, then the heel goes up.
-
-    land_pitch, off_pitch: pitch as the foot lands and as it leaves, radians. rest_pitch: (F,) pitch of a
-    standing foot, radians. All stances share this array. flat: share of the stance after which the toe is
-    down. heel_off: share of the stance after which the heel leaves the ground. power: exponent of the heel's
-    rise over time.
-    """
-
-    stance: PlannedStance
-    land_pitch: float
-    off_pitch: float
-    rest_pitch: Array
-    flat: float
-    heel_off: float
-    power: float
-
-    @classmethod
-    def of(cls, stance: PlannedStance, style: Style, side: int, rest_pitch: Array) -> _Roll:
-        """The roll of a stance, with the values that the style has during it."""
-        land = interpolate_curve(style.land_pitch[:, side], stance.land)
-        off = interpolate_curve(style.off_pitch[:, side], stance.leave)
-        flat = interpolate_curve(style.flat, stance.land)
-        heel_off = interpolate_curve(style.heel_off[:, side], (stance.land + stance.leave) / 2)
-        return cls(
-            stance,
-            float(np.radians(land)),
-            float(np.radians(off)),
-            rest_pitch,
-            float(flat),
-            float(heel_off),
-            float(interpolate_curve(style.roll, stance.leave)),
-        )
-
-    def pitch(self, t: Array | float, lands: bool = True, leaves: bool = True) -> Array:
-        """The pitch, radians, at frames `t` in the stance or just outside it.
-
-        lands: whether the stance begins with a landing. leaves: whether it ends with a swing. Without a
-        landing or a swing, the foot has the pitch of a standing foot at that end.
-        """
-        stance = self.stance
-        share = (np.asarray(t, float) - stance.land) / (stance.leave - stance.land)  # of the stance
-        down = share / self.flat
-        rise = np.clip((share - self.heel_off) / (1 - self.heel_off), 0, None)
-        rest = interpolate_curve(self.rest_pitch, t)
-        landing = (self.land_pitch - rest) * (1 - smoothstep(down)) if lands else 0.0
-        leaving = (self.off_pitch - rest) * rise**self.power if leaves else 0.0
-        return np.asarray(rest + landing + leaving)
-
-    def toe(self, pitch: Array) -> Array:
-        """(..., 3) position of the toe joint at pitches (...).
-
-        The toe joint stands still while the heel is up, and moves on an arc about the ankle while the toe is
-        up.
-        """
-        rotation = quat.mul(self.stance.turn, quat.from_axis_angle(X_AXIS, -np.maximum(pitch, 0.0)))
-        return self.stance.ankle + quat.rotate(rotation, ANKLE_TO_TOE)
-
-    def ankle(self, pitch: Array) -> Array:
-        """(..., 3) position of the ankle at pitches (...).
-
-        The ankle stands still while the toe is up, and moves on an arc about the toe joint while the heel is
-        up.
-        """
-        stance = self.stance
-        rotation = quat.mul(stance.turn, quat.from_axis_angle(X_AXIS, -np.minimum(pitch, 0)))
-        return stance.ankle + quat.rotate(stance.turn, ANKLE_TO_TOE) - quat.rotate(rotation, ANKLE_TO_TOE)
-
-
-def _stand(foot: FootPoses, t: np.ndarray, roll: _Roll, pitch: Array) -> None:
-    """Set the frames t (N,) of a stance, in which the foot has the pitches (N,).
-
-    While the heel is up, the toes stay flat on the ground.
-    """
-    foot.ankle[t] = roll.ankle(pitch)
-    foot.foot[t] = quat.mul(roll.stance.turn, quat.from_axis_angle(X_AXIS, -pitch))
-    foot.toes[t] = quat.mul(roll.stance.turn, quat.from_axis_angle(X_AXIS, -np.maximum(pitch, 0)))
-
-
-def _swing(foot: FootPoses, here: _Roll, there: _Roll, style: Style, side: int, ground: Ground) -> None:
+def _swing(foot: FootPoses, here: Stance, there: Stance, style: Style, side: int, ground: Ground) -> None:
     """Set the frames of the swing from the stance `here` to the stance `there`."""
-    start, end = here.stance.leave, there.stance.land
+    start, end = here.leave, there.land
     t = _frames(start, end)
     if not len(t):
         return
@@ -312,7 +292,7 @@ def _swing(foot: FootPoses, here: _Roll, there: _Roll, style: Style, side: int, 
     # The rate of change at the end of the stance, radians in the time READY of the swing.
     rate = (first_pitch - here.pitch(start - 0.01)) / 0.01 * (end - start) * READY
     pitch = _hermite(first_pitch, rate * FOLLOW, last_pitch, 0.0, np.minimum(u / READY, 1))
-    turn = quat.slerp(here.stance.turn, there.stance.turn, smoothstep(u))
+    turn = quat.slerp(here.turn, there.turn, smoothstep(u))
     rotation = quat.mul(turn, quat.from_axis_angle(X_AXIS, -pitch))
     # While the heel is up, the toes are bent up as in a stance, but by up to 40% less in the swing.
     bend = np.minimum(pitch, 0) * (1 - 0.4 * bump)
@@ -320,8 +300,8 @@ def _swing(foot: FootPoses, here: _Roll, there: _Roll, style: Style, side: int, 
     # The toe joint starts at rest and is moving when it lands. Its position and the pitch give the ankle.
     along = _hermite(0.0, 0.0, 1.0, LANDING_SPEED / EARLY, u**EARLY)
     share = np.stack([along, smoothstep(u), along], axis=1)  # of the way in x, y and z
-    first_toe = here.toe(first_pitch)
-    toe = first_toe + (there.toe(last_pitch) - first_toe) * share
+    first_toe = here.toe_at(first_pitch)
+    toe = first_toe + (there.toe_at(last_pitch) - first_toe) * share
     toe[:, 1] += style.lift[t, side] * bump
     toe[:, 1] += (
         _missing_height(toe, rotation, toes, style.clearance[t, side] * bump, ground)
