@@ -1,9 +1,11 @@
 """How well limps are recognised: of left-out people, at several strengths, and in captured clips.
 
-    python benchmarks/limps.py CMU_FOLDER [CLIP.bvh ...]
+    python benchmarks/limps.py CMU_FOLDER [CLIP.bvh ...] [--network WEIGHTS.npz]
+    python benchmarks/limps.py CMU_FOLDER --sizes [--network WEIGHTS.npz]
 
-Also prints how often healthy walks are called impaired, and whether hurt versions of healthy walks are nearer
-to captured limps than the healthy walks are.
+Also prints how often healthy walks are called impaired, whether hurt versions of healthy walks are nearer to
+captured limps than the healthy walks are, and how large the limps of hurt versions and of a network are. With
+--sizes only that.
 """
 
 from __future__ import annotations
@@ -22,13 +24,16 @@ from hobble.cli.gait import read_clip
 from hobble.core.clip import Clip
 from hobble.core.errors import HobbleError
 from hobble.core.files import load_npz
+from hobble.core.quat import Array
 from hobble.gait.cycles import join_walks, measure_clip
 from hobble.gait.profile import (
     GAITS,
     NORMAL,
     PROFILE_NAMES,
     Profile,
+    features,
     healthy_profile,
+    measure_effects,
     mirror_profile,
     profile_of_walk,
     read_people,
@@ -40,6 +45,7 @@ from hobble.gait.recognise import (
     compare_clip,
     examples_of_people,
     grade_walk,
+    healthy_covariance,
     learn,
     learn_grader,
     recognise,
@@ -49,9 +55,14 @@ from hobble.hurt.hurt_clip import hurt_clip
 from hobble.labels.clip_labels import Labels
 from hobble.labels.label import label_clip
 from hobble.labels.options import LabelOptions
-from hobble.measures.limp_run import limp_distance
+from hobble.measures.limp_run import limp_distance, walk_figures
+from hobble.models.load import load_network
 from hobble.motion.make import make_clip
 from hobble.motion.options import ClipMotion
+from hobble.motion.skeleton_file import load_skeleton
+from hobble.runtime.options import Runtime
+from hobble.synthetic.generate_clip import walk_from_plan
+from hobble.synthetic.plan import Segment
 
 STRENGTHS = (0.15, 0.3, 0.5, 0.7, 1.0)
 EXAM = ("105_16", "105_25", "105_26", "105_15")
@@ -153,19 +164,21 @@ def captured(folder: Path, clips: list[str]) -> None:
         print(f"    graded {g.name} {g.strength:.1f}; windows: {by_graded}")
 
 
-def made(folder: Path) -> None:
-    def read(name: str) -> tuple[Clip, Labels]:
-        file, skeleton = folder / f"{name}.bvh", SKELETONS / "holden31.yaml"
-        clip, _ = make_clip(
-            file, skeleton, SKELETONS, clip=name, skeleton_name="holden31", options=ClipMotion(ground="flat")
-        )
-        source = {"source_frames": len(clip), "source_fps": clip.fps}
-        return clip, label_clip(clip, [], source, "walk", "flat", LabelOptions())[0]
+def read(folder: Path, name: str) -> tuple[Clip, Labels]:
+    """A clip of the folder on the skeleton holden31, and its labels."""
+    file, skeleton = folder / f"{name}.bvh", SKELETONS / "holden31.yaml"
+    clip, _ = make_clip(
+        file, skeleton, SKELETONS, clip=name, skeleton_name="holden31", options=ClipMotion(ground="flat")
+    )
+    source = {"source_frames": len(clip), "source_fps": clip.fps}
+    return clip, label_clip(clip, [], source, "walk", "flat", LabelOptions())[0]
 
+
+def made(folder: Path) -> None:
     def walks(clips: list[Clip]) -> Profile:
         return profile_of_walk(join_walks(map(measure_clip, clips)))
 
-    sources = [read(name) for name in HEALTHY_WALKS]
+    sources = [read(folder, name) for name in HEALTHY_WALKS]
     healthy = walks([clip for clip, _ in sources])
     print(f"\nspreads from a captured limp: healthy {', '.join(HEALTHY_WALKS)}; their hurt versions")
     for name, entry in yaml.safe_load(DATA_SET.read_text())["clips"].items():
@@ -177,10 +190,76 @@ def made(folder: Path) -> None:
         versions = [
             hurt_clip(clip, labels, np.tile(severity, (len(clip), 1))).clip for clip, labels in sources
         ]
-        captured_limp = walks([read(name)[0]])
+        captured_limp = walks([read(folder, name)[0]])
         far = limp_distance(captured_limp, healthy, healthy, healthy)
         near = limp_distance(captured_limp, healthy, walks(versions), healthy)
         print(f"  {name} {far:.2f} {near:.2f}")
+
+
+# Part -> link on the right that hurts.
+PARTS = {
+    "hip": "RHipJoint-RightUpLeg",
+    "thigh": "RightUpLeg-RightLeg",
+    "shank": "RightLeg-RightFoot",
+    "foot": "RightFoot-RightToeBase",
+}
+SEVERITIES = (3.0, 5.0, 7.0, 10.0)
+COLUMNS = ("speed", "stance", "step_hurt", "step_sound", "knee_hurt", "knee_sound", "lean_forward")
+
+
+def print_sizes(title: str, healthy: Profile, walks: Mapping[tuple[str, float], Profile]) -> None:
+    """The effects of each part and severity: EFFECTS of `hobble.gait.profile`, and these.
+
+    lift: rise of the sound ankle, share of healthy. turn: range of the pelvis' turn, degrees more. sd: root
+    mean square of the 21 features, each divided by its standard deviation over healthy windows of one person.
+    near: `limp_distance` to the nearest real limp of the ten people. The last line: how far parts are apart
+    at 10, in the same unit as `sd`.
+    """
+    deviation, spread = np.sqrt(np.diag(healthy_covariance())), examples_of_people()[0].std(axis=0)
+    real = np.array(
+        [list(features(p[gait], p[NORMAL]).values()) for p in read_people() for gait in GAITS[1:]]
+    )
+    print(f"\n{title}: {', '.join((*COLUMNS, 'lift', 'turn', 'sd', 'near'))}")
+    found: dict[tuple[str, float], Array] = {}
+    for (part, severity), walk in walks.items():
+        effects = measure_effects(walk, healthy)
+        found[part, severity] = limp = np.array(list(features(walk, healthy).values()))
+        numbers = [
+            *(effects[name] for name in COLUMNS),
+            walk["range ankle_height_L"] / healthy["range ankle_height_L"],
+            walk["range pelvis_turn_left"] - healthy["range pelvis_turn_left"],
+            np.sqrt(np.mean((limp / deviation) ** 2)),
+            np.sqrt((((real - limp) / spread) ** 2).mean(axis=1)).min(),
+        ]
+        print(f"  {part:5} {severity:2.0f} " + " ".join(f"{number:6.2f}" for number in numbers))
+    for a, b in (("hip", "thigh"), ("thigh", "shank"), ("thigh", "foot"), ("shank", "foot")):
+        apart = np.sqrt(np.mean(((found[a, 10.0] - found[b, 10.0]) / deviation) ** 2))
+        print(f"  {a} and {b}: {apart:.1f} apart")
+
+
+def sizes_of_versions(folder: Path) -> None:
+    skeleton = load_skeleton(SKELETONS / "holden31.yaml").skeleton
+    walk = walk_from_plan("generated", skeleton, [Segment("walk", 130, seconds=20)], 1200, "flat", 60, 1).clip
+    source = {"source_frames": len(walk), "source_fps": 60.0}
+    generated = walk, label_clip(walk, [], source, "walk", "flat", LabelOptions())[0]
+    for clip, labels in (generated, *(read(folder, name) for name in HEALTHY_WALKS)):
+        walks = {}
+        for part, link in PARTS.items():
+            for severity in SEVERITIES:
+                hurt = np.zeros((len(clip), len(skeleton.links)))
+                hurt[:, skeleton.link_names.index(link)] = severity
+                walks[part, severity] = profile_of_walk(measure_clip(hurt_clip(clip, labels, hurt).clip))
+        print_sizes(f"hurt versions of {clip.name}", profile_of_walk(measure_clip(clip)), walks)
+
+
+def sizes_of_network(file: Path) -> None:
+    """Walks of 20 s at 1.2 m/s."""
+    cases = [(part, severity) for part in PARTS for severity in SEVERITIES]
+    injuries = [{}, *({PARTS[part]: severity} for part, severity in cases)]
+    figures = walk_figures(load_network(file), injuries, 2.0, "walk", 20.0, Runtime())
+    healthy, *hurt = (figure.profile for figure in figures)
+    assert healthy is not None
+    print_sizes(str(file), healthy, {case: p for case, p in zip(cases, hurt, strict=True) if p is not None})
 
 
 def main() -> None:
@@ -189,7 +268,16 @@ def main() -> None:
     )
     parser.add_argument("folder", type=Path, metavar="CMU_FOLDER", help="folder of the CMU clips, as .bvh")
     parser.add_argument("clips", nargs="*", metavar="CLIP.bvh", help="more captured impaired walks")
+    parser.add_argument(
+        "--network", type=Path, metavar="WEIGHTS.npz", help="a network whose limps are measured"
+    )
+    parser.add_argument("--sizes", action="store_true", help="only the sizes of limps")
     options = parser.parse_args()
+    sizes_of_versions(options.folder)
+    if options.network:
+        sizes_of_network(options.network)
+    if options.sizes:
+        return
     linear = {p: learn(*examples_of_people(rest), shrinkage=SHRINKAGE_OF_PEOPLE) for p, rest in left_out()}
     people_left_out("linear", {p: lambda w, h, j=j: recognise(w, h, j) for p, j in linear.items()})
     graders: dict[int, Grader] = {p: learn_grader(rest) for p, rest in left_out()}

@@ -40,14 +40,6 @@ def pace(labels: int = 2, across=None) -> LimitLearner:
     return LimitLearner(10.0, np.arange(labels) if across is None else np.array(across), GAITS)
 
 
-@pytest.mark.parametrize(
-    ("values", "speed"),
-    [((0, 0), np.inf), ((5, 0), 3.0), ((10, 0), 1.0), ((7.5, 0), 2.0), ((2.5, 0), 3.5), ((0, 7.5), 3.0)],
-)
-def test_between_levels_the_speed_is_interpolated(values, speed: float) -> None:
-    np.testing.assert_array_equal(LIMITS.highest_speeds(np.array([values], float)), [[speed]])
-
-
 def test_two_injuries_add_up_like_the_effects_of_hurt_versions() -> None:
     """Each takes half of the healthy speed of 4: together (2 * .5^3)^(1/3) = .63 of it."""
     limits = Limits(np.array([0.0, 10.0]), np.array([[[4.0, 2.0], [4.0, 2.0]]]), usual=np.array([3.5]))

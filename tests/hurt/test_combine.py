@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hobble.core import quat
 from hobble.core.clip import Clip
 from hobble.core.errors import HobbleError
 from hobble.core.quat import Array
@@ -33,49 +32,31 @@ def clips(shared: Path) -> tuple[Labelled, Labelled]:
     return out[0], out[1]
 
 
-def mean_poses(of: Labelled, joints: list[int], role: str) -> Array:
-    """(12, J, 3) mean places of joints in the coordinates of the joint `role`, in each twelfth of a cycle."""
+def mean_poses(of: Labelled, joints: list[int]) -> Array:
+    """(12, J, 4) mean rotations of joints, relative to the joint above, in each twelfth of a cycle."""
     clip, labels = of
-    origin = clip.skeleton.role(role)
-    turn = quat.inv(clip.global_rotations[:, origin])
-    local = quat.rotate(turn[:, None], clip.positions - clip.positions[:, [origin]])[:, joints]
-    bins = np.minimum((labels.phase * 12).astype(int), 11)
     known = np.zeros(len(clip), bool)
     for first, last in labels.cycles:
         known[first : last + 1] = True
+    bins = np.minimum((labels.phase * 12).astype(int), 11)
+    local = clip.rotations[:, joints] * np.sign(clip.rotations[:, joints, :1])
     return np.stack([local[known & (bins == b)].mean(axis=0) for b in range(12)])
-
-
-def apart(one: Labelled, other: Labelled, joints: list[int], role: str) -> float:
-    """cm between the mean poses of two walks, over phases and joints."""
-    one_poses, other_poses = (mean_poses(of, joints, role) for of in (one, other))
-    return float(np.linalg.norm(one_poses - other_poses, axis=-1).mean())
 
 
 @pytest.mark.shared
 @pytest.mark.parametrize("part", ["arms", "left arm", "upper body"])
-def test_the_result_is_nearer_to_both_clips_than_either_alone(clips, part: str) -> None:
+def test_the_result_has_the_legs_of_one_clip_and_the_arm_of_the_other(clips, part: str) -> None:
     (walk, walk_labels), (jog, jog_labels) = clips
-    both = combine_clips(walk, walk_labels, jog, jog_labels, part, "both"), walk_labels
-    skeleton = walk.skeleton
-    taken = joints_of_part(skeleton, part)
-    kept = [j for j in range(len(skeleton.joints)) if j not in taken]
-    np.testing.assert_array_equal(both[0].positions[:, kept], walk.positions[:, kept])
-
-    arms = joints_of_part(skeleton, "left arm")
-
-    def away(of: Labelled) -> float:
-        """From the jog in the arm that is taken, plus from the walk in the legs."""
-        legs = [skeleton.role(f"{side}_{role}") for side in ("left", "right") for role in ("knee", "heel")]
-        return apart(of, clips[1], arms, "chest") + apart(of, clips[0], legs, "hips")
-
-    assert away(both) < 0.5 * min(away(clips[0]), away(clips[1]))
+    both = combine_clips(walk, walk_labels, jog, jog_labels, part, "both")
+    kept = [j for j in range(len(walk.skeleton.joints)) if j not in joints_of_part(walk.skeleton, part)]
+    np.testing.assert_array_equal(both.positions[:, kept], walk.positions[:, kept])
+    arm = joints_of_part(walk.skeleton, "left arm")
+    of_both, of_walk, of_jog = (mean_poses(of, arm) for of in ((both, walk_labels), *clips))
+    assert np.abs(of_both - of_jog).mean() < 0.5 * np.abs(of_walk - of_jog).mean()
     # No jump where a cycle of the jog begins again: no arm is faster than in the jog, played at the walk's
     # cadence.
-    speed, of_jog = (
-        np.linalg.norm(np.diff(c.rotations[:, arms], axis=0), axis=-1).max() for c in (both[0], jog)
-    )
-    assert speed < 1.5 * of_jog
+    speed, jog_speed = (np.abs(np.diff(c.rotations[:, arm], axis=0)).max() for c in (both, jog))
+    assert speed < 1.5 * jog_speed
 
 
 @pytest.mark.shared

@@ -27,15 +27,6 @@ def test_footsteps_are_landings_of_the_right_and_the_left_foot_in_turn(written, 
                 assert not down[frame - 3 : frame - 1].any(), f"{side} is down before frame {frame}"
 
 
-def test_the_clip_has_the_requested_frames_and_rate(written):
-    for fps in (60, 120):
-        clip = written("any", recipe="jog", frames=300, fps=fps)
-        _, frame_time, positions = clip.bvh
-        assert len(positions) == 300 * fps // 60
-        assert frame_time == pytest.approx(1 / fps, abs=1e-6)
-        assert clip.footsteps.max() <= len(positions)
-
-
 def test_equal_arguments_give_equal_bytes_and_others_another_walk(written, tmp_path, holden31):
     def write(name, seed):
         paths = {key: tmp_path / f"{name}{seed}{key}" for key in ("bvh", "footsteps", "gait")}

@@ -13,13 +13,12 @@ from hypothesis import strategies as st
 from hobble.core.skeleton import Skeleton
 from hobble.motion.options import ClipMotion
 from hobble.motion.root import RootFrames
-from hobble.terrain.clip_fits import clip_fits, heights_under, sample_points, save_fits
+from hobble.terrain.clip_fits import clip_fits, heights_under, sample_points
 from hobble.terrain.cycle_ground import (
     IS_HEEL,
     distances,
     find_soles,
     fit_surfaces,
-    gather_stances,
     heel_above_toe,
 )
 from hobble.terrain.options import FitOptions
@@ -81,17 +80,6 @@ def test_heights_are_ordered_left_centre_right_from_past_to_future() -> None:
             at = samples[side, 70 + row + np.arange(-60, 60, 10)]
             assert np.allclose(heights[row, 0, side], at[:, 0])
             assert np.allclose(heights[row, 1, side], 7 + at[:, 1])
-
-
-def test_a_clip_without_cycles_has_no_fits(made: SimpleNamespace, patches: Patches, tmp_path: Path) -> None:
-    walk = made.walk(GROUNDS["waves"])
-    labels = {**walk.labels, "cycles": np.zeros((0, 2), int)}
-    for kind in ("flat", "rocky"):
-        fits = clip_fits(walk.clip, labels, patches, kind, made.options(), made.database())
-        save_fits(tmp_path / "f.npz", fits)
-        assert fits.heights.shape == (0, 36)
-        assert fits.patch.shape == (0, 10)
-        assert len(fits.frame) == len(fits.fits) == 0
 
 
 def test_heights_of_joints_above_their_soles(made: SimpleNamespace, holden31: Skeleton) -> None:
@@ -187,19 +175,6 @@ def test_a_foot_below_a_flat_floor_makes_only_a_local_pit(made: SimpleNamespace,
     assert as_it_is.foot_below.max() == pytest.approx(4)
 
 
-def test_a_heel_held_up_over_its_standing_toe_is_not_on_a_flat_floor(
-    made: SimpleNamespace, patches: Patches
-) -> None:
-    """Like a crouch on the balls of the feet: heels that do not move are labelled as contacts."""
-    walk = made.walk(GROUNDS["level"])
-    feet = walk.clip.positions[:, -4:].copy()
-    feet[:, [0, 2], 1] += 5
-    clip = made.figure(feet, walk.clip.root)
-    fits = clip_fits(clip, walk.labels, patches, "flat", made.options(), made.database())
-    assert np.all(fits.heights == 0)
-    assert fits.foot_error.max() < 0.01
-
-
 def test_flat_ground_can_be_at_the_height_of_the_feet_as_in_the_original(
     made: SimpleNamespace, patches: Patches
 ) -> None:
@@ -235,17 +210,3 @@ def test_only_large_residuals_are_fitted_more_closely_than_in_the_original(seed:
     assert max(left) <= 0.5 + 1e-9
     assert np.abs(residual[1] - once[1].heights_at(place)) @ count / count.sum() > 0.5
     assert np.array_equal(once[0].weights, met[0].weights)
-
-
-def test_stances_are_runs_of_one_joint_of_limited_length() -> None:
-    soles = np.zeros((20, 4, 3))
-    soles[:, :, 0] = np.arange(4) * 10.0
-    soles[:, :, 1] = np.arange(20)[:, None]
-    contacts = np.zeros((20, 4), bool)
-    contacts[2:7, 0] = True
-    contacts[8:10, 0] = True
-    contacts[5:10, 3] = True
-    x, _, height, count = gather_stances(soles, contacts, longest=3).T
-    assert count.tolist() == [3, 2, 2, 3, 2]
-    assert x.tolist() == [0, 0, 0, 30, 30]
-    assert height.tolist() == [3, 5.5, 8.5, 6, 8.5]

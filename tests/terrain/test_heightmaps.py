@@ -10,8 +10,7 @@ from PIL import Image
 from PIL.TiffImagePlugin import ImageFileDirectory_v2
 
 from hobble.core.errors import InputError
-from hobble.terrain.heightmaps import KINDS, generate_heights, heightmaps, landscape_heights, read_heights
-from hobble.terrain.options import HeightmapOptions
+from hobble.terrain.heightmaps import KINDS, generate_heights, landscape_heights, read_heights
 
 CELL = 3.937007874
 RAMP = np.add.outer(np.arange(5.0), 10 * np.arange(4.0))
@@ -86,21 +85,6 @@ def test_an_esri_grid_has_a_header_and_holes(tmp_path: Path) -> None:
     header = "ncols 3\nnrows 2\nxllcorner 0.0\nyllcorner 0.0\ncellsize 30\nNODATA_value -9999\n"
     (tmp_path / "map.asc").write_text(header + "1 2 3\n4 -9999 6\n")
     assert np.array_equal(read_heights(tmp_path / "map.asc"), [[1, 2, 3], [4, np.nan, 6]], equal_nan=True)
-
-
-def test_files_are_scaled_by_their_own_cell_and_height_scale(tmp_path: Path) -> None:
-    write(tmp_path / "a.txt", RAMP)
-    write(tmp_path / "b.txt", RAMP)
-    entries = [
-        HeightmapOptions(kind="file", path="a.txt"),
-        HeightmapOptions(kind="hills", height_scale=0.5),
-        HeightmapOptions(kind="file", path="b.txt", cell=10.0, height_scale=2.0),
-    ]
-    maps = heightmaps(entries, [tmp_path / "a.txt", tmp_path / "b.txt"], cell=CELL, height_scale=3.0)
-    assert np.array_equal(maps[0].heights, 3 * RAMP)
-    assert np.array_equal(maps[1].heights, generate_heights("hills", 0, CELL) / 2)
-    assert np.array_equal(maps[2].heights, 2 * RAMP)
-    assert [m.cell for m in maps] == [CELL, CELL, 10.0]
 
 
 BAD = {

@@ -4,12 +4,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from hobble.channels import ClipSource
 from hobble.channels.clip_values import load_values, save_values, write_report
@@ -25,7 +22,7 @@ from hobble.channels.injury.status import (
 from hobble.core.clip import Clip
 from hobble.core.errors import InputError
 from hobble.core.files import read_json
-from hobble.core.skeleton import Skeleton, other_side
+from hobble.core.skeleton import Skeleton
 
 THIGH, ARM = "LeftUpLeg-LeftLeg", "LeftArm-LeftForeArm"
 
@@ -85,17 +82,6 @@ def test_each_frame_maps_to_the_source_frame_of_the_same_time(fps, start, expect
     assert source_rows(4, 100, motion(100, fps, start)).tolist() == expected
 
 
-def test_a_status_file_at_its_own_rate(clip, tmp_path):
-    path = tmp_path / "walk_injuries.txt"
-    path.write_text(f"frames:600\n201-400 {THIGH}[8];\n")
-    severity, warnings = clip_severity(clip, path, None, motion())
-    hurt = np.flatnonzero(severity[:, column(clip.skeleton, THIGH)])
-    assert (hurt[0], hurt[-1]) == (100, 199)
-    assert severity.dtype == np.float32
-    assert severity.sum() == 800
-    assert warnings == []
-
-
 def test_one_frame_more_or_less_is_a_warning_and_two_are_refused(clip, tmp_path):
     path = tmp_path / "walk_injuries.txt"
     for frames in (599, 601):
@@ -127,18 +113,6 @@ def test_on_a_skeleton_without_links_a_hurt_clip_has_no_columns(clip):
         CHANNEL.check(ClipSource("walk", {}, "Thigh[4]"), clip.skeleton)
 
 
-@given(st.integers(0, 29), st.floats(0, 10, width=32))
-@settings(max_examples=30, deadline=None)
-def test_mirroring_twice_gives_the_same_back(holden31, link, value):
-    severity = np.zeros((3, 30), np.float32)
-    severity[:, link] = value
-    links = holden31.mirror_links
-    once = CHANNEL.mirror(severity, SimpleNamespace(mirror_links=links))
-    assert (CHANNEL.mirror(once, SimpleNamespace(mirror_links=links)) == severity).all()
-    other = "-".join(other_side(joint) for joint in holden31.link_names[link].split("-"))
-    assert (once[:, holden31.link_names.index(other)] == np.float32(value)).all()
-
-
 def test_saved_values_keep_their_columns_and_the_report_lists_the_injuries(clip, tmp_path):
     severity, _ = clip_severity(clip, None, f"{THIGH}[4]", motion())
     severity[:60] = 0
@@ -164,8 +138,3 @@ def test_severities_equal_the_published_matrices_of_ferre(shared: Path, holden31
     severity, warnings = severity_matrix(status, holden31.link_names)
     assert (severity == np.loadtxt(stem)).all()
     assert len(warnings) == 1
-
-
-def test_source_rows_of_a_looped_clip_start_over_with_each_cycle():
-    looped = motion(3, 60.0) | {"loops": 2, "cycle_frames": 3}
-    assert source_rows(6, 3, looped).tolist() == [0, 1, 2, 0, 1, 2]
