@@ -288,7 +288,7 @@ def test_the_saved_bvh_is_the_motion_that_was_played(
     assert frame_rate(file.frame_time, file.frame_time_text) == 60
     read, _ = decode_channels(file)
     order = [file.names.index(name) for name in holden31.joints]
-    skeleton = replace(holden31, offsets=read.offsets[order])
+    skeleton = replace(holden31, offsets=read.skeleton.offsets[order])
     _, back = forward_kinematics(skeleton, read.rotations[:, order], read.root)
     assert np.abs(back - places).max() < 0.05
     tab.run(
