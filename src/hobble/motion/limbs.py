@@ -92,6 +92,8 @@ class MovingRig:
     names: Sequence[str]
     parents: Sequence[int]
     positions: Array = field(repr=False)
+    # (joint, parent) -> result of `_twins_below`: each is asked for once for every child of `parent`.
+    _twins: dict[tuple[int, int], list[int]] = field(default_factory=dict, init=False, repr=False)
 
     @cached_property
     def lengths(self) -> Array:
@@ -150,8 +152,11 @@ class MovingRig:
 
     def _twins_below(self, joint: int, parent: int) -> list[int]:
         """Those children of `parent` whose names say that they are the counterpart of `joint`."""
-        name = self.names[joint]
-        return [j for j in self.children[parent] if j != joint and are_twins(name, self.names[j])]
+        if (joint, parent) not in self._twins:
+            name = self.names[joint]
+            below = [j for j in self.children[parent] if j != joint and are_twins(name, self.names[j])]
+            self._twins[joint, parent] = below
+        return self._twins[joint, parent]
 
     def equal_chains(self, a: int, b: int) -> tuple[float, tuple[int, ...], tuple[int, ...]]:
         """The longest equal chains of bones that start with the bones that end at joints `a` and `b`.

@@ -61,6 +61,7 @@ def words(name: str) -> list[str]:
     return [w.lower() for w in re.findall(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+", name.replace("ß", "ss"))]
 
 
+@lru_cache(8192)  # a rig's names, of which each is asked for very often
 def side_of(name: str) -> str | None:
     """The side that a joint's name says: "left" or "right", or None if it says neither or both.
 
@@ -95,7 +96,6 @@ def side_of_pair(name: str, other: str) -> str | None:
     return {("l", "r"): "left", ("r", "l"): "right"}.get(unlike[0]) if len(unlike) == 1 else None
 
 
-@lru_cache(65536)  # comparing names takes long
 def are_twins(name: str, other: str) -> bool:
     """Whether two names say that the joints are the same part of the body, one left and one right.
 
