@@ -1,14 +1,28 @@
-"""Made-up motion for several tests: captured walks, and rows of random values."""
+"""Made-up motion for several tests: captured walks, rows of random values, and a network that fits them."""
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
+from itertools import pairwise
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from hobble.models.load import NEEDED_ROLES
 from hobble.rows.clip_rows import Captured, ClipRows
 from hobble.rows.layout import GAITS, RowLayout
+
+LAYOUT = RowLayout(3, channels=(("injury", 1),))
+SKELETON = {
+    "name": "stick",
+    "joints": {
+        n: {"parent": p, "offset": [0, 1, 0]} for n, p in (("Hips", None), ("Arm", "Hips"), ("Foot", "Hips"))
+    },
+    "roles": dict.fromkeys(NEEDED_ROLES, "Foot") | {"hips": "Hips"},
+    "links": [["Hips", "Arm"]],
+}
 
 
 def captured_walk(name: str, local: np.ndarray, channels: Mapping[str, np.ndarray]) -> Captured:
@@ -23,7 +37,13 @@ def captured_walk(name: str, local: np.ndarray, channels: Mapping[str, np.ndarra
 
 
 def random_rows(
-    clip: str, layout: RowLayout, skeleton: Any, rows: int, fits: int, seed: int, spread: float = 1.0
+    clip: str,
+    rows: int,
+    fits: int,
+    seed: int,
+    layout: RowLayout = LAYOUT,
+    skeleton: Any = SKELETON,
+    spread: float = 5.0,
 ) -> ClipRows:
     """Random rows with `fits` fits each, and severities from 0 to 10. spread: of Y."""
     rng = np.random.default_rng(seed)
@@ -41,3 +61,18 @@ def random_rows(
         rng.normal(size=(rows * fits, 36)).astype(np.float32),
         rng.normal(size=rows * fits).astype(np.float32),
     )
+
+
+def random_network(path: Path) -> Path:
+    """Write a network with random weights for rows of LAYOUT. Returns `path`."""
+    rng = np.random.default_rng(0)
+    arrays: dict[str, np.ndarray] = {}
+    for i, (a, b) in enumerate(pairwise((LAYOUT.x_size, 16, 16, LAYOUT.y_size))):
+        arrays[f"W{i}"] = rng.normal(0, 0.2, (4, b, a)).astype(np.float32)
+        arrays[f"b{i}"] = rng.normal(0, 0.1, (4, b)).astype(np.float32)
+    for name, size in (("X", LAYOUT.x_size), ("Y", LAYOUT.y_size)):
+        arrays[f"{name}mean"] = rng.normal(size=size).astype(np.float32)
+        arrays[f"{name}std"] = (rng.random(size) + 0.5).astype(np.float32)
+    meta = {"layout": LAYOUT.to_dict(), "skeleton": SKELETON, "channels": {"injury": ["Hips-Arm"]}}
+    np.savez(path, **arrays, meta=np.array(json.dumps(meta)))
+    return path

@@ -97,11 +97,13 @@ def test_captured_motion_that_is_walked_again_exactly_is_equal_to_itself(monkeyp
 
 def test_the_measurement_of_a_network_and_its_section(network):
     found = measure_field(network, Runtime(), Options(field_seconds=2), {"train": captured_commands()})
-    found["published"] = [{"measure": "circle_cm", "value": 2.98, "source": "MANN"}]
+    published = {"field": [{"measure": "paths_circle_cm", "value": 2.98, "source": "MANN"}]}
     assert found["split"] == "train"
     assert found["asked"]["captured"]["jerk"] > 0
-    table = {row[0]: row[1:] for row in rows(found)}
-    assert table["distance from a circle, cm"] == [found["paths"]["circle"]["cm"], None, None, "2.98 (MANN)"]
-    assert section(found, None).parts
+    table = {row["measure"]: row for row in rows(found, published["field"])}
+    circle = table["distance from a circle, cm"]
+    assert (circle["straight"], circle["published"]) == (found["paths"]["circle"]["cm"], "2.98 (MANN)")
+    assert table["jerk, m/s3"]["captured"] == found["asked"]["captured"]["jerk"]
+    assert section(found, SimpleNamespace(published=published)).parts
     found["asked"]["character"]["jerk"] = 2 * found["asked"]["captured"]["jerk"]
     assert any("jerk" in hint.head for hint in hints(found, None))

@@ -21,8 +21,7 @@ FUNCTIONS = {
     "compared": 2,
     "tables": 1,
     "compared_section": 1,
-    "compared_columns": 1,
-    "compared_verdicts": 1,
+    "compared_values": 1,
 }
 
 

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from hobble.measures import responsivity_run as module
+from hobble.measures.measure import flat_rows
 from hobble.measures.responsivity import Options
 from hobble.measures.responsivity_run import (
-    lap_rows,
     lap_starts,
     measure_responsivity,
     parameter_counts,
@@ -47,9 +47,9 @@ def run(network, track, laps=2, seconds=10.0) -> dict[str, Any]:
 
 def test_finished_laps_are_counted_and_timed(steady) -> None:
     result = run(steady, NEAR)
-    rows = lap_rows(result)
+    rows = flat_rows(result["modes"], "laps", "mode")
     assert list(rows[0])[:4] == ["mode", "lap", "finished", "frames"]
-    assert {"milliseconds_predict", "milliseconds_predict_sd", "milliseconds_p99"} <= set(rows[0])
+    assert {"milliseconds_predict", "milliseconds_sd_predict", "milliseconds_spread_p99"} <= set(rows[0])
     modes = ("constant", "linear", "cubic")
     assert [(row["mode"], row["lap"]) for row in rows] == [(mode, lap) for mode in modes for lap in (1, 2)]
     assert result["laps_finished"] == 2

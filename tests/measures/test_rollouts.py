@@ -87,7 +87,7 @@ LAYOUT = RowLayout(31, channels=(("injury", 30),))
 def clip_rows(network: Network, rows: int, seed: int, gap: int | None = None) -> ClipRows:
     """Random rows; with a `gap`, a new stretch begins there."""
     assert network.skeleton is not None
-    found = random_rows("a", LAYOUT, network.skeleton.to_dict(), rows, 1, seed)
+    found = random_rows("a", rows, 1, seed, LAYOUT, network.skeleton.to_dict(), 1.0)
     found.frame[gap if gap is not None else rows :] += 20
     return found
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 from dataclasses import replace
 from pathlib import Path
 
@@ -27,13 +26,7 @@ from hobble.rows.clip_rows import (
     summary_of_rows,
 )
 from hobble.rows.layout import GAITS
-
-_spec = importlib.util.spec_from_file_location("of_accuracy", Path(__file__).with_name("test_accuracy.py"))
-assert _spec is not None
-assert _spec.loader is not None
-_of_accuracy = importlib.util.module_from_spec(_spec)
-_spec.loader.exec_module(_of_accuracy)
-make_rows, make_network = _of_accuracy.make_rows, _of_accuracy.make_network
+from tests.measures.made_up import random_network, random_rows
 
 
 def population(
@@ -116,7 +109,7 @@ def whole(name: str, rows: int) -> Excerpt:
 
 
 def test_excerpts_cover_a_clip_once_and_are_read_as_they_are(tmp_path):
-    rows = make_rows("a", 2500, 2, 5)
+    rows = random_rows("a", 2500, 2, 5)
     rows.fits[::3] = 1
     rows = replace(rows, heights=rows.heights[: rows.fits.sum()], mean=rows.mean[: rows.fits.sum()])
     save_clip_rows(tmp_path / "a.npz", rows)
@@ -144,7 +137,7 @@ def clips(tmp_path: Path) -> dict[str, Path]:
     files = {}
     for seed, name in enumerate("abcdefgh"):
         files[name] = tmp_path / f"{name}.npz"
-        save_clip_rows(files[name], make_rows(name, 20 + 5 * seed, 1, seed))
+        save_clip_rows(files[name], random_rows(name, 20 + 5 * seed, 1, seed))
     return files
 
 
@@ -154,8 +147,7 @@ def flat(clip):
 
 
 def test_accuracy_and_roll_outs_of_a_sample_have_intervals(tmp_path, clips):
-    weights = tmp_path / "w.npz"
-    np.savez(weights, **make_network())
+    weights = random_network(tmp_path / "w.npz")
     splits = dict.fromkeys(clips, "train")
     chosen = tuple(whole(name, 20 + 5 * i) for i, name in enumerate("abcde"))
     sample = Sample({"train": Drawn(chosen, 8, 465)}, 8)
@@ -183,9 +175,8 @@ def test_accuracy_and_roll_outs_of_a_sample_have_intervals(tmp_path, clips):
 
 def test_all_excerpts_of_a_clip_together_measure_what_the_clip_does(tmp_path):
     """Roll-outs that begin in an excerpt go on after it, so none is cut short but at the end of the clip."""
-    weights, file = tmp_path / "w.npz", tmp_path / "a.npz"
-    np.savez(weights, **make_network())
-    save_clip_rows(file, make_rows("a", 120, 1, 3))
+    weights, file = random_network(tmp_path / "w.npz"), tmp_path / "a.npz"
+    save_clip_rows(file, random_rows("a", 120, 1, 3))
     parts = [Excerpt("a", 40 * i, 40, 120) for i in range(3)]
     sample = Sample({"train": Drawn(tuple(parts), 3, 120)}, 1)
     given = weights, {"a": file}, {"a": "train"}, "holden"
@@ -202,7 +193,7 @@ def test_all_excerpts_of_a_clip_together_measure_what_the_clip_does(tmp_path):
 
 
 def test_facts_of_a_clip_survive_their_file(tmp_path):
-    rows = make_rows("a", 30, 1, 1)
+    rows = random_rows("a", 30, 1, 1)
     gait = rows.x[:, rows.layout.with_channels(()).x_gait].reshape(30, len(GAITS), -1)
     gait[:] = 0
     gait[:, GAITS.index("jog")] = 1

@@ -11,9 +11,9 @@ from hobble.core.quat import Array
 from hobble.measures.rollouts_run import (
     RollOutCrowd,
     RollOutInputs,
-    errors_of_sums,
     roll_out_sums,
     stretches_of,
+    values_of_sums,
 )
 from hobble.measures.sample import LoadedPart
 from hobble.models.network import Predictor
@@ -38,4 +38,4 @@ def clip_roll_outs(
     """Length -> errors of all roll-outs of the clip."""
     stretches = stretches_of(LoadedPart(rows, 0, len(rows)), predictor.network.layout)
     sums = {n: roll_out_sums(predictor, stretches, joints, n).sum(axis=0) for n in lengths}
-    return {n: errors_of_sums(of_length) for n, of_length in sums.items()}
+    return {n: values_of_sums(of_length) for n, of_length in sums.items()}

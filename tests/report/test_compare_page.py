@@ -74,7 +74,7 @@ def test_published_errors_laps_and_curves_are_drawn_beside_ours(compared: dict[s
     assert set(means) == {"holden", "holden, published", "ava", "ava, published"}
     assert means["holden, published"]["y"][0] == pytest.approx(4.96)
     assert "ava, published" not in {trace["name"] for trace in lines.options["standard deviation"]}
-    laps = {trace["name"]: trace for trace in of_laps.lap_lines(compared).options["constant phase"]}
+    laps = {trace["name"]: trace for trace in of_laps.lap_boxes(compared).options["constant phase"]}
     assert (len(laps["ava, published"]["y"]), laps["ava, published"]["y"][-1]) == (19, 1.397291)
     chart = compare_page.training_curves(compared)
     assert chart is not None

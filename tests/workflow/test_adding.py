@@ -23,7 +23,7 @@ HIPS = '''"""How high the hips of the captured figure are."""
 from hobble.core.section import Positive, Section
 from hobble.measures.compare import ComparisonAddition
 from hobble.measures.measure import Cost, Measure
-from hobble.report.parts import Column, Hint, KeyFigure, OverviewColumn, Table
+from hobble.report.parts import Column, ComparedValue, Hint, KeyFigure, Table
 from hobble.report.parts import PageSection, Paragraph, SectionPart
 
 
@@ -66,9 +66,9 @@ def tables(compared):
     return {"hips": compared["hips"]}
 
 
-def compared_columns(compared):
+def compared_values(compared):
     values = {entry["configuration"]: entry["highest"] for entry in compared["hips"]}
-    yield OverviewColumn(25, Column.number("highest hips, cm", 4), values)
+    yield ComparedValue(25, Column.number("highest hips, cm", 4), values)
 
 
 def compared_section(compared):

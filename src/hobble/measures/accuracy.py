@@ -7,76 +7,42 @@ captured position, divided by its distance from the root. JSON files have it as 
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from hobble.report.gather import ReportMaterial
-
-from collections.abc import Iterator, Mapping, Sequence
-from itertools import combinations, product
-from typing import Any
+from collections.abc import Iterator, Sequence
+from itertools import product
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from hobble.core.files import Json
-from hobble.measures.compare import (
-    ComparisonAddition,
-    ConfigurationResults,
-    compare_series,
-    mean_and_sd,
-    published_clips,
-    published_differences,
-    published_row,
-)
-from hobble.measures.measure import SPLITS, Cost, JointOptions, Measure, Row, SampleOptions, sample_in_words
-from hobble.measures.shown import boxes, chart, table, words
+from hobble.measures import compare, measure
+from hobble.measures.measure import SPLITS, Row
+from hobble.measures.shown import boxes, chart, ours_and_published, table, words
+from hobble.report import parts
 from hobble.report.parts import SPLITS as SPLIT_LABELS
-from hobble.report.parts import (
-    Chart,
-    Column,
-    Compared,
-    Hint,
-    KeyFigure,
-    OverviewColumn,
-    PageSection,
-    Paragraph,
-    SectionPart,
-    Table,
-    TemplatePart,
-    Trace,
-    axis,
-    citation,
-    configuration_colours,
-    configuration_names,
-    format_duration,
-    format_number,
-    heatmap,
-    line_trace,
-    marker_trace,
-    ordered_axis,
-    reference_line,
-    with_order,
-)
+from hobble.report.parts import Chart, Compared, Hint, PageSection, SectionPart, Trace
+
+if TYPE_CHECKING:
+    from hobble.report.gather import ReportMaterial
 
 
-class Options(JointOptions, SampleOptions):
+class Options(measure.JointOptions, measure.SampleOptions):
     """The keys of this measurement in a configuration's section `evaluation`."""
 
 
-MEASURE = Measure(
+MEASURE = measure.Measure(
     name="accuracy",
     module=__name__,
     inputs=("weights", "clips", "summaries", "skeleton"),
     options=Options,
     # For each thousand frames: 12 MB and 0.2 s. At least 10 minutes.
-    cost=Cost(mb_per_1000_frames=12, seconds_per_1000_frames=0.2, least_minutes=10),
+    cost=measure.Cost(mb_per_1000_frames=12, seconds_per_1000_frames=0.2, least_minutes=10),
 )
 COLOURS = {"train": "@muted", "held_out": "@accent"}  # split -> its colour in the charts
 NAMES = {"held_out": "held out", "train": "training"}  # split -> its name on the page
-# The keys of the 5th to 95th percentile of the error in accuracy.json.
-QUANTILES = ("p05", "p25", "p50", "p75", "p95")
-CLIP_COLUMNS = ("clip", "split", "frames", "mean", "sd", "position_error_cm", *QUANTILES)
-ERROR_AXIS = axis("relative error, %", rangemode="tozero")
+# Edges of a box, as plotly names them -> keys of accuracy.json.
+BOX = {"lowerfence": "p05", "q1": "p25", "median": "p50", "q3": "p75", "upperfence": "p95", "mean": "mean"}
+CLIP_HEADS = {key: key for key in ("clip", "split", "frames", "mean", "sd")}
+ERROR_AXIS = parts.axis("relative error, %", rangemode="tozero")
 # Key of a difference between two configurations in compare.json -> what it is divided by (eq. 3.2).
 DEVIATIONS = {"difference_of_means": "sd of the means of clips", "difference": "sd of single frames"}
 
@@ -88,20 +54,22 @@ def section(found: Json, material: ReportMaterial) -> PageSection:
     # Readers may take the number in _hurt1 for a severity, so endings of names are explained.
     endings = [end for end in ("_hurt1", "_mirror") if any(end in row["clip"] for row in found["clips"])]
     introduction = words("accuracy.introduction", *(f"accuracy.{end[1:]}" for end in endings))
-    heads = {key: "position error, cm" if key == "position_error_cm" else key for key in CLIP_COLUMNS[:6]}
+    heads = CLIP_HEADS | {"position_error_cm": "position error, cm"}
     of_clips = table(f"{material.name}-accuracy", _measured(found), heads, show={"split": NAMES.__getitem__})
     # Only gait cycles are measured, so the clips are longer.
     seconds = sum(found[split]["frames"] for split in NAMES) / 60
-    caveat = words("accuracy.caveat", duration=format_duration(seconds), dataset=material.dataset)
-    parts = [
-        SectionPart(0, Paragraph(introduction + _about_sample(found))),
-        SectionPart(9, Paragraph(caveat)),
+    duration = parts.format_duration(seconds)
+    shown = [
+        SectionPart(0, parts.Paragraph(introduction + _about_sample(found))),
+        SectionPart(
+            9, parts.Paragraph(words("accuracy.caveat", duration=duration, dataset=material.dataset))
+        ),
         SectionPart(10, published_table(found, material), open=True, short=True),
         SectionPart(30, clip_boxes(found, material), tall=True),
         SectionPart(60, of_clips),
-        SectionPart(90, TemplatePart("captured.html.j2")),
+        SectionPart(90, parts.TemplatePart("captured.html.j2")),
     ]
-    return PageSection("accuracy", parts, title="Accuracy", order=10, long=True)
+    return PageSection("accuracy", shown, title="Accuracy", order=10, long=True)
 
 
 def _measured(found: Json) -> list[dict[str, Any]]:
@@ -119,7 +87,8 @@ def _about_sample(found: Json) -> str:
         for split in NAMES
         if found[split].get("interval")
     ]
-    return " " + words("accuracy.sample", sample=sample_in_words(found), means=", ".join(means))
+    sample = measure.sample_in_words(found)
+    return " " + words("accuracy.sample", sample=sample, means=", ".join(means))
 
 
 def clip_boxes(found: Json, material: ReportMaterial) -> Chart:
@@ -135,39 +104,43 @@ def clip_boxes(found: Json, material: ReportMaterial) -> Chart:
             place = {"orientation": "h", "y": [row["clip"] for row in chosen], "fillcolor": fill}
             traces.append(quantile_boxes(NAMES[split], chosen, COLOURS[split], line, **place))
     means = material.published["clip_means"].get(material.name, ())
-    theirs = dict(zip(published_clips(material.published), means, strict=False))
+    theirs = dict(zip(compare.published_clips(material.published), means, strict=False))
     if shown := [row["clip"] for row in rows if row["clip"] in theirs]:
         diamond = {"symbol": "diamond-open", "size": 7, "color": "@ink"}
-        traces.append(marker_trace("published mean", [100 * theirs[clip] for clip in shown], shown, diamond))
+        x = [100 * theirs[clip] for clip in shown]
+        traces.append(parts.marker_trace("published mean", x, shown, diamond))
     published = material.published_entry("accuracy")
-    mean = reference_line(100 * published["mean"], f"{published['label']}, published") if published else {}
-    clips = ordered_axis(row["clip"] for row in rows)
-    layout = {"xaxis": ERROR_AXIS, "yaxis": clips, **mean, "boxmode": "overlay"}
+    mean = (
+        parts.reference_line(100 * published["mean"], f"{published['label']}, published") if published else {}
+    )
+    clips = parts.ordered_axis(row["clip"] for row in rows)
+    layout = {"xaxis": ERROR_AXIS, "yaxis": clips, "boxmode": "overlay", **mean}
     more = ["held_out"] if any(row["split"] == "held_out" for row in rows) else []
     return chart("accuracy-boxes", traces, layout, max(260, 110 + 21 * len(rows)), more=more)
 
 
 def quantile_boxes(name: str, errors: Sequence[Json], colour: str, line: str, **more: Any) -> Trace:
     """Boxes of the relative error in %, one for each entry of accuracy.json in `errors`."""
-    keys = zip(("lowerfence", "q1", "median", "q3", "upperfence", "mean"), (*QUANTILES, "mean"), strict=True)
-    values = {key: [100 * entry[of_entry] for entry in errors] for key, of_entry in keys}
+    values = {edge: [100 * entry[key] for entry in errors] for edge, key in BOX.items()}
     return boxes(name, line, **values, marker={"color": colour}, **more)
 
 
-def published_table(found: Json, material: ReportMaterial) -> Table:
+def published_table(found: Json, material: ReportMaterial) -> parts.Table:
     """Means and standard deviations of the clips' mean errors: ours on both splits, then the published ones.
 
     Ours are measured as the published ones were, see `measure_accuracy` in `hobble.measures.accuracy_run`.
     """
-    rows: list[Row] = []
-    for split, name in NAMES.items():
-        if ours := found[split].get("as_published"):
-            of_split = {"mean": ours["mean_of_clips"], "sd": ours["sd_of_clips"], "source": "this report"}
-            cm = found[split]["position_error_cm"]
-            rows.append({"network": f"{material.name}, {name} clips", **of_split, "cm": cm})
-    for entry in material.published["accuracy"]:
-        source = citation(entry, material.published["sources"])
-        rows.append({"network": entry["label"], **entry, "source": source})
+    ours = [
+        {
+            "network": f"{material.name}, {name} clips",
+            "mean": found[split]["as_published"]["mean_of_clips"],
+            "sd": found[split]["as_published"]["sd_of_clips"],
+            "cm": found[split]["position_error_cm"],
+            "source": "this report",
+        }
+        for split, name in NAMES.items()
+        if found[split].get("as_published")
+    ]
     heads = {
         "network": "network",
         "mean": "mean error of the clips, as a fraction",
@@ -175,10 +148,11 @@ def published_table(found: Json, material: ReportMaterial) -> Table:
         "cm": "position error, cm (all frames, exact phase)",
         "source": "source",
     }
+    rows = [*ours, *material.published_records("accuracy")]
     return table(f"{material.name}-published", rows, heads, words("accuracy.published"), long=["source"])
 
 
-def figures(found: Json, material: ReportMaterial) -> Iterator[KeyFigure]:
+def figures(found: Json, material: ReportMaterial) -> Iterator[parts.KeyFigure]:
     """The key figures: the error on each split that was measured."""
     for order, (split, label) in enumerate(SPLIT_LABELS.items(), 10):
         part = found.get(split)
@@ -187,7 +161,7 @@ def figures(found: Json, material: ReportMaterial) -> Iterator[KeyFigure]:
             if (published := material.published_entry("accuracy")) and split == "held_out":
                 mean = 100 * published["mean"]
                 note += f"; published for {published['label']}: {mean:.2f} %, on other clips"
-            yield KeyFigure(f"Error on {label}", f"{100 * part['mean']:.2f}", "%", note, order)
+            yield parts.KeyFigure(f"Error on {label}", f"{100 * part['mean']:.2f}", "%", note, order)
 
 
 def _centimetres(part: Json, split: str, material: ReportMaterial) -> str:
@@ -196,12 +170,13 @@ def _centimetres(part: Json, split: str, material: ReportMaterial) -> str:
     The runtime draws a joint halfway between its predicted position and its old position plus the predicted
     velocity. This error is left out if the measurement `rollouts` has no roll-outs of one frame.
     """
-    error = format_number(part["position_error_cm"])
+    error = parts.format_number(part["position_error_cm"])
     lengths = {entry["length"]: entry for entry in material.results_of("rollouts").get("lengths", ())}
     drawn = lengths.get(1, {}).get(split, {}).get("position_error_cm")
     if drawn is None:
         return f"{error} cm per joint on average"
-    return f"{error} cm per joint as predicted; {format_number(drawn)} cm as drawn (explained under Accuracy)"
+    as_drawn = parts.format_number(drawn)
+    return f"{error} cm per joint as predicted; {as_drawn} cm as drawn (explained under Accuracy)"
 
 
 def hints(found: Json, material: ReportMaterial) -> Iterator[Hint]:
@@ -221,7 +196,7 @@ def hints(found: Json, material: ReportMaterial) -> Iterator[Hint]:
             yield Hint("good", head, "A larger network may do better.", 30)
         else:
             yield Hint("fact", f"{head}.", "That is usual.", 30)
-    yield from with_order(12, _worst_clip(_measured(found)))
+    yield from _worst_clip(_measured(found))
 
 
 def _worst_clip(rows: Sequence[Json]) -> Iterator[Hint]:
@@ -234,55 +209,54 @@ def _worst_clip(rows: Sequence[Json]) -> Iterator[Hint]:
         source = worst["clip"].removesuffix("_mirror")
         whose = "its labels" if source == worst["clip"] else f"the labels of {source}, which it mirrors,"
         text = words("accuracy.worst", times=f"{worst['mean'] / median:.1f}", whose=whose)
-        yield Hint("note", f"{worst['clip']} has the largest error,", text)
+        yield Hint("note", f"{worst['clip']} has the largest error,", text, 12)
 
 
-def compared(all_measured: Sequence[ConfigurationResults], published: Json) -> ComparisonAddition:
+def compared(
+    all_measured: Sequence[compare.ConfigurationResults], published: Json
+) -> compare.ComparisonAddition:
     """The errors of each configuration, the difference of each pair, and the published errors beside ours.
 
     all_measured: the results of each configuration. published: the content of published.yaml.
+
+    Two configurations are compared over each split, and over each clip on which both were measured. The
+    errors of the network that Holden et al. released are beside those of any network on the same clips.
     """
     found = {m.name: m.results_of("accuracy") for m in all_measured}
-    differences = accuracy_differences(found)
-    ours = []
-    for row in published["accuracy"]:
-        for split in SPLITS:
-            clips, label = found.get(row["configuration"]), SPLIT_LABELS[split]
-            mean, sd = mean_and_sd(clip_means(clips, split) if clips else [])
-            ours.append(published_row(f"relative error, {label}", row, row["mean"], mean))
-            ours.append(published_row(f"standard deviation of the means of {label}", row, row["sd"], sd))
-    # Errors of the network that Holden et al. released on three clips, beside ours on these clips.
-    of_release = [
-        published_row(
-            f"relative error, {clip['clip']}",
-            {"configuration": name, "source": "release"},
-            published["released_clips"][clip["clip"]],
-            clip.get("as_published", clip)["mean"],
-        )
-        for name, of_configuration in found.items()
-        for clip in of_configuration["clips"]
-        if clip["clip"] in published["released_clips"]
-    ]
+    series = {
+        name: {split: {**of[split], "means": clip_means(of, split)} for split in SPLITS}
+        | {entry["clip"]: entry for entry in of["clips"]}
+        for name, of in found.items()
+    }
+    differences = compare.pair_differences(
+        {name: {over: one for over, one in of.items() if one["frames"]} for name, of in series.items()}
+    )
+    beside: list[Row] = []
+    for split in SPLITS:
+        statistics = {name: compare.mean_and_sd(of[split]["means"]) for name, of in series.items()}
+        of_means = f"standard deviation of the means of {SPLIT_LABELS[split]}"
+        for at, key, what in ((0, "mean", f"relative error, {SPLIT_LABELS[split]}"), (1, "sd", of_means)):
+            ours = {name: values[at] for name, values in statistics.items()}
+            beside += compare.beside_ours(what, published["accuracy"], key, ours)
     on_training = [row for row in differences if row["over"] == "train"]
-    return ComparisonAddition(
+    beside += compare.published_differences("error", on_training, published)
+    for name, (clip, theirs) in product(found, published["released_clips"].items()):
+        if mine := series[name].get(clip):
+            row = {"configuration": name, "source": "release"}
+            ours_mean = mine.get("as_published", mine)["mean"]
+            beside.append(compare.published_row(f"relative error, {clip}", row, theirs, ours_mean))
+    return compare.ComparisonAddition(
         entries=[{"dataset": m.dataset, **found[m.name], "configuration": m.name} for m in all_measured],
-        about={name: {"joints": of_configuration["joints"]} for name, of_configuration in found.items()},
+        about={name: {"joints": of["joints"]} for name, of in found.items()},
         differences=differences,
-        against_published=[*ours, *published_differences("error", on_training, published), *of_release],
+        against_published=beside,
     )
 
 
 def tables(compared: Json) -> dict[str, list[Row]]:
-    """Name -> rows of a CSV table: the errors of every clip in every configuration; Tables A.4 and A.5.
-
-    compared: the content of compare.json.
-    """
-    rows: list[Row] = [
-        {"configuration": entry["configuration"], **{key: clip.get(key) for key in CLIP_COLUMNS}}
-        for entry in compared["accuracy"]
-        for clip in entry["clips"]
-    ]
-    return {"accuracy": rows, "published-clips": published_clip_rows(compared)}
+    """Name -> rows of a CSV table: the errors of every clip in every configuration; Tables A.4 and A.5."""
+    clips = measure.flat_rows(compared["accuracy"], "clips", "configuration")
+    return {"accuracy": clips, "published-clips": published_clip_rows(compared)}
 
 
 def published_clip_rows(compared: Json) -> list[Row]:
@@ -296,31 +270,12 @@ def published_clip_rows(compared: Json) -> list[Row]:
     rows: list[Row] = []
     for name, means in published["clip_means"].items():
         sds = published["clip_sds"].get(name, [None] * len(means))  # table A.5 has none for AVA
-        for index, (clip, *theirs) in enumerate(zip(published_clips(published), means, sds, strict=True)):
-            found = ours.get((name, clip), {})
+        clips = compare.published_clips(published)
+        for index, (clip, mean, sd) in enumerate(zip(clips, means, sds, strict=True)):
             row = {"index": index, "clip": clip, "configuration": name}
-            row |= dict(zip(("published_mean", "published_sd"), theirs, strict=True))
-            rows.append(row | {key: found.get(key) for key in ("mean", "sd")})
+            row |= {"published_mean": mean, "published_sd": sd}
+            rows.append(row | {key: ours.get((name, clip), {}).get(key) for key in ("mean", "sd")})
     return rows
-
-
-def accuracy_differences(found: Mapping[str, Json]) -> list[dict[str, Any]]:
-    """The difference between the errors of each two configurations, by eq. 3.2 of Segerstedt 2021.
-
-    There is a row for each split and each clip on which both configurations were measured. `over` is the name
-    of this split or clip. found: configuration -> content of its accuracy.json.
-    """
-    series = {
-        name: {split: {**of[split], "means": clip_means(of, split)} for split in SPLITS}
-        | {entry["clip"]: entry for entry in of["clips"]}
-        for name, of in found.items()
-    }
-    return [
-        {"a": a, "b": b, "over": over, **compare_series(series[a][over], series[b][over])}
-        for a, b in combinations(series, 2)
-        for over in series[a]
-        if over in series[b] and series[a][over]["frames"] and series[b][over]["frames"]
-    ]
 
 
 def clip_means(found: Json, split: str) -> list[float]:
@@ -331,26 +286,25 @@ def clip_means(found: Json, split: str) -> list[float]:
 
 def compared_section(compared: Compared) -> PageSection:
     """The spread of the errors, differences between configurations, and errors of single clips."""
-    clips = table(
-        "compare-published-clips", published_clip_rows(compared), title=words("accuracy.published-clips")
-    )
-    parts = [
+    rows, title = published_clip_rows(compared), words("accuracy.published-clips")
+    shown = [
         SectionPart(10, error_boxes(compared)),
         SectionPart(30, difference_map(compared)),
         SectionPart(50, clip_lines(compared)),
-        SectionPart(60, clips),
+        SectionPart(60, table("compare-published-clips", rows, title=title)),
     ]
-    return PageSection("accuracy", parts, title="Accuracy", order=10, long=True)
+    return PageSection("accuracy", shown, title="Accuracy", order=10, long=True)
 
 
-def compared_columns(compared: Compared) -> Iterator[OverviewColumn]:
-    """Columns for the table of configurations: the error on each split, and the number of measured joints."""
+def compared_values(compared: Compared) -> Iterator[parts.ComparedValue]:
+    """The error on each split, and the number of measured joints."""
     entries = {entry["configuration"]: entry for entry in compared["accuracy"]}
     for order, split, label in ((10, "held_out", "held-out error"), (20, "train", "training error")):
         values = {name: entry[split]["mean"] for name, entry in entries.items()}
-        yield OverviewColumn(order, Column(label, lambda value: f"{100 * value:.2f} %", "n"), values)
+        column = parts.Column(label, lambda value: f"{100 * value:.2f} %", "n")
+        yield parts.ComparedValue(order, column, values)
     joints = {name: entry["joints"] for name, entry in entries.items()}
-    yield OverviewColumn(70, Column.count("joints"), joints)
+    yield parts.ComparedValue(70, parts.Column.count("joints"), joints)
 
 
 def error_boxes(compared: Compared) -> Chart:
@@ -358,15 +312,16 @@ def error_boxes(compared: Compared) -> Chart:
 
     With a value for each clip, boxes are of the means of clips, published ones beside ours.
     """
-    colours, options = configuration_colours(compared), {}
-    published = [row for row in compared["published"]["accuracy"] if row["configuration"] in colours]
-    marks = marker_trace(
+    colours, options = parts.configuration_colours(compared), {}
+    published = {row["configuration"]: 100 * row["mean"] for row in compared["published"]["accuracy"]}
+    marks = parts.marker_trace(
         "published mean",
-        [row["configuration"] for row in published],
-        [100 * row["mean"] for row in published],
+        [name for name in published if name in colours],
+        [mean for name, mean in published.items() if name in colours],
         {"symbol": "diamond-open", "size": 10, "color": "@ink"},
         hovertemplate="%{x}: %{y:.2f} % published<extra></extra>",
     )
+    their_clips = compared["published"]["clip_means"]
     for split, label in SPLIT_LABELS.items():
         of_split = {e["configuration"]: e for e in compared["accuracy"] if e[split]["mean"] is not None}
         if not of_split:
@@ -374,16 +329,13 @@ def error_boxes(compared: Compared) -> Chart:
         options[label] = [
             quantile_boxes(name, [entry[split]], colours[name], colours[name], x=[name], boxmean=True)
             for name, entry in of_split.items()
-        ] + [marks] * bool(published)
-        options[f"{label}, a value for each clip"] = [
-            boxes(f"{name}, {whose}", colour, y=[100 * mean for mean in means], boxmean=True)
-            for name, entry in of_split.items()
-            for whose, means, colour in (
-                ("ours", clip_means(entry, split), "@accent"),
-                ("published", compared["published"]["clip_means"].get(name, ()), "@muted"),
-            )
-            if len(means)
-        ]
+        ] + [marks] * bool(marks["x"])
+        means = {name: clip_means(entry, split) for name, entry in of_split.items()}
+        of_clips, theirs = (
+            {name: [100 * v for v in values] for name, values in each.items()}
+            for each in (means, their_clips)
+        )
+        options[f"{label}, a value for each clip"] = ours_and_published(list(of_split), of_clips, theirs)
     layout = {"yaxis": ERROR_AXIS, "showlegend": False}
     return chart("compare-boxes", layout=layout, height=400, choose="Clips", options=options)
 
@@ -393,50 +345,42 @@ def clip_lines(compared: Compared) -> Chart | None:
 
     Our clips that are not among his 80 come first. Dotted lines are the published ones.
     """
-    published, colours = compared["published"], configuration_colours(compared)
-    their_clips = published_clips(published)
+    published, colours = compared["published"], parts.configuration_colours(compared)
+    their_clips = compare.published_clips(published)
     measured = {(row["split"], row["clip"]) for entry in compared["accuracy"] for row in entry["clips"]}
     if not measured:
         return None
     order = [clip for _, clip in sorted(measured) if clip not in their_clips]
     if set(colours) & set(published["clip_means"]) or {clip for _, clip in measured} & set(their_clips):
         order += their_clips
-    options: dict[str, list[Trace]] = {}
+    options: dict[str, list[Trace]] = {"mean": [], "standard deviation": []}
     hover = {"hovertemplate": "%{x}: %{y:.2f} %<extra>%{fullData.name}</extra>"}
-    for label, key, theirs in (("mean", "mean", "clip_means"), ("standard deviation", "sd", "clip_sds")):
-        lines = options.setdefault(label, [])
+    for lines, key, theirs in zip(options.values(), ("mean", "sd"), ("clip_means", "clip_sds"), strict=True):
         for entry in compared["accuracy"]:
             name, colour = entry["configuration"], colours[entry["configuration"]]
             rows = {r["clip"]: 100 * r.get("as_published", r)[key] for r in _measured(entry)}
-            known = [clip for clip in order if clip in rows]
-            ours = [rows[clip] for clip in known]
-            lines.append(line_trace(name, known, ours, colour, mode="lines+markers", **hover))
+            known = {clip: rows[clip] for clip in order if clip in rows}
+            style = {"mode": "lines+markers", **hover}
+            lines.append(parts.line_trace(name, list(known), list(known.values()), colour, **style))
             if values := published[theirs].get(name):
                 y, dotted = [100 * value for value in values], {"dash": "dot", "width": 1.3, **hover}
-                lines.append(line_trace(f"{name}, published", their_clips, y, colour, **dotted))
-    x = {"type": "category", **ordered_axis(order), "showticklabels": len(order) < 40}
+                lines.append(parts.line_trace(f"{name}, published", their_clips, y, colour, **dotted))
+    x = {"type": "category", **parts.ordered_axis(order), "showticklabels": len(order) < 40}
     layout = {"xaxis": x, "yaxis": ERROR_AXIS}
     return chart("compare-clips", layout=layout, height=420, choose="Shown", options=options)
 
 
 def difference_map(compared: Compared) -> Chart:
     """The difference of each two configurations. A menu selects the split and the kind of deviation."""
-    names, options = configuration_names(compared), {}
+    names, options = parts.configuration_names(compared), {}
     hover, look = "%{y} and %{x}: %{z:.3f}<extra></extra>", {"texttemplate": "%{z:.2f}", "xgap": 3, "ygap": 3}
     for (split, label), (key, kind) in product(SPLIT_LABELS.items(), DEVIATIONS.items()):
         # compare.json has each pair in one order only.
-        values = {
-            pair: r[key]
-            for r in compared["difference"]
-            if r["over"] == split
-            for pair in ((r["a"], r["b"]), (r["b"], r["a"]))
-        }
+        values = {frozenset((r["a"], r["b"])): r[key] for r in compared["difference"] if r["over"] == split}
         if any(value is not None for value in values.values()):
-            cells = [[values.get((a, b)) for b in names] for a in names]
-            options[f"{label}, {kind}"] = [heatmap(names, names, cells, hover, **look)]
-    layout = {
-        "xaxis": {"type": "category"},
-        "yaxis": {"type": "category", "autorange": "reversed", "automargin": True},
-    }
+            cells = [[values.get(frozenset((a, b))) for b in names] for a in names]
+            options[f"{label}, {kind}"] = [parts.heatmap(names, names, cells, hover, **look)]
+    category = {"type": "category"}
+    layout = {"xaxis": category, "yaxis": {**category, "autorange": "reversed", "automargin": True}}
     height, choose = max(240, 90 + 42 * len(names)), "Clips and deviation"
     return chart("compare-difference", layout=layout, height=height, choose=choose, options=options)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,13 +17,11 @@ import numpy as np
 
 from hobble.core.errors import HobbleError, InputError
 from hobble.core.quat import Array
-from hobble.database.statistics import Moments
-from hobble.measures.measure import SPLITS, JointOptions, MeasureInputs, Outcome, Row
-from hobble.measures.sample import Sample, clip_parts, sample_to_measure, with_sample
-from hobble.measures.walks import mean_of_known
+from hobble.measures import sample as samples
+from hobble.measures.measure import SPLITS, JointOptions, MeasureInputs, Outcome, flat_rows
 from hobble.models.load import load_network
 from hobble.models.network import Network
-from hobble.rows.clip_rows import ClipRows, Excerpt, pair_batches
+from hobble.rows.clip_rows import ClipRows, pair_batches
 from hobble.rows.layout import RowLayout
 from hobble.runtime.error_calculator import relative_and_distance
 
@@ -39,51 +37,12 @@ BATCH = 256  # frames predicted in one call; the inputs of more frames do not fi
 PUBLISHED_POSITIONS = 500_000
 # With the option `joints: equivalent`, only joints with a counterpart on this skeleton are measured.
 REFERENCE = "holden31"
-# Keys of the errors that have a confidence interval, if only a sample was measured.
-WITH_INTERVAL = ("mean", "position_error_cm")
 QUANTILES = {"p05": 0.05, "p25": 0.25, "p50": 0.5, "p75": 0.75, "p95": 0.95}
-# Columns of the table of clips.
-COLUMNS = ("clip", "split", "frames", "mean", "sd", "position_error_cm", *QUANTILES)
 # Edges of the bins of the relative error, each 2 % above the one before. Quantiles are read from the bins, so
 # that the errors of single frames need not be stored.
 EDGES = np.concatenate([[0.0], np.geomspace(1e-4, 1e2, 701)])
 
 log = logging.getLogger("hobble")
-
-
-@dataclass(frozen=True)
-class Errors:
-    """The relative errors and the position errors (cm) of the joints in `frames` frames.
-
-    moments: weighted mean and variance of two columns, the relative error and the position error. histogram:
-    (bins,) total weight of the relative errors in each bin between two EDGES.
-    """
-
-    frames: int = 0
-    moments: Moments = field(default_factory=lambda: Moments.of_no_rows(2), repr=False)
-    histogram: Array = field(default_factory=lambda: np.zeros(len(EDGES) - 1), repr=False)
-
-    def __add__(self, other: Errors) -> Errors:
-        return Errors(
-            self.frames + other.frames, self.moments + other.moments, self.histogram + other.histogram
-        )
-
-    def quantile(self, share: float) -> float:
-        """The relative error below which `share` of all errors lie, accurate to about 1 % of its value."""
-        below = np.concatenate([[0.0], np.cumsum(self.histogram)])  # weight of the errors below each of EDGES
-        return float(np.interp(share * below[-1], below, EDGES))
-
-    def to_dict(self) -> dict[str, Any]:
-        """Plain data for accuracy.json, with quantiles of the relative error; None if there was no frame."""
-        if not self.frames:
-            return {"frames": 0, "mean": None, "sd": None, "position_error_cm": None}
-        return {
-            "frames": self.frames,
-            "mean": float(self.moments.mean[0]),
-            "sd": float(self.moments.std[0]),
-            "position_error_cm": float(self.moments.mean[1]),
-            **{name: self.quantile(share) for name, share in QUANTILES.items()},
-        }
 
 
 def joint_errors(layout: RowLayout, truth: Array, predicted: Array, joints: Sequence[int]) -> Array:
@@ -130,29 +89,29 @@ def at_stored_phases(network: Network, predict: Predict) -> Predict:
     return predict_stored
 
 
-def clip_errors(
-    network: Network,
-    rows: ClipRows,
-    joints: Sequence[int],
-    predict: Predict | None = None,
-    first: int | None = None,
-) -> Errors:
-    """The errors in all frames of a clip.
+def clip_sums(network: Network, rows: ClipRows, joints: Sequence[int], predict: Predict) -> Array:
+    """(n,) sums over the frames of a clip: those of `errors_of_sums`, then the weight of each bin of EDGES.
 
     A frame may have several terrain fits (ground heights that suit the motion). It is predicted on each of
-    them and counts once, with its mean error. joints: indices of the joints to measure. predict: how to
-    evaluate the network; by default `Network.predict`. first: only so many rows, from the beginning.
+    them and counts once, with its mean error. joints: indices of the joints to measure.
     """
-    layout, predict = network.layout, predict or network.predict
-    total, histogram = Moments.of_no_rows(2), np.zeros(len(EDGES) - 1)
-    rows = rows if first is None or len(rows) <= first else rows.part(slice(first))
-    for pairs in pair_batches(rows, layout):
-        errors = joint_errors(layout, pairs.y, predict(pairs.x, pairs.p), joints)
+    sums, bins = np.zeros(4), np.zeros(len(EDGES) - 1)
+    for pairs in pair_batches(rows, network.layout):
+        relative, cm = (
+            joint_errors(network.layout, pairs.y, predict(pairs.x, pairs.p), joints).reshape(-1, 2).T
+        )
         weights = np.repeat(pairs.weight / len(joints), len(joints))  # all weights of a frame add up to 1
-        errors = errors.reshape(-1, 2)
-        total = total + Moments.of_rows(errors, weights)
-        histogram += np.histogram(np.minimum(errors[:, 0], EDGES[-1]), EDGES, weights=weights)[0]
-    return Errors(len(rows), total, histogram)
+        sums += (weights * [np.ones_like(cm), relative, relative**2, cm]).sum(axis=1)
+        bins += np.histogram(np.minimum(relative, EDGES[-1]), EDGES, weights=weights)[0]
+    return np.concatenate([sums, bins])
+
+
+def values_of_sums(sums: Array) -> dict[str, Any]:
+    """Plain data for accuracy.json from `clip_sums`. Quantiles are right to about 1 %."""
+    below = np.concatenate([[0.0], np.cumsum(sums[4:])])  # weight of the errors below each of EDGES
+    quantiles = np.interp(np.array([*QUANTILES.values()]) * below[-1], below, EDGES)
+    known = quantiles.tolist() if sums[0] else [None] * len(QUANTILES)
+    return samples.errors_of_sums(sums) | dict(zip(QUANTILES, known, strict=True))
 
 
 def measure_accuracy(
@@ -161,7 +120,7 @@ def measure_accuracy(
     splits: Mapping[str, str],
     configuration: str,
     joint_names: Sequence[str] | None = None,
-    sample: Sample | None = None,
+    sample: samples.Sample | None = None,
 ) -> dict[str, Any]:
     """The content of accuracy.json: errors over the frames of each split, and of each clip, sorted by name.
 
@@ -176,47 +135,36 @@ def measure_accuracy(
     network = load_network(weights)
     joints, predict = joint_indices(network, joint_names), predict_function(network)
     constant, first_frames = at_stored_phases(network, predict), PUBLISHED_POSITIONS // network.layout.joints
-    of_clip: dict[str, Errors] = {}
-    as_published: dict[str, dict[str, Any]] = {}
-    excerpts: dict[Excerpt, dict[str, Any]] = {}
-    for part in clip_parts(clips, sample):
+    sums: dict[samples.ClipPart, Array] = {}
+    published, excerpts = {}, []
+    for part in samples.clip_parts(clips, sample):
         rows = part.load().rows
         check_layout(part.path, rows, network)
-        errors = clip_errors(network, rows, joints, predict)
-        of_clip[part.clip] = of_clip.get(part.clip, Errors()) + errors
-        values = errors.to_dict()
-        if part.excerpt is None:
-            published = clip_errors(network, rows, joints, constant, first_frames).to_dict()
-            as_published[part.clip] = {key: published[key] for key in ("frames", "mean", "sd")}
+        sums[part] = clip_sums(network, rows, joints, predict)
+        values = values_of_sums(sums[part])
+        log.info("%s: %s", part.excerpt or part.clip, values)
+        if sample is None:
+            of_first = clip_sums(network, rows.part(slice(first_frames)), joints, constant)
+            found = samples.errors_of_sums(of_first)
+            published[part.clip] = {key: found[key] for key in ("frames", "mean", "sd")}
         else:
             place = {"first_frame": int(rows.frame[0]), "last_frame": int(rows.frame[-1])}
-            excerpts[part.excerpt] = {"clip": part.clip, "split": splits[part.clip], **place, **values}
-        log.info("%s: %s", part.excerpt or part.clip, values)
-    entries = [
-        {"clip": name, "split": splits[name], **errors.to_dict()}
-        | ({"as_published": as_published[name]} if sample is None else {})
-        for name, errors in of_clip.items()
-    ]
-    result: dict[str, Any] = {"configuration": configuration, "joints": len(joints), "clips": entries}
+            excerpts.append({"clip": part.clip, "split": splits[part.clip], **place, **values})
+    result = samples.summed_up(sums, splits, sample, values_of_sums, {"mean": 1, "position_error_cm": 3})
     for split in SPLITS:
-        total = sum((errors for name, errors in of_clip.items() if splits[name] == split), Errors())
-        own = [e for e in entries if e["split"] == split and e["mean"] is not None]
-        mean = mean_of_known([e["mean"] for e in own], 15)
-        result[split] = {**total.to_dict(), "clips": len(own), "mean_of_clips": mean}
+        own = {part: s[1] / s[0] for part, s in sums.items() if splits[part.clip] == split and s[0]}
+        # The mean over clips, of which each has as much weight as there is of it in the sample.
+        mean = float(np.average([*own.values()], weights=[part.share for part in own])) if own else None
+        result[split] |= {"clips": len({part.clip for part in own}), "mean_of_clips": mean}
         if sample is None:
-            means = [e["as_published"]["mean"] for e in own]
+            means = [published[part.clip]["mean"] for part in own]
             sd = float(np.std(means, ddof=1)) if len(means) > 1 else None
-            result[split]["as_published"] = {"mean_of_clips": mean_of_known(means, 15), "sd_of_clips": sd}
-        elif drawn := sample.splits.get(split):
-            # The mean over clips, of which each has as much weight as there is of it in the sample.
-            shares = [excerpt.rows / excerpt.clip_rows for excerpt in drawn.drawn]
-            means = [excerpts[excerpt]["mean"] for excerpt in drawn.drawn]
-            result[split]["mean_of_clips"] = float(np.average(means, weights=shares))
-            result[split]["interval"] = {
-                key: drawn.confidence_half_width({e: excerpts[e][key] for e in drawn.drawn})
-                for key in WITH_INTERVAL
-            }
-    return {**with_sample(result, sample), **({"excerpts": list(excerpts.values())} if sample else {})}
+            mean = float(np.mean(means)) if means else None
+            result[split]["as_published"] = {"mean_of_clips": mean, "sd_of_clips": sd}
+    for clip in result["clips"] if sample is None else ():
+        clip["as_published"] = published[clip["clip"]]
+    result = {"configuration": configuration, "joints": len(joints), **result}
+    return {**samples.with_sample(result, sample), **({"excerpts": excerpts} if sample else {})}
 
 
 def joints_to_measure(inputs: MeasureInputs, options: JointOptions) -> list[str] | None:
@@ -261,16 +209,11 @@ def check_layout(where: str | Path, rows: ClipRows, network: Network) -> None:
         )
 
 
-def clips_table(result: Mapping[str, Any]) -> list[Row]:
-    """The entries of the clips as rows of a table. Each row has all COLUMNS; a missing value is None."""
-    return [{key: clip.get(key) for key in COLUMNS} for clip in result["clips"]]
-
-
 def run(inputs: MeasureInputs, options: Options) -> Outcome:
     """accuracy.json, and the tables `clips` and, if a sample was measured, `excerpts`, with their errors."""
-    joints, sample = joints_to_measure(inputs, options), sample_to_measure(inputs, options)
+    joints, sample = joints_to_measure(inputs, options), samples.sample_to_measure(inputs, options)
     result = measure_accuracy(
         inputs.weights, inputs.clips, inputs.splits, inputs.configuration, joints, sample
     )
     excerpts = {"excerpts": result.pop("excerpts")} if sample else {}
-    return Outcome(result, {"clips": clips_table(result), **excerpts})
+    return Outcome(result, {"clips": flat_rows([result], "clips"), **excerpts})

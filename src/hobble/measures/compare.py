@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import combinations
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +12,7 @@ import numpy as np
 import yaml
 
 from hobble.core.files import Json, read_json, read_numbers
-from hobble.measures.measure import Row, functions
+from hobble.measures.measure import Row, flatten, functions
 from hobble.models import network_options
 
 
@@ -35,10 +36,8 @@ def fit_line(x: Sequence[float], y: Sequence[float]) -> dict[str, Any]:
     """
     if len(set(x)) < 2:
         return {"slope": None, "intercept": None, "r2": None, "points": len(x)}
-    slope, intercept = np.polyfit(np.asarray(x, float), np.asarray(y, float), 1)
-    rest = np.asarray(y) - (intercept + slope * np.asarray(x, float))
-    spread = float(np.sum((np.asarray(y) - np.mean(y)) ** 2))
-    r2 = 1 - float(np.sum(rest**2)) / spread if spread > 0 else None
+    slope, intercept = np.polyfit(x, y, 1)
+    r2 = float(np.corrcoef(x, y)[0, 1] ** 2) if len(set(y)) > 1 else None
     return {"slope": float(slope), "intercept": float(intercept), "r2": r2, "points": len(x)}
 
 
@@ -69,7 +68,12 @@ class ConfigurationResults:
         return self.resolved["configuration"]["dataset"]
 
     def stage_value(self, stage: str, key: str) -> float | None:
-        """The value "seconds" or "bytes" of a stage in pipeline.json; None if it does not list the stage."""
+        """The value "seconds" or "bytes" of a stage in pipeline.json; None if it does not list the stage.
+
+        The bytes of the database are those of its rows, without reports on the clips.
+        """
+        if (stage, key) == ("database", "bytes"):
+            return (self.pipeline.get("database") or {}).get("bytes")
         return next((s[key] for s in self.pipeline["stages"] if s["stage"] == stage), None)
 
 
@@ -124,6 +128,19 @@ def compare_series(a: Json, b: Json) -> dict[str, Any]:
     }
 
 
+def pair_differences(series: Mapping[str, Mapping[str, Json]]) -> list[dict[str, Any]]:
+    """`compare_series` of each two configurations, over each thing that both measured.
+
+    series: configuration -> split, clip or phase mode -> its series.
+    """
+    return [
+        {"a": a, "b": b, "over": over, **compare_series(series[a][over], series[b][over])}
+        for a, b in combinations(series, 2)
+        for over in series[a]
+        if over in series[b]
+    ]
+
+
 def mean_and_sd(values: Sequence[float]) -> tuple[float | None, float | None]:
     """Mean and standard deviation (n - 1) of a sample; None for those that need more values."""
     mean = float(np.mean(values)) if len(values) else None
@@ -149,6 +166,16 @@ def published_row(
         "table": row.get("table"),
         "other_figure": row.get("other_figure", row.get("slip")),
     }
+
+
+def beside_ours(
+    measure: str, rows: Iterable[Json], key: str, ours: Mapping[str, float | None], unit: str = ""
+) -> list[dict[str, Any]]:
+    """The `published_row` of each of `rows`, entries of published.yaml with their number under `key`.
+
+    ours: configuration -> our number. Configurations that we did not measure may be missing.
+    """
+    return [published_row(measure, row, row[key], ours.get(row["configuration"]), unit) for row in rows]
 
 
 def published_clips(published: Json) -> list[str]:
@@ -212,18 +239,14 @@ def published_costs(all_measured: Sequence[ConfigurationResults], published: Jso
     The bytes of the training are those of the network's weights, which `responsivity` compares.
     """
     by_name = {m.name: m for m in all_measured}
-    sizes, times = [], []
+    rows: dict[str, list[Row]] = {"bytes": [], "s": []}
     for row in published["stages"]:
         m, stage = by_name.get(row["configuration"]), row["stage"]
-        if "bytes" in row and stage != "training":
-            ours = m.stage_value(stage, "bytes") if m else None
-            if m and stage == "database":
-                ours = (m.pipeline.get("database") or {}).get("bytes")
-            sizes.append(published_row(row["what"], row, row["bytes"], ours, "bytes"))
-        if "seconds" in row:
-            ours = m.stage_value(stage, "seconds") if m else None
-            times.append(published_row(f"{stage}, time", row, row["seconds"], ours, "s"))
-    return ComparisonAddition(against_published=sizes, milliseconds={"against_published": times})
+        for key, unit, what in (("bytes", "bytes", row.get("what")), ("seconds", "s", f"{stage}, time")):
+            if key in row and (stage, key) != ("training", "bytes"):
+                ours = m.stage_value(stage, key) if m else None
+                rows[unit].append(published_row(what, row, row[key], ours, unit))
+    return ComparisonAddition(against_published=rows["bytes"], milliseconds={"against_published": rows["s"]})
 
 
 def published_differences(over: str, rows: Sequence[Json], published: Json) -> list[dict[str, Any]]:
@@ -232,17 +255,17 @@ def published_differences(over: str, rows: Sequence[Json], published: Json) -> l
     over: key of published.yaml, "error" or "milliseconds". rows: ours, of the training clips or of the phase
     mode `constant`.
     """
-    ours = {frozenset((row["a"], row["b"])): row["difference_of_means"] for row in rows}
-    return [
-        published_row(
-            f"eq. 3.2, {over}",
-            {**row, "configuration": f"{row['a']} to {row['b']}"},
-            row["value"],
-            ours.get(frozenset((row["a"], row["b"]))),
-        )
+    ours = {
+        f"{a} to {b}": row["difference_of_means"]
+        for row in rows
+        for a, b in ((row["a"], row["b"]), (row["b"], row["a"]))
+    }
+    theirs = [
+        {**row, "configuration": f"{row['a']} to {row['b']}"}
         for row in published["differences"]
         if row["over"] == over
     ]
+    return beside_ours(f"eq. 3.2, {over}", theirs, "value", ours)
 
 
 def comparison_tables(compared: Json) -> dict[str, Sequence[Row]]:
@@ -265,14 +288,6 @@ def comparison_tables(compared: Json) -> dict[str, Sequence[Row]]:
         ],
         "published": [*compared["against_published"], *compared["milliseconds"]["against_published"]],
     }
-
-
-def flatten(row: Row) -> Row:
-    """The row without mappings as values: the entry `b` of a mapping under the key `a` gets the key `a_b`."""
-    out: dict[str, object] = {}
-    for key, value in row.items():
-        out |= {f"{key}_{k}": v for k, v in value.items()} if isinstance(value, Mapping) else {key: value}
-    return out
 
 
 def _training(compared: Json) -> list[Row]:

@@ -2,35 +2,23 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from hobble.report.gather import ReportMaterial
-
 from collections.abc import Iterator, Sequence
-from functools import partial
+from typing import TYPE_CHECKING
 
 from pydantic import Field
 
 from hobble.core.files import Json
 from hobble.core.section import Positive, Section
+from hobble.measures import measure
 from hobble.measures.compare import ComparisonAddition, ConfigurationResults
-from hobble.measures.measure import Cost, Measure, Row
-from hobble.measures.shown import words
-from hobble.report.parts import (
-    Column,
-    Compared,
-    Hint,
-    OverviewColumn,
-    PageSection,
-    Paragraph,
-    SectionPart,
-    Table,
-    Verdict,
-    format_number,
-    verdict_on_lowest,
-)
+from hobble.measures.measure import Row
+from hobble.measures.shown import table, words
+from hobble.report import parts
+from hobble.report.parts import Compared, Hint, PageSection, SectionPart
 from hobble.runtime.options import Runtime
+
+if TYPE_CHECKING:
+    from hobble.report.gather import ReportMaterial
 
 
 class Options(Section):
@@ -40,13 +28,13 @@ class Options(Section):
     field_seconds: Positive = Field(30, description="seconds of the straight walk")
 
 
-MEASURE = Measure(
+MEASURE = measure.Measure(
     name="field",
     module=__name__,
-    inputs=("weights", "clips", "published"),
+    inputs=("weights", "clips"),
     options=Options,
     runtime=tuple(Runtime.model_fields),
-    cost=Cost(memory_mb=300, mb_per_1000_frames=10, seconds_per_1000_frames=1.0, least_minutes=30),
+    cost=measure.Cost(memory_mb=300, mb_per_1000_frames=10, seconds_per_1000_frames=1.0, least_minutes=30),
 )
 
 # Measure -> its name and unit. Measures of motion are also measured of captured motion.
@@ -60,8 +48,22 @@ OF_MOTION = {
     "frechet": "Frechet distance, variance of captured windows",
     "diversity": "diversity of windows, spread of captured windows",
 }
-PATHS = ("circle", "square", "star")
-GAITS = {"walk": "from standing to 1.2 m/s, s", "jog": "from standing to 4.2 m/s, s"}
+OF_PATHS = {
+    f"paths_{path}_{unit}": label.format(path)
+    for path in ("circle", "square", "star")
+    for unit, label in (("cm", "distance from a {}, cm"), ("degrees", "angle to a {}, degrees"))
+}
+OF_RESPONSE = {
+    "response_walk": "from standing to 1.2 m/s, s",
+    "response_jog": "from standing to 4.2 m/s, s",
+}
+HEADS = {
+    "measure": "measure",
+    "straight": "straight walk",
+    "asked": "as asked",
+    "captured": "captured",
+    "published": "published, other bodies and data",
+}
 # More than this many times the captured motion's value is worth a hint.
 MUCH_MORE = 1.3
 WORTH_A_HINT = {"skating_cm": "feet skate", "jerk": "joints jerk"}
@@ -72,38 +74,33 @@ def section(found: Json, material: ReportMaterial) -> PageSection:
     if "straight" not in found:
         return PageSection("field", [])
     clips = "held-out" if found["split"] == "held_out" else "training"
-    parts = [
-        SectionPart(10, Paragraph(words("field.introduction", stretches=found["stretches"], clips=clips))),
-        SectionPart(20, Table("field", COLUMNS, rows(found), "Measures of the field"), open=True),
+    shown = [
+        SectionPart(
+            10, parts.Paragraph(words("field.introduction", stretches=found["stretches"], clips=clips))
+        ),
+        SectionPart(
+            20,
+            table("field", rows(found, material.published["field"]), HEADS, "Measures of the field"),
+            open=True,
+        ),
     ]
-    return PageSection("field", parts, title="Measures of the field", order=35)
+    return PageSection("field", shown, title="Measures of the field", order=35)
 
 
-COLUMNS = [
-    Column("measure"),
-    *map(Column.number, ("straight walk", "as asked", "captured")),
-    Column("published, other bodies and data"),
-]
-
-
-def rows(found: Json) -> list[list[object]]:
-    """The rows of the table: measure, straight walk, as asked, captured, published."""
-    asked = found["asked"] or {"character": {}, "captured": {}}
-    published = {row["measure"]: row for row in found["published"]}
-    out: list[list[object]] = [
-        [name, found["straight"].get(key), asked["character"].get(key), asked["captured"].get(key), key]
-        for key, name in OF_MOTION.items()
+def rows(found: Json, published: Sequence[Json]) -> list[Row]:
+    """A row for each measure: the character's values, captured people's, and a published one (see HEADS)."""
+    values = measure.flatten(found)
+    theirs = {row["measure"]: f"{row['value']} ({row['source']})" for row in published}
+    return [
+        {
+            "measure": name,
+            "straight": values.get(f"straight_{key}", values.get(key)),
+            "asked": values.get(f"asked_character_{key}"),
+            "captured": values.get(f"asked_captured_{key}"),
+            "published": theirs.get(key, ""),
+        }
+        for key, name in (OF_MOTION | OF_PATHS | OF_RESPONSE).items()
     ]
-    for path in PATHS:
-        for unit, label in (("cm", "distance from a {}, cm"), ("degrees", "angle to a {}, degrees")):
-            out.append([label.format(path), found["paths"][path][unit], None, None, f"{path}_{unit}"])
-    out += [[label, found["response"][gait], None, None, f"response_{gait}"] for gait, label in GAITS.items()]
-    return [[*row[:-1], _published_words(published.get(str(row[-1])))] for row in out]
-
-
-def _published_words(row: Json | None) -> str:
-    """A published value with its source, or ""."""
-    return f"{row['value']} ({row['source']})" if row else ""
 
 
 def hints(found: Json, material: ReportMaterial) -> Iterator[Hint]:
@@ -112,36 +109,19 @@ def hints(found: Json, material: ReportMaterial) -> Iterator[Hint]:
     for key, faults in WORTH_A_HINT.items():
         mine, theirs = (asked.get(who, {}).get(key) for who in ("character", "captured"))
         if mine and theirs and mine > MUCH_MORE * theirs:
-            yield Hint(
-                "note",
-                f"The character's {faults} more than captured people's.",
-                f"{OF_MOTION[key]}: {format_number(mine)} against {format_number(theirs)}. "
-                + words(f"field.{key}"),
-                order=40,
-            )
+            beside = f"{parts.format_number(mine)} against {parts.format_number(theirs)}."
+            text = f"{OF_MOTION[key]}: {beside} {words(f'field.{key}')}"
+            yield Hint("note", f"The character's {faults} more than captured people's.", text, order=40)
 
 
 def compared(all_measured: Sequence[ConfigurationResults], published: Json) -> ComparisonAddition:
-    """An entry for each configuration that was measured."""
-    return ComparisonAddition(
-        entries=[
-            {"configuration": m.name, **_flat(m.results_of("field"))}
-            for m in all_measured
-            if m.results_of("field").get("straight")
-        ]
-    )
-
-
-def _flat(found: Json) -> Json:
-    """The values of one configuration by name, without those of captured motion."""
-    paths = {f"{path}_{unit}": value for path, of in found["paths"].items() for unit, value in of.items()}
-    asked = (found["asked"] or {}).get("character", {})
-    return {
-        **found["straight"],
-        **{f"asked_{key}": value for key, value in asked.items()},
-        **paths,
-        **{f"response_{gait}": value for gait, value in found["response"].items()},
-    }
+    """The values of each configuration by name."""
+    entries = []
+    for m in all_measured:
+        if (found := m.results_of("field")).get("straight"):
+            values = {key: found[key] for key in ("straight", "asked", "paths", "response")}
+            entries.append({"configuration": m.name, **measure.flatten(values)})
+    return ComparisonAddition(entries=entries)
 
 
 def tables(compared: Json) -> dict[str, list[Row]]:
@@ -149,25 +129,14 @@ def tables(compared: Json) -> dict[str, list[Row]]:
     return {"field": compared["field"]}
 
 
-def compared_columns(compared: Compared) -> Iterator[OverviewColumn]:
-    """Skating, the circle and the Frechet distance of each configuration."""
-    for order, (key, label) in enumerate(
-        (("skating_cm", "skating, cm"), ("circle_cm", "off a circle, cm"), ("asked_frechet", "Frechet"))
+def compared_values(compared: Compared) -> Iterator[parts.ComparedValue]:
+    """Skating, with the cleanest feet, the circle, with who is closest to it, and the Frechet distance."""
+    skating = "Cleanest feet", "{name} has {value} cm a frame in a straight walk"
+    circle = "Closest to a circle", "{name} has {value} cm from it on average"
+    for order, key, label, verdict in (
+        (60, "straight_skating_cm", "skating, cm", skating),
+        (61, "paths_circle_cm", "off a circle, cm", circle),
+        (62, "asked_character_frechet", "Frechet", ()),
     ):
         values = {row["configuration"]: row.get(key) for row in compared.get("field", ())}
-        yield OverviewColumn(60 + order, Column.number(label), values)
-
-
-def compared_verdicts(compared: Compared) -> Iterator[Verdict]:
-    """Which configuration's feet skate least, and which follows a circle most closely."""
-    for order, head, key, ending in (
-        (41, "Cleanest feet", "skating_cm", "cm a frame in a straight walk"),
-        (42, "Closest to a circle", "circle_cm", "cm from it on average"),
-    ):
-        values = {row["configuration"]: row.get(key) for row in compared.get("field", ())}
-        yield from verdict_on_lowest(order, head, values, partial(_value_words, ending))
-
-
-def _value_words(ending: str, name: str, value: float) -> str:
-    """Half of a sentence on the configuration `name`."""
-    return f"{name} has {format_number(value, 3)} {ending}"
+        yield parts.ComparedValue(order, parts.Column.number(label), values, *verdict)

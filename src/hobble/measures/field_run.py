@@ -278,6 +278,5 @@ def run(inputs: MeasureInputs, options: Options) -> Outcome:
     assert network.skeleton is not None
     commands = {split: commands_of_clips(inputs, network.skeleton, split) for split in ("held_out", "train")}
     result = measure_field(network, inputs.runtime, options, commands)
-    result["published"] = inputs.published["field"]
     circle, skated = result["paths"]["circle"]["cm"], result["straight"]["skating_cm"]
     return Outcome(result, {}, f"off a circle by {circle:.1f} cm; feet skate {skated:.3f} cm a frame")

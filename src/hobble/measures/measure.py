@@ -8,8 +8,8 @@ The module `hobble.measures.<name>` holds MEASURE and may define these functions
 - `compared(all_measured, published) -> ComparisonAddition`: what it adds to compare.json,
 - `tables(compared) -> Mapping[str, Sequence[Row]]`: CSV tables of the comparison, name -> rows,
 - `compared_section(compared) -> PageSection`: its part of the comparison page,
-- `compared_columns(compared) -> Iterable[OverviewColumn]`: columns of the table of configurations there,
-- `compared_verdicts(compared) -> Iterable[Verdict]`: sentences on which configuration is best.
+- `compared_values(compared) -> Iterable[ComparedValue]`: columns of the table of configurations there, and
+  verdicts on which configuration is best.
 
 `found` is the measurement's JSON ({} if it was not run), `material` has all results of the configuration
 (`hobble.report.gather.ReportMaterial`), `compared` is the content of compare.json, and `all_measured` has the
@@ -23,7 +23,7 @@ from __future__ import annotations
 import functools
 import importlib
 import pkgutil
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import ModuleType
@@ -219,6 +219,30 @@ class Outcome:
     result: Json = field(repr=False)
     tables: Mapping[str, Sequence[Row]] = field(default_factory=dict, repr=False)
     log_line: str = ""
+
+
+def flatten(row: Row) -> dict[str, object]:
+    """The row without mappings as values: the entry `b` of a mapping under the key `a` gets the key `a_b`.
+
+    >>> flatten({"lap": 1, "ms": {"total": 0.5, "sd": {"total": 0.1}}})
+    {'lap': 1, 'ms_total': 0.5, 'ms_sd_total': 0.1}
+    """
+    out: dict[str, object] = {}
+    for key, value in row.items():
+        if isinstance(value, Mapping):
+            out |= {f"{key}_{k}": v for k, v in flatten(value).items()}
+        else:
+            out[key] = value
+    return out
+
+
+def flat_rows(entries: Iterable[Json], items: str, *labels: str) -> list[Row]:
+    """A table of JSON: a row for each item of the list `items` of each entry, after the entry's `labels`."""
+    return [
+        flatten({**{label: entry[label] for label in labels}, **item})
+        for entry in entries
+        for item in entry[items]
+    ]
 
 
 def sample_sentence(found: Json) -> str:

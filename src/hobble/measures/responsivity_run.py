@@ -18,7 +18,7 @@ import numpy as np
 
 from hobble.core.files import Json
 from hobble.core.quat import Array
-from hobble.measures.measure import MeasureInputs, Outcome, Row
+from hobble.measures.measure import MeasureInputs, Outcome, flat_rows
 from hobble.measures.walks import FPS, foot_slide, mean_of_known, turns_between
 from hobble.models.load import load_network
 from hobble.models.network import Network
@@ -262,33 +262,19 @@ def laps_of_mode(
 def parameter_counts(sizes: Sequence[int]) -> dict[str, int]:
     """Number of weights and biases that one frame uses, actual and as Table 6.1 of Segerstedt counts them.
 
-    sizes: units of each layer, from inputs to outputs. true: the actual number. table_6_1: by the formula of
-    the table, the sum of n_l (1 + n_(l+1)) over the layers, plus the number of outputs. table_6_1_as_printed:
-    by the same formula without one of the hidden layers, because the text of the thesis states one hidden
-    layer fewer than the network has.
+    sizes: units of each layer, from inputs to outputs. true: the actual number. table_6_1_as_printed: by the
+    formula of the table, the sum of n_l (1 + n_(l+1)) over the layers, plus the number of outputs, without
+    one of the hidden layers, because the text of the thesis states one hidden layer fewer than the network
+    has.
 
     >>> parameter_counts((342, 512, 512, 311))
-    {'true': 597815, 'table_6_1': 598157, 'table_6_1_as_printed': 335501}
+    {'true': 597815, 'table_6_1_as_printed': 335501}
     """
     without_a_layer = [sizes[0], *sizes[2:]]
     return {
         "true": sum(a * b + b for a, b in pairwise(sizes)),
-        "table_6_1": sum(a * (1 + b) for a, b in pairwise(sizes)) + sizes[-1],
         "table_6_1_as_printed": sum(a * (1 + b) for a, b in pairwise(without_a_layer)) + sizes[-1],
     }
-
-
-def lap_rows(result: Json) -> list[Row]:
-    """The laps of every mode as rows for a CSV file. The last columns are the times and their spread."""
-    rows: list[Row] = []
-    for entry in result["modes"]:
-        for lap in entry["laps"]:
-            times = lap["milliseconds"]
-            row = {"mode": entry["mode"], **{key: v for key, v in lap.items() if key != "milliseconds"}}
-            row |= {f"milliseconds_{key}": times[key] for key in (*STEPS, "total")}
-            row |= {f"milliseconds_{key}_sd": times["sd"][key] for key in STEPS}
-            rows.append(row | {f"milliseconds_{key}": value for key, value in times["spread"].items()})
-    return rows
 
 
 def run(inputs: MeasureInputs, options: Options) -> Outcome:
@@ -302,4 +288,4 @@ def run(inputs: MeasureInputs, options: Options) -> Outcome:
     reached = [
         f"{m['mode']}: {m['waypoints_reached']} of {m['waypoints']} waypoints" for m in result["modes"]
     ]
-    return Outcome(result, {"laps": lap_rows(result)}, "; ".join(reached))
+    return Outcome(result, {"laps": flat_rows(result["modes"], "laps", "mode")}, "; ".join(reached))

@@ -2,62 +2,43 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Iterable, Iterator, Sequence
+from typing import TYPE_CHECKING, Any
+
+from pydantic import Field
+
+from hobble.core.files import Json
+from hobble.core.section import Positive
+from hobble.measures import measure
+from hobble.measures.accuracy import COLOURS, NAMES
+from hobble.measures.compare import ComparisonAddition, ConfigurationResults
+from hobble.measures.measure import SPLITS, Row
+from hobble.measures.shown import chart
+from hobble.report import parts
+from hobble.report.parts import SPLITS as SPLIT_LABELS
+from hobble.report.parts import Chart, Compared, PageSection, SectionPart, Trace
 
 if TYPE_CHECKING:
     from hobble.report.gather import ReportMaterial
 
-from collections.abc import Iterable, Iterator, Sequence
-from typing import Annotated, Any
 
-from pydantic import AfterValidator, Field
-
-from hobble.core.files import Json
-from hobble.core.section import Positive
-from hobble.measures.accuracy import COLOURS, NAMES
-from hobble.measures.compare import ComparisonAddition, ConfigurationResults
-from hobble.measures.measure import SPLITS, Cost, JointOptions, Measure, Row, SampleOptions, sample_in_words
-from hobble.measures.shown import chart
-from hobble.report.parts import SPLITS as SPLIT_LABELS
-from hobble.report.parts import (
-    Chart,
-    Compared,
-    PageSection,
-    SectionPart,
-    Trace,
-    Verdict,
-    axis,
-    configuration_colours,
-    format_number,
-    line_trace,
-    log_axis,
-    verdict_on_lowest,
-)
-
-
-def _require_lengths(lengths: tuple[int, ...]) -> tuple[int, ...]:
-    """Returns `lengths`. Raises ValueError if it is empty."""
-    if not lengths:
-        raise ValueError("must name at least one number of frames")
-    return lengths
-
-
-class Options(JointOptions, SampleOptions):
+class Options(measure.JointOptions, measure.SampleOptions):
     """The keys of this measurement in a configuration's section `evaluation`."""
 
-    rollouts: Annotated[tuple[Positive, ...], AfterValidator(_require_lengths)] = Field(
-        (1, 10, 60, 300), description="lengths of roll-outs, in frames"
+    rollouts: tuple[Positive, ...] = Field(
+        (1, 10, 60, 300), min_length=1, description="lengths of roll-outs, in frames"
     )
 
 
-MEASURE = Measure(
+MEASURE = measure.Measure(
     name="rollouts",
     module=__name__,
     inputs=("weights", "clips", "summaries", "skeleton"),
     options=Options,
     runtime=("mode",),
-    cost=Cost(memory_mb=120, mb_per_1000_frames=27, seconds_per_1000_frames=0.6, least_minutes=30),
+    cost=measure.Cost(memory_mb=120, mb_per_1000_frames=27, seconds_per_1000_frames=0.6, least_minutes=30),
 )
+FRAMES_PER_SECOND = 60
 
 
 def section(found: Json, material: ReportMaterial) -> PageSection:
@@ -65,10 +46,10 @@ def section(found: Json, material: ReportMaterial) -> PageSection:
     traces = [
         trace
         for split, name in NAMES.items()
-        for trace in _error_line(name, found.get("lengths", ()), split, COLOURS[split], "sample" in found)
+        for trace in _error_line(name, found.get("lengths", ()), split, COLOURS[split])
     ]
-    more, sample = (("sample",), sample_in_words(found)) if "sample" in found else ((), "")
-    shown = chart("rollouts", traces, _layout(traces), more=more, sample=sample)
+    sample = measure.sample_in_words(found)
+    shown = chart("rollouts", traces, _layout(traces), more=["sample"] if sample else (), sample=sample)
     return PageSection("accuracy", [SectionPart(50, shown)])
 
 
@@ -93,16 +74,13 @@ def tables(compared: Json) -> dict[str, list[Row]]:
     return {"rollouts": rows}
 
 
-FRAMES_PER_SECOND = 60
-
-
 def compared_section(compared: Compared) -> PageSection:
     """The chart, which is added to the section on accuracy."""
     return PageSection("accuracy", [SectionPart(20, compared_chart(compared))])
 
 
-def compared_verdicts(compared: Compared) -> Iterator[Verdict]:
-    """Which configuration stays closest to the captured motion in roll-outs of about a second.
+def compared_values(compared: Compared) -> Iterator[parts.ComparedValue]:
+    """How far the joints are from the captured motion in roll-outs of about a second, and which are closest.
 
     The held-out clips are compared, or the training clips if there are no errors of held-out clips.
     """
@@ -112,12 +90,10 @@ def compared_verdicts(compared: Compared) -> Iterator[Verdict]:
     for split, label in SPLIT_LABELS.items():
         errors = {row["configuration"]: (row[split] or {}).get("position_error_cm") for row in rows}
         if any(value is not None for value in errors.values()):
-            ending = f"cm from the captured joints on average, in roll-outs of {length} frames on {label}"
-
-            def words(name: str, cm: float, ending: str = ending) -> str:
-                return f"the joints of {name} are {format_number(cm, 3)} {ending}"
-
-            yield from verdict_on_lowest(10, "Closest to captured motion", errors, words)
+            of_what = f"in roll-outs of {length} frames on {label}"
+            far = "the joints of {name} are {value} cm from the captured joints on average, " + of_what
+            column = parts.Column.number(f"cm from captured joints {of_what}")
+            yield parts.ComparedValue(25, column, errors, "Closest to captured motion", far)
             return
 
 
@@ -125,30 +101,32 @@ def compared_chart(compared: Compared) -> Chart:
     """How the error grows when the networks continue from their own poses."""
     options: dict[str, list[Trace]] = {}
     for split, label in SPLIT_LABELS.items():
-        for name, colour in configuration_colours(compared).items():
+        for name, colour in parts.configuration_colours(compared).items():
             rows = [r for r in compared.get("rollouts", ()) if r["configuration"] == name]
-            if line := _error_line(name, rows, split, colour, bars=False):
+            if line := _error_line(name, rows, split, colour):
                 options[label] = options.get(label, []) + line
     layout = _layout(trace for traces in options.values() for trace in traces)
     return chart("compare-rollouts", layout=layout, choose="Clips", options=options)
 
 
-def _error_line(name: str, entries: Iterable[Json], split: str, colour: str, bars: bool) -> list[Trace]:
+def _error_line(name: str, entries: Iterable[Json], split: str, colour: str) -> list[Trace]:
     """The line of the mean error of a split over the length of roll-outs; [] if none was measured.
 
-    entries: one for each length. bars: whether to draw the half widths of 95 % confidence intervals.
+    entries: one for each length. If only a sample was measured, bars show 95 % confidence intervals.
     """
     known = [entry for entry in entries if (entry.get(split) or {}).get("position_error_cm") is not None]
     if not known:
         return []
     x, y = [entry["length"] for entry in known], [entry[split]["position_error_cm"] for entry in known]
-    widths = [(entry[split].get("interval") or {}).get("position_error_cm", 0.0) for entry in known]
-    style = {"error_y": {"type": "data", "array": widths, "color": "@faint", "thickness": 1}} if bars else {}
-    return [line_trace(name, x, y, colour, mode="lines+markers", **style)]
+    style: dict[str, Any] = {"mode": "lines+markers"}
+    if widths := [e[split]["interval"]["position_error_cm"] for e in known if "interval" in e[split]]:
+        style["error_y"] = {"type": "data", "array": widths, "color": "@faint", "thickness": 1}
+    return [parts.line_trace(name, x, y, colour, **style)]
 
 
 def _layout(traces: Iterable[Trace]) -> dict[str, Any]:
+    lengths = [x for trace in traces for x in trace["x"]]
     return {
-        "xaxis": log_axis("frames", [x for trace in traces for x in trace["x"]]),
-        "yaxis": axis("cm per joint", rangemode="tozero"),
+        "xaxis": parts.log_axis("frames", lengths),
+        "yaxis": parts.axis("cm per joint", rangemode="tozero"),
     }

@@ -14,6 +14,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -21,12 +22,12 @@ import numpy as np
 
 from hobble.core.files import Json
 from hobble.core.quat import Array
+from hobble.measures import sample as samples
 from hobble.measures.accuracy_run import check_layout, joint_indices, joints_to_measure
 from hobble.measures.measure import SPLITS, MeasureInputs, Outcome, Row
-from hobble.measures.sample import ClipPart, LoadedPart, Sample, clip_parts, sample_to_measure, with_sample
 from hobble.models.load import load_network
 from hobble.models.network import Network, Predictor
-from hobble.rows.clip_rows import ClipRows, Excerpt, compose_pairs, rotate_by_yaw, unbroken_stretches
+from hobble.rows.clip_rows import ClipRows, compose_pairs, rotate_by_yaw, unbroken_stretches
 from hobble.rows.layout import GAITS, RowLayout
 from hobble.runtime.error_calculator import relative_and_distance
 from hobble.runtime.rule import joint_place, movement_share, phase_change
@@ -181,7 +182,7 @@ class Stretch:
         return np.arange(max(1, self.first), self.stop, max(1, length // overlap))
 
 
-def stretches_of(loaded: LoadedPart, layout: RowLayout) -> list[Stretch]:
+def stretches_of(loaded: samples.LoadedPart, layout: RowLayout) -> list[Stretch]:
     """The stretches of consecutive frames in the rows of a clip or an excerpt. layout: the network's."""
     out = []
     for rows in unbroken_stretches(loaded.rows.frame):  # indices of rows
@@ -228,17 +229,14 @@ def roll_out_sums(
     return sums
 
 
-def errors_of_sums(sums: Array, phase: bool = True) -> dict[str, Any]:
+def values_of_sums(sums: Array, phase: bool = True) -> dict[str, Any]:
     """Plain data from the sums (7,) of `roll_out_sums`. Values of no frames or no ended roll-outs are None.
 
     phase: whether the network uses the phase. If not, the phase error has no meaning and is None.
     """
-    frames, ended = sums[0], sums[4]
-    mean, squared, cm = sums[1:4] / max(frames, 1)
-    values = {"mean": mean, "sd": float(np.sqrt(max(0.0, squared - mean**2))), "position_error_cm": cm}
+    ended = sums[4]
     return {
-        "frames": int(frames),
-        **{key: float(value) if frames else None for key, value in values.items()},
+        **samples.errors_of_sums(sums),
         "ended": int(ended),
         "last_cm": float(sums[5] / ended) if ended else None,
         "last_phase": float(sums[6] / ended) if ended and phase else None,
@@ -253,7 +251,7 @@ def measure_roll_outs(
     equivalents: Sequence[str] | None = None,
     lengths: Sequence[int] = LENGTHS,
     mode: str = "cubic",
-    sample: Sample | None = None,
+    sample: samples.Sample | None = None,
 ) -> Json:
     """The content of rollouts.json: for each of `lengths`, the errors of the splits and of the clips.
 
@@ -264,56 +262,39 @@ def measure_roll_outs(
     """
     network = load_network(weights)
     predictor, joints = network.predictor(mode), joint_indices(network, equivalents)
-    # For each length, in the order of the clips: clip or excerpt -> sums.
-    of_parts: dict[int, dict[tuple[str, Excerpt | None], Array]] = {length: {} for length in lengths}
-    for batch in _part_batches(clip_parts(clips, sample), network, lengths):
-        stretches = [stretch for _, some in batch for stretch in some]
-        parts = np.cumsum([0, *(len(some) for _, some in batch)])
-        for length, sums_of_parts in of_parts.items():
-            sums = roll_out_sums(predictor, stretches, joints, length)
-            for (part, _), first, stop in zip(batch, parts[:-1], parts[1:], strict=True):
-                sums_of_parts[part.clip, part.excerpt] = sums[first:stop].sum(axis=0)
-        log.info("rolled out: %s", ", ".join(str(part.excerpt or part.clip) for part, _ in batch))
-    entries = []
-    for length, sums_of_parts in of_parts.items():
-        of_clip: dict[str, Array] = {}
-        for (clip, _), sums in sums_of_parts.items():
-            of_clip[clip] = of_clip.get(clip, np.zeros(7)) + sums
-        entry: dict[str, Any] = {"length": length}
-        for split in SPLITS:
-            total = sum((sums for clip, sums in of_clip.items() if splits[clip] == split), np.zeros(7))
-            entry[split] = errors_of_sums(total, network.uses_phase)
-            if sample and (drawn := sample.splits.get(split)) and total[0]:
-                # An excerpt that is too short for a roll-out counts with the mean of the split.
-                of_parts_drawn = {e: sums_of_parts[e.clip, e] for e in drawn.drawn}
-                known = {e: sums if sums[0] else total for e, sums in of_parts_drawn.items()}
-                means = {e: sums[3] / sums[0] for e, sums in known.items()}
-                entry[split]["interval"] = {"position_error_cm": drawn.confidence_half_width(means)}
-        entry["clips"] = [
-            {"clip": clip, "split": splits[clip], **errors_of_sums(sums, network.uses_phase)}
-            for clip, sums in of_clip.items()
-        ]
-        entries.append(entry)
+    of_parts: dict[int, dict[samples.ClipPart, Array]] = {length: {} for length in lengths}
+    for batch in _part_batches(samples.clip_parts(clips, sample), network, lengths):
+        stretches = [stretch for some in batch.values() for stretch in some]
+        ends = np.cumsum([len(some) for some in batch.values()])[:-1]
+        for length, sums in of_parts.items():
+            of_stretches = np.split(roll_out_sums(predictor, stretches, joints, length), ends)
+            sums |= {part: own.sum(axis=0) for part, own in zip(batch, of_stretches, strict=True)}
+        log.info("rolled out: %s", ", ".join(str(part.excerpt or part.clip) for part in batch))
+    values = partial(values_of_sums, phase=network.uses_phase)
+    entries = [
+        {"length": length, **samples.summed_up(sums, splits, sample, values, {"position_error_cm": 3})}
+        for length, sums in of_parts.items()
+    ]
     result = {"configuration": configuration, "joints": len(joints), "mode": mode, "lengths": entries}
-    return with_sample(result, sample)
+    return samples.with_sample(result, sample)
 
 
 def _part_batches(
-    parts: Iterable[ClipPart], network: Network, lengths: Sequence[int]
-) -> Iterator[list[tuple[ClipPart, list[Stretch]]]]:
+    parts: Iterable[samples.ClipPart], network: Network, lengths: Sequence[int]
+) -> Iterator[dict[samples.ClipPart, list[Stretch]]]:
     """Yield a few clips or excerpts at a time, together about AT_ONCE rows, with their stretches."""
-    batch: list[tuple[ClipPart, list[Stretch]]] = []
+    batch: dict[samples.ClipPart, list[Stretch]] = {}
     rows = 0
     for part in parts:
         # A roll-out needs the frame before its start, and max(lengths) frames from its start on. Twice as
         # many rows are read, because a frame that two cycles share has two rows.
         loaded = part.load(before=2, after=2 * max(lengths))
         check_layout(part.path, loaded.rows, network)
-        batch.append((part, stretches_of(loaded, network.layout)))
+        batch[part] = stretches_of(loaded, network.layout)
         rows += len(loaded.rows)
         if rows >= AT_ONCE:
             yield batch
-            batch, rows = [], 0
+            batch, rows = {}, 0
     if batch:
         yield batch
 
@@ -337,6 +318,6 @@ def run(inputs: MeasureInputs, options: Options) -> Outcome:
         joints_to_measure(inputs, options),
         options.rollouts,
         inputs.runtime.mode,
-        sample_to_measure(inputs, options),
+        samples.sample_to_measure(inputs, options),
     )
     return Outcome(result, {"lengths": roll_out_rows(result)})

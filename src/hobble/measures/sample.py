@@ -13,14 +13,16 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from hobble.core.files import Json
-from hobble.measures.measure import MeasureInputs, SampleOptions
+from hobble.core.quat import Array
+from hobble.measures.measure import SPLITS, MeasureInputs, SampleOptions
 from hobble.rows.clip_rows import (
     Captured,
     ClipRows,
@@ -121,6 +123,11 @@ class ClipPart:
     weight: float = 1.0
     excerpt: Excerpt | None = None
 
+    @property
+    def share(self) -> float:
+        """Which share of its clip it is."""
+        return 1.0 if self.excerpt is None else self.excerpt.rows / self.excerpt.clip_rows
+
     def load(self, before: int = 0, after: int = 0) -> LoadedPart:
         """Read the rows, and up to `before` rows before an excerpt and `after` rows after it."""
         if self.excerpt is None:
@@ -164,6 +171,48 @@ def captured_motion(clips: Mapping[str, str | Path], sample: Sample | None) -> I
     """
     for part in clip_parts(clips, sample):
         yield from captured_stretches(part.load().rows)
+
+
+def errors_of_sums(sums: Array) -> dict[str, Any]:
+    """Plain data from sums over frames: 1, and means over the joints of the relative error, its square, and
+    the position error (cm). More sums may follow. Without frames, errors are None.
+    """
+    frames = sums[0]
+    mean, squared, cm = sums[1:4] / max(frames, 1.0)
+    values = {"mean": mean, "sd": np.sqrt(max(0.0, squared - mean**2)), "position_error_cm": cm}
+    return {"frames": round(frames), **{k: float(v) if frames else None for k, v in values.items()}}
+
+
+def summed_up(
+    sums: Mapping[ClipPart, Array],
+    splits: Mapping[str, str],
+    sample: Sample | None,
+    values: Callable[[Array], Json],
+    intervals: Mapping[str, int],
+) -> dict[str, Any]:
+    """What is measured of each clip (key `clips`) and over all clips of each split.
+
+    sums: part of a clip -> (n,) sums over its frames, see `errors_of_sums`. values: makes plain data of sums.
+    intervals: key -> index of a sum. If there is a sample, the mean of this sum has the half width of a 95 %
+    confidence interval under this key of `interval`.
+    """
+    of_clip: dict[str, Array] = {}
+    for part, own in sums.items():
+        of_clip[part.clip] = of_clip.get(part.clip, 0.0) + own
+    nothing = np.zeros_like(next(iter(sums.values()), np.zeros(4)))
+    clips = [{"clip": clip, "split": splits[clip], **values(own)} for clip, own in of_clip.items()]
+    result: dict[str, Any] = {"clips": clips}
+    for split in SPLITS:
+        total = sum((own for clip, own in of_clip.items() if splits[clip] == split), nothing)
+        result[split] = dict(values(total))
+        if sample and (drawn := sample.splits.get(split)) and total[0]:
+            # An excerpt in which nothing could be measured counts with the mean of the split.
+            known = {part.excerpt: own if own[0] else total for part, own in sums.items()}
+            result[split]["interval"] = {
+                key: drawn.confidence_half_width({e: known[e][at] / known[e][0] for e in drawn.drawn})
+                for key, at in intervals.items()
+            }
+    return result
 
 
 def sample_to_measure(inputs: MeasureInputs, options: SampleOptions) -> Sample | None:

@@ -105,6 +105,21 @@ def boxes(name: str, colour: str, **values: Any) -> Trace:
     }
 
 
+def ours_and_published(
+    names: Sequence[str],
+    ours: Mapping[str, Sequence[float]],
+    published: Mapping[str, Sequence[float]],
+    **more: Any,
+) -> list[Trace]:
+    """The traces of a box over our values of each configuration, and beside it of one over published ones."""
+    return [
+        boxes(f"{name}, {whose}", colour, y=list(values[name]), boxmean=True, **more)
+        for name in names
+        for whose, values, colour in (("ours", ours, "@accent"), ("published", published, "@muted"))
+        if len(values.get(name, ()))
+    ]
+
+
 def stick_figures(skeleton: Json, poses: Array, colour: str, view: str = "side", up: float = 0.0) -> Trace:
     """The trace of figures side by side, STRIP_WIDTH apart.
 

@@ -11,7 +11,7 @@ from hobble.report.parts import (
     Chart,
     Column,
     Compared,
-    OverviewColumn,
+    ComparedValue,
     Table,
     Trace,
     axis,
@@ -46,8 +46,7 @@ def render_comparison(
     the page are left out. bundle: all scripts of the page as one script. measures: all measurements, for what
     they show.
     """
-    columns = [column for each in compared_by(measures, "compared_columns", compared) for column in each]
-    verdicts = [v for each in compared_by(measures, "compared_verdicts", compared) for v in each]
+    values = [value for each in compared_by(measures, "compared_values", compared) for value in each]
     once = "The stages that prepare a data set run only once for all configurations that use it."
     stages = {
         name: [stage for stage in compared["stages"] if stage["configuration"] == name]
@@ -55,8 +54,8 @@ def render_comparison(
     }
     sections: dict[str, dict[str, Any]] = {
         "overview": {
-            "verdicts": sorted(verdicts, key=lambda verdict: verdict.order),
-            "table": configuration_table(compared, columns),
+            "verdicts": sorted((v for v in values if v.verdict), key=lambda value: value.order),
+            "table": configuration_table(compared, values),
             "published": published_table(compared),
         },
         "training": {"curves": training_curves(compared)},
@@ -158,7 +157,7 @@ LONGER_NAMES = {
 }
 
 
-def configuration_table(compared: Compared, measured: Sequence[OverviewColumn]) -> Table:
+def configuration_table(compared: Compared, measured: Sequence[ComparedValue]) -> Table:
     """A row for each configuration: its settings, and the columns `measured` of its measurements."""
     entries = {entry["configuration"]: entry for entry in compared["configurations"]}
 
@@ -169,11 +168,11 @@ def configuration_table(compared: Compared, measured: Sequence[OverviewColumn]) 
     channel_names = {name: ", ".join(channels) or "none" for name, channels in by_name("channels").items()}
     columns = [
         *measured,
-        OverviewColumn(50, Column("channels"), channel_names),
-        OverviewColumn(60, Column("data set"), by_name("dataset")),
-        OverviewColumn(80, Column.count("layers"), by_name("hidden_layers")),
-        OverviewColumn(90, Column.count("units"), by_name("units")),
-        OverviewColumn(100, Column.number("passes"), by_name("passes")),
+        ComparedValue(50, Column("channels"), channel_names),
+        ComparedValue(60, Column("data set"), by_name("dataset")),
+        ComparedValue(80, Column.count("layers"), by_name("hidden_layers")),
+        ComparedValue(90, Column.count("units"), by_name("units")),
+        ComparedValue(100, Column.number("passes"), by_name("passes")),
     ]
     columns.sort(key=lambda column: column.order)
     rows = [[name, *(column.values.get(name) for column in columns)] for name in entries]

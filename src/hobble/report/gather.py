@@ -10,6 +10,7 @@ from typing import Any
 from hobble.core.files import Json, read_json, read_numbers
 from hobble.core.untrusted import read_yaml
 from hobble.models.load import load_network
+from hobble.report.parts import citation
 
 PUBLISHED = Path(__file__).with_name("published.yaml")
 # Columns of the training history. Each further column has the held-out error of one block of the network's
@@ -60,6 +61,14 @@ class ReportMaterial:
         """The first entry for this configuration in the list `what` of published.yaml, or None."""
         rows = self.published.get(what, ())
         return next((row for row in rows if row["configuration"] == self.name), None)
+
+    def published_records(self, *lists: str) -> list[dict[str, Any]]:
+        """All entries of some lists of published.yaml as rows of a table, with `network` and `source`."""
+        return [
+            {"network": entry.get("label"), **entry, "source": citation(entry, self.published["sources"])}
+            for name in lists
+            for entry in self.published[name]
+        ]
 
     @property
     def blocks(self) -> list[str]:

@@ -344,51 +344,6 @@ def citation(row: Mapping[str, Any], sources: Mapping[str, str]) -> str:
     return f"{text} (but {row['other_figure']})" if row.get("other_figure") else text
 
 
-# Two values are called almost equal if the higher one exceeds the lower one by at most this share.
-EQUAL = 0.03
-
-
-@dataclass(frozen=True)
-class Verdict:
-    """A sentence about the configuration that is best in one respect.
-
-    order: place on the page, which sorts its verdicts by this number. title: heading of the sentence, such as
-    "Closest to captured motion". name: the best configuration. text: the sentence.
-    """
-
-    order: int
-    title: str
-    name: str
-    text: str
-
-
-def verdict_on_lowest(
-    order: int,
-    title: str,
-    values: Mapping[str, float | None],
-    say: Callable[[str, float], str],
-    more: str = "",
-) -> Iterator[Verdict]:
-    """Yield one verdict: the configuration with the lowest value is best, and is compared with the second.
-
-    Yields nothing if fewer than two configurations have a value. order, title: see `Verdict`. values:
-    configuration -> value, or None if it was not measured. say: function (configuration, value) -> half of
-    the sentence. more: further text after the sentence; it begins with a space.
-
-    >>> seconds = {"a": 2.0, "b": 3.0}
-    >>> found = verdict_on_lowest(1, "Fastest", seconds, lambda name, s: f"a frame of {name} takes {s} s")
-    >>> [verdict.text for verdict in found]
-    ['A frame of a takes 2.0 s; a frame of b takes 3.0 s.']
-    """
-    ranked = sorted((value, name) for name, value in values.items() if value is not None)
-    if len(ranked) < 2:
-        return
-    (low, first), (second, other) = ranked[:2]
-    equal = "almost equal: " if second <= low * (1 + EQUAL) else ""
-    text = f"{say(first, low)}; {equal}{say(other, second)}.{more}"
-    yield Verdict(order, title, first, text[0].upper() + text[1:])
-
-
 @dataclass(frozen=True)
 class Paragraph:
     """A paragraph. Markup is not escaped, so only text from the source code may be Markup."""
@@ -527,13 +482,46 @@ def ordered_axis(names: Iterable[str], **more: Any) -> dict[str, Any]:
     return {"categoryorder": "array", "categoryarray": list(names), "automargin": True, **more}
 
 
-@dataclass(frozen=True)
-class OverviewColumn:
-    """A column of the table of configurations, which has a row for each configuration.
+# Two values are called almost equal if the higher one exceeds the lower one by at most this share.
+EQUAL = 0.03
 
-    values: configuration -> value in its row. order: a number; columns are sorted by it.
+
+@dataclass(frozen=True)
+class ComparedValue:
+    """A value of each configuration: a column of the table of configurations, and perhaps a verdict.
+
+    order: a number; columns, and verdicts, are sorted by it. values: configuration -> value, or None if it
+    was not measured. best: heading of the verdict on the lowest value, such as "Fastest"; "": no verdict.
+    sentence: half of the verdict's sentence, with {name} and {value}. more: text that follows the sentence.
+
+    >>> seconds = {"a": 2.0, "b": 3.0}
+    >>> sentence = "a frame of {name} takes {value} s"
+    >>> ComparedValue(1, Column.number("s", 2), seconds, "Fastest", sentence).verdict
+    'A frame of a takes 2.0 s; a frame of b takes 3.0 s.'
     """
 
     order: int
     column: Column
     values: Mapping[str, Any] = field(repr=False)
+    best: str = ""
+    sentence: str = ""
+    more: str = ""
+
+    @property
+    def ranked(self) -> list[str]:
+        """The configurations with a value, if there is a verdict on it, the lowest first."""
+        known = {name: value for name, value in self.values.items() if value is not None}
+        return sorted(known, key=lambda name: (known[name], name)) if self.best else []
+
+    @property
+    def verdict(self) -> str:
+        """The lowest value compared with the second; "" if fewer than two configurations have a value."""
+        if len(self.ranked) < 2:
+            return ""
+        first, second = (
+            self.sentence.format(name=name, value=self.column.show(self.values[name]))
+            for name in self.ranked[:2]
+        )
+        low, other = (self.values[name] for name in self.ranked[:2])
+        text = f"{first}; {'almost equal: ' if other <= low * (1 + EQUAL) else ''}{second}.{self.more}"
+        return text[0].upper() + text[1:]
