@@ -118,7 +118,7 @@ def test_the_settings_of_a_data_set_are_options(folder, tmp_path, capsys):
 
 def test_a_clip_is_hurt_and_its_status_file_says_how(folder, tmp_path, holden31, capsys):
     source = str(folder / "one.bvh")
-    assert main(["hurt", source, str(tmp_path), "--injury", "LeftUpLeg-LeftLeg[8]", "--unit", "1"]) == 0
+    assert main(["hurt", source, str(tmp_path), "--injury", "left knee[8]", "--unit", "1"]) == 0
     clip = read_bvh(tmp_path / "one_limps.bvh")
     status = read_status(tmp_path / "one_limps_injuries.txt", holden31.link_names)
     assert status.frames == len(clip), "at 60 Hz, slower than the clip at 120 Hz"

@@ -240,6 +240,12 @@ def test_the_runtime_compiles_for_other_machines(target: str, tmp_path: Path) ->
     )
 
 
+@pytest.mark.skipif("HOBBLE_GODOT" not in os.environ, reason="HOBBLE_GODOT: where Godot's header is")
+def test_the_extension_for_godot_compiles(tmp_path: Path) -> None:
+    options = [*WARNINGS, "-shared", "-fPIC", f"-I{os.environ['HOBBLE_GODOT']}", f"-I{SOURCES}"]
+    compile_c([RUNTIME_C, EXAMPLES / "hobble_godot.c"], tmp_path / "libhobble_godot.so", options)
+
+
 @pytest.mark.skipif(not shutil.which("mcs"), reason="no C# compiler")
 def test_c_sharp_moves_a_character_as_python_does(
     built_folder: Path, holden31: Skeleton, tmp_path: Path

@@ -60,7 +60,9 @@ def _words_of(parser: argparse.ArgumentParser) -> str:
 def _parsers(parent: argparse.ArgumentParser | None = None) -> dict[str, argparse.ArgumentParser]:
     """Name of each subcommand -> its parser, below `parent`."""
     parent = parent or argparse.ArgumentParser(prog="hobble")
-    commands = parent.add_subparsers(dest="command", required=True, metavar="COMMAND", help=argparse.SUPPRESS)
+    commands = parent.add_subparsers(
+        dest="command", required=True, metavar="COMMAND", help=argparse.SUPPRESS, prog="hobble"
+    )
     parsers = {}
     for name, found in COMMANDS.items():
         layout = argparse.RawDescriptionHelpFormatter

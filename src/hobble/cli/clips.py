@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import re
 import sys
 from collections.abc import Mapping
 from dataclasses import replace
@@ -13,6 +14,7 @@ import numpy as np
 
 from hobble.channels.injury.status import FPS, InjurySpell, Status, parse_links, write_status
 from hobble.channels.injury.table import write_statuses
+from hobble.channels.shown import channel_display
 from hobble.cli.command import (
     FOLDER,
     JSON,
@@ -240,17 +242,21 @@ def _labelled(
 @command(
     "limps",
     *out("the folder to write into: CLIP_limps.bvh and CLIP_limps_injuries.txt"),
-    arg("--injury", required=True, help="what hurts: Joint-Joint[severity];..."),
+    arg("--injury", required=True, help="what hurts: PART[severity];..."),
 )
 def hurt(options: argparse.Namespace) -> int:
     """Write clips as a body with these injuries walks them, with the status files of what hurts.
 
-    hobble hurt FOLDER OUT --injury 'LeftUpLeg-LeftLeg[7];LeftArm-LeftForeArm[3]'
+    hobble hurt FOLDER OUT --injury 'left knee[7];LeftArm-LeftForeArm[3]'
 
-    The clips are retargeted to the skeleton holden31, which has the links. Severities are 0 to 10.
+    A part is a link of the skeleton holden31, to which the clips are retargeted, or its name in words. Severities
+    are 0 to 10.
     """
-    links = load_skeleton(find_skeleton(SKELETON)).skeleton.link_names
-    pairs = parse_links(options.injury, links, "--injury")
+    skeleton = load_skeleton(find_skeleton(SKELETON)).skeleton
+    links = skeleton.link_names
+    named = channel_display("injury", skeleton, links, links).other_names
+    given = re.sub(r"[^;\[]+(?=\[)", lambda part: named.get(part[0].strip(), part[0]), options.injury)
+    pairs = parse_links(given, links, "--injury")
     values = dict(pairs)
 
     def make(name: str, file: Path) -> list[Message]:
