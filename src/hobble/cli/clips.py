@@ -249,8 +249,8 @@ def hurt(options: argparse.Namespace) -> int:
 
     hobble hurt FOLDER OUT --injury 'left knee[7];LeftArm-LeftForeArm[3]'
 
-    A part is a link of the skeleton holden31, to which the clips are retargeted, or its name in words. Severities
-    are 0 to 10.
+    A part is a link of the skeleton holden31, to which the clips are retargeted, or its name in words.
+    Severities are 0 to 10.
     """
     skeleton = load_skeleton(find_skeleton(SKELETON)).skeleton
     links = skeleton.link_names
