@@ -92,7 +92,7 @@ def test_captured_motion_that_is_walked_again_exactly_is_equal_to_itself(monkeyp
     assert found["character"].pop("frechet") == pytest.approx(0.0, abs=1e-6)
     assert found["captured"].pop("frechet") > 0
     assert found["character"] == found["captured"]
-    assert found["captured"]["skating_toes_cm"] < 0.2
+    assert found["captured"]["skating_toes"] < 0.2
 
 
 def test_the_measurement_of_a_network_and_its_section(network):

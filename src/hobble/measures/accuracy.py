@@ -254,28 +254,8 @@ def compared(
 
 
 def tables(compared: Json) -> dict[str, list[Row]]:
-    """Name -> rows of a CSV table: the errors of every clip in every configuration; Tables A.4 and A.5."""
-    clips = measure.flat_rows(compared["accuracy"], "clips", "configuration")
-    return {"accuracy": clips, "published-clips": published_clip_rows(compared)}
-
-
-def published_clip_rows(compared: Json) -> list[Row]:
-    """Tables A.4 and A.5 of Segerstedt (2021): a row for each clip and network, with ours beside it."""
-    published = compared["published"]
-    ours = {
-        (entry["configuration"], clip["clip"]): clip.get("as_published", {})
-        for entry in compared["accuracy"]
-        for clip in entry["clips"]
-    }
-    rows: list[Row] = []
-    for name, means in published["clip_means"].items():
-        sds = published["clip_sds"].get(name, [None] * len(means))  # table A.5 has none for AVA
-        clips = compare.published_clips(published)
-        for index, (clip, mean, sd) in enumerate(zip(clips, means, sds, strict=True)):
-            row = {"index": index, "clip": clip, "configuration": name}
-            row |= {"published_mean": mean, "published_sd": sd}
-            rows.append(row | {key: ours.get((name, clip), {}).get(key) for key in ("mean", "sd")})
-    return rows
+    """One table: the errors of every clip in every configuration."""
+    return {"accuracy": measure.flat_rows(compared["accuracy"], "clips", "configuration")}
 
 
 def clip_means(found: Json, split: str) -> list[float]:
@@ -286,13 +266,8 @@ def clip_means(found: Json, split: str) -> list[float]:
 
 def compared_section(compared: Compared) -> PageSection:
     """The spread of the errors, differences between configurations, and errors of single clips."""
-    rows, title = published_clip_rows(compared), words("accuracy.published-clips")
-    shown = [
-        SectionPart(10, error_boxes(compared)),
-        SectionPart(30, difference_map(compared)),
-        SectionPart(50, clip_lines(compared)),
-        SectionPart(60, table("compare-published-clips", rows, title=title)),
-    ]
+    charts = enumerate((error_boxes(compared), difference_map(compared), clip_lines(compared)))
+    shown = [SectionPart(10 + 20 * place, chart) for place, chart in charts]
     return PageSection("accuracy", shown, title="Accuracy", order=10, long=True)
 
 

@@ -39,10 +39,10 @@ MEASURE = measure.Measure(
 
 # Measure -> its name and unit. Measures of motion are also measured of captured motion.
 OF_MOTION = {
-    "skating_cm": "foot skating, cm a frame",
-    "skating_heels_cm": "skating of heels, cm a frame",
-    "skating_toes_cm": "skating of toes, cm a frame",
-    "joint_update_degrees": "rotation of a joint, degrees a frame",
+    "skating": "foot skating, cm a frame",
+    "skating_heels": "skating of heels, cm a frame",
+    "skating_toes": "skating of toes, cm a frame",
+    "joint_update": "rotation of a joint, degrees a frame",
     "jerk": "jerk, m/s3",
     "contact_speed": "speed of feet on the ground, share of their largest",
     "frechet": "Frechet distance, variance of captured windows",
@@ -66,7 +66,7 @@ HEADS = {
 }
 # More than this many times the captured motion's value is worth a hint.
 MUCH_MORE = 1.3
-WORTH_A_HINT = {"skating_cm": "feet skate", "jerk": "joints jerk"}
+WORTH_A_HINT = {"skating": "feet skate", "jerk": "joints jerk"}
 
 
 def section(found: Json, material: ReportMaterial) -> PageSection:
@@ -134,7 +134,7 @@ def compared_values(compared: Compared) -> Iterator[parts.ComparedValue]:
     skating = "Cleanest feet", "{name} has {value} cm a frame in a straight walk"
     circle = "Closest to a circle", "{name} has {value} cm from it on average"
     for order, key, label, verdict in (
-        (60, "straight_skating_cm", "skating, cm", skating),
+        (60, "straight_skating", "skating, cm", skating),
         (61, "paths_circle_cm", "off a circle, cm", circle),
         (62, "asked_character_frechet", "Frechet", ()),
     ):

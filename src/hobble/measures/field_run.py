@@ -132,32 +132,34 @@ def response(network: Network, runtime: Runtime, gait: str, speed: float) -> flo
 
 def straight_walk(network: Network, runtime: Runtime, seconds: float) -> Motion:
     """A straight walk at WALK speed, after SETTLING."""
+    gait = [float(name == "walk") for name in network.gaits]
     frames = SETTLING + round(seconds * FPS)
-    gait = np.tile([float(name == "walk") for name in network.gaits], (frames, 1))
-    ahead = np.tile([0.0, 1.0], (frames, 1))
-    command = Command(WALK * ahead, gait, 0 * ahead, Motion(np.zeros((0, 0, 3)), np.zeros((0, 0, 4))))
-    return walk_commands(network, runtime, [command])[0].part(slice(SETTLING, None))
+    asked = (np.tile(np.array(values), (frames, 1, 1)) for values in ([0.0, WALK], gait, [0.0, 0.0]))
+    return walk(network, runtime, *asked)[0].part(slice(SETTLING, None))
 
 
 def walk_commands(network: Network, runtime: Runtime, commands: Sequence[Command]) -> list[Motion]:
-    """The character's motion for each command, all as one crowd. Characters start standing."""
-    assert network.skeleton is not None
-    count, longest = len(commands), max(map(len, commands))
-    animation = ProceduralAnimation(network, characters=count, **dict(runtime))
-    velocity, gait, ahead = (
+    """The character's motion for each command, all as one crowd."""
+    longest = max(map(len, commands))
+    asked = (
         np.stack([_lengthened(getattr(command, name), longest) for command in commands], axis=1)
         for name in ("velocity", "gait", "ahead")
     )
-    joints = len(network.skeleton.joints)
-    positions = np.empty((longest, count, joints, 3), np.float32)
-    rotations = np.empty((longest, count, joints, 4), np.float32)
-    for frame in range(longest):
+    walked = zip(walk(network, runtime, *asked), commands, strict=True)
+    return [motion.part(slice(len(command))) for motion, command in walked]
+
+
+def walk(network: Network, runtime: Runtime, velocity: Array, gait: Array, ahead: Array) -> list[Motion]:
+    """The motion of C characters, who start standing. velocity, gait, ahead: (F, C, ...), see `Command`."""
+    assert network.skeleton is not None
+    shape = *velocity.shape[:2], len(network.skeleton.joints)
+    animation = ProceduralAnimation(network, characters=shape[1], **dict(runtime))
+    positions, rotations = np.empty((*shape, 3), np.float32), np.empty((*shape, 4), np.float32)
+    for frame in range(len(velocity)):
         pose = animation.next_pose(velocity[frame], facing=ahead[frame], gait=gait[frame])
-        positions[frame], rotations[frame] = (
-            x.reshape(count, joints, -1) for x in (pose.positions, pose.rotations)
-        )
+        positions[frame], rotations[frame] = pose.positions, pose.rotations
     local = local_rotations(network.skeleton, rotations)
-    return [Motion(positions[: len(c), i], local[: len(c), i]) for i, c in enumerate(commands)]
+    return [Motion(positions[:, i], local[:, i]) for i in range(shape[1])]
 
 
 def _lengthened(values: Array, frames: int) -> Array:
@@ -202,21 +204,10 @@ def _commands_of(part: ClipPart, skeleton: Skeleton) -> Iterator[Command]:
                 yield Command(velocity[frames], captured.gait[frames], ahead[frames], motion.part(frames))
 
 
-# Name in field.json -> name in `hobble.measures.motion_quality.cleanness`.
-CLEANNESS = {
-    "skating_cm": "skating",
-    "skating_heels_cm": "skating_heels",
-    "skating_toes_cm": "skating_toes",
-    "joint_update_degrees": "joint_update",
-    "jerk": "jerk",
-    "contact_speed": "contact_speed",
-}
-
-
 def mean_cleanness(skeleton: Skeleton, motions: Sequence[Motion]) -> dict[str, float]:
     """Skating, rotation of joints, jerk and contact speed of motions: means over them."""
     found = [cleanness(skeleton, motion.positions, motion.rotations) for motion in motions]
-    return {name: round(float(np.nanmean([one[key] for one in found])), 4) for name, key in CLEANNESS.items()}
+    return {key: round(float(np.nanmean([one[key] for one in found])), 4) for key in found[0]}
 
 
 def compare_with_captured(
@@ -250,22 +241,16 @@ def measure_field(
 ) -> dict[str, Any]:
     """The content of field.json (docs/artefacts.md). commands: split -> its captured stretches."""
     assert network.skeleton is not None
-    walked = {
-        name: dict(
-            zip(("cm", "degrees"), follow_path(network, runtime, path, options.path_laps), strict=True)
-        )
-        for name, path in paths().items()
-    }
+    walked = {name: follow_path(network, runtime, path, options.path_laps) for name, path in paths().items()}
     split = next((name for name in ("held_out", "train") if commands.get(name)), None)
+    straight = straight_walk(network, runtime, options.field_seconds)
     return {
-        "paths": walked,
+        "paths": {name: {"cm": cm, "degrees": degrees} for name, (cm, degrees) in walked.items()},
         "response": {
             "walk": response(network, runtime, "walk", WALK),
             "jog": response(network, runtime, "jog", JOG),
         },
-        "straight": mean_cleanness(
-            network.skeleton, [straight_walk(network, runtime, options.field_seconds)]
-        ),
+        "straight": mean_cleanness(network.skeleton, [straight]),
         "split": split,
         "stretches": len(commands[split]) if split else 0,
         "asked": compare_with_captured(network, runtime, commands[split]) if split else None,
@@ -278,5 +263,5 @@ def run(inputs: MeasureInputs, options: Options) -> Outcome:
     assert network.skeleton is not None
     commands = {split: commands_of_clips(inputs, network.skeleton, split) for split in ("held_out", "train")}
     result = measure_field(network, inputs.runtime, options, commands)
-    circle, skated = result["paths"]["circle"]["cm"], result["straight"]["skating_cm"]
+    circle, skated = result["paths"]["circle"]["cm"], result["straight"]["skating"]
     return Outcome(result, {}, f"off a circle by {circle:.1f} cm; feet skate {skated:.3f} cm a frame")

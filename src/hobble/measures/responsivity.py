@@ -433,31 +433,17 @@ def _published_regression(fits: Sequence[Json], row: Json) -> list[dict[str, Any
 
 
 def tables(compared: Json) -> dict[str, Sequence[Row]]:
-    """Three tables: every lap; the published laps; the lines of time over size, without their points."""
+    """Two tables: every lap; the lines of time over size, without their points."""
     fit = compared["milliseconds"]["fit"]
     return {
         "responsivity": measure.flat_rows(compared["responsivity"], "laps", "configuration", "mode"),
-        "published-laps": published_lap_rows(compared["published"]),
         "fit": [{k: v for k, v in row.items() if k not in ("x", "y")} for row in fit],
     }
 
 
-def published_lap_rows(published: Json) -> list[Row]:
-    """Table A.3 of Segerstedt (2021): milliseconds a frame in each of 19 laps."""
-    return [
-        {"lap": lap, **dict(zip(published["laps"], times, strict=True))}
-        for lap, times in enumerate(zip(*published["laps"].values(), strict=True), 1)
-    ]
-
-
 def compared_section(compared: Compared) -> PageSection:
     """Charts of the times of the laps, and of the time of a frame over the size of the network."""
-    rows, title = published_lap_rows(compared["published"]), "Table A.3 of Segerstedt, ms per frame"
-    shown = [
-        SectionPart(10, lap_boxes(compared)),
-        SectionPart(20, fit_chart(compared)),
-        SectionPart(30, table("compare-published-laps", rows, title=title)),
-    ]
+    shown = [SectionPart(10, lap_boxes(compared)), SectionPart(20, fit_chart(compared))]
     return PageSection("speed", shown, title="Time per frame", order=30)
 
 

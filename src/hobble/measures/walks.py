@@ -157,7 +157,6 @@ def _percentile_range(angles: Array) -> float:
 
 FPS = 60
 SPEEDS = {"walk": 2.5, "jog": 7.0}  # target speeds, cm a frame
-VELOCITY, GAIT = "target_velocity", "gait"  # the names of the targets that are not channels
 # This share of a stretch, at its start, is not measured, because the motion still changes to the new target.
 SETTLING_SHARE = 0.25
 
@@ -234,72 +233,32 @@ class Walks:
 def generate_walks(network: Network, script: Sequence[CrowdTarget], runtime: Runtime) -> Walks:
     """The motion of C figures that follow `script`. They begin standing and walk ahead on flat ground.
 
-    script: one `CrowdTarget` for each stretch, in order. Figures with the same targets move in the same way,
-    to the last bit, until their targets first differ. So, to save time, a single character of the animation
-    walks for all of them until then.
+    script: one `CrowdTarget` for each stretch, in order. Each figure walks as it would alone, to the last
+    bit.
     """
     assert network.skeleton is not None
     count, frames = len(script[0].gait), sum(s.frames for s in script)
-    animation = ProceduralAnimation(network, **dict(runtime))
-    walker = np.zeros(count, int)  # the character that walks for each figure
+    animation = ProceduralAnimation(network, characters=count, **dict(runtime))
     local = np.zeros((frames, count, len(network.skeleton.joints), 3), np.float32)
     contacts, root = np.zeros((frames, count, 4)), np.zeros((frames, count, 3))
-    phase, acceleration = np.zeros((frames, count)), np.zeros((frames, count))
+    phase, largest = np.zeros((frames, count)), np.zeros((frames, count))
     recent: list[Array] = []  # joint positions in the world, of the last three frames or fewer
     frame = 0
     for stretch in script:
-        target = _targets(network, stretch)
-        first, new_walker = _group_by_target(walker, *target.values())
-        if len(first) > animation.characters:
-            # Figures with one character now have different targets. Each target gets a copy of the character.
-            copied = walker[first]  # (new characters,) the character from which each new one is copied
-            animation, recent = animation.copies(copied), [p[copied] for p in recent]
-            walker = new_walker
-        target_now = {name: values[_first_figures(walker)] for name, values in target.items()}
-        velocity, shares = target_now.pop(VELOCITY), target_now.pop(GAIT)
+        velocity = np.zeros((count, 2))
+        velocity[:, 1] = [SPEEDS[name] for name in stretch.gait] if stretch.speed is None else stretch.speed
+        shares = np.array([[float(name == gait) for name in network.gaits] for gait in stretch.gait])
         for _ in range(stretch.frames):
-            pose = animation.next_pose(velocity, gait=shares, **target_now)
-            # The arrays of a single character have no axis for characters. It is added here.
-            positions, roots = pose.positions.reshape(len(shares), -1, 3), np.atleast_2d(pose.root)
-            root[frame], phase[frame] = roots[walker], np.atleast_1d(pose.phase)[walker]
-            contacts[frame] = np.atleast_2d(pose.contacts)[walker]
-            local[frame] = in_root_coordinates(positions, roots, np.atleast_1d(pose.yaw))[walker]
+            pose = animation.next_pose(velocity, gait=shares, **stretch.channels)
+            positions = pose.positions.reshape(count, -1, 3)  # a single figure has no axis for figures
+            root[frame], phase[frame], contacts[frame] = pose.root, pose.phase, pose.contacts
+            local[frame] = in_root_coordinates(positions, root[frame], np.atleast_1d(pose.yaw))
             recent = [*recent[-2:], positions]
             if len(recent) == 3:
-                second_difference = recent[2] - 2 * recent[1] + recent[0]
-                squared = np.einsum("cjk,cjk->cj", second_difference, second_difference)
-                acceleration[frame - 1] = np.sqrt(np.max(squared, axis=1))[walker]
+                largest[frame - 1] = acceleration(np.array(recent))[0].max(axis=1)
             frame += 1
     starts = np.cumsum([0, *(s.frames for s in script)])
-    return Walks(network.skeleton, local, contacts, phase, root, acceleration, starts)
-
-
-def _targets(network: Network, stretch: CrowdTarget) -> dict[str, Array]:
-    """The targets of C figures in a stretch, by name.
-
-    VELOCITY: (C, 2) to the side and forward, cm a frame. GAIT: (C, 6) shares of the gaits. Name of each
-    channel: (C, columns) its values.
-    """
-    velocity = np.zeros((len(stretch.gait), 2))
-    velocity[:, 1] = [SPEEDS[name] for name in stretch.gait] if stretch.speed is None else stretch.speed
-    shares = np.array([[float(name == gait) for name in network.gaits] for gait in stretch.gait])
-    return {VELOCITY: velocity, GAIT: shares, **stretch.channels}
-
-
-def _group_by_target(walker: np.ndarray, *targets: Array) -> tuple[np.ndarray, np.ndarray]:
-    """Group the figures that had the same character so far and have the same targets from now on.
-
-    walker: (C,) the character that walked for each figure so far. targets: arrays (C, n). Returns (groups,)
-    the first figure of each group, and (C,) the group of each figure.
-    """
-    alike = np.column_stack([walker, *targets])
-    _, first, group = np.unique(alike, axis=0, return_index=True, return_inverse=True)
-    return first, group.reshape(-1)
-
-
-def _first_figures(walker: np.ndarray) -> np.ndarray:
-    """(characters,) the first figure of each character. walker: (C,) the character of each figure."""
-    return np.unique(walker, return_index=True)[1]
+    return Walks(network.skeleton, local, contacts, phase, root, largest, starts)
 
 
 def channel_values(network: Network, name: str, figures: Sequence[Mapping[str, float]]) -> dict[str, Array]:
@@ -451,7 +410,6 @@ def spearman(x: Sequence[float] | Array, y: Sequence[float | None]) -> float | N
     pairs = [(a, b) for a, b in zip(x, y, strict=True) if b is not None]
     if len(pairs) < 3 or len({b for _, b in pairs}) < 2:
         return None
-    from scipy.stats import rankdata  # here, because the import takes a second
+    from scipy.stats import spearmanr  # here, because the import takes a second
 
-    ranks = rankdata(np.array(pairs), axis=0).T
-    return round(float(np.corrcoef(ranks)[0, 1]), 5)
+    return round(float(spearmanr(*zip(*pairs, strict=True)).statistic), 5)
