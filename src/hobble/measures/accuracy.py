@@ -16,7 +16,7 @@ import numpy as np
 from hobble.core.files import Json
 from hobble.measures import compare, measure
 from hobble.measures.measure import SPLITS, Row
-from hobble.measures.shown import boxes, chart, ours_and_published, table, words
+from hobble.measures.shown import boxes, chart, in_words, ours_and_published, table, words
 from hobble.report import parts
 from hobble.report.parts import SPLITS as SPLIT_LABELS
 from hobble.report.parts import Chart, Compared, Hint, PageSection, SectionPart, Trace
@@ -41,7 +41,7 @@ COLOURS = {"train": "@muted", "held_out": "@accent"}  # split -> its colour in t
 NAMES = {"held_out": "held out", "train": "training"}  # split -> its name on the page
 # Edges of a box, as plotly names them -> keys of accuracy.json.
 BOX = {"lowerfence": "p05", "q1": "p25", "median": "p50", "q3": "p75", "upperfence": "p95", "mean": "mean"}
-CLIP_HEADS = {key: key for key in ("clip", "split", "frames", "mean", "sd")}
+CLIP_HEADS = {key: in_words(key) for key in ("clip", "split", "frames", "mean", "sd", "position_error_cm")}
 ERROR_AXIS = parts.axis("relative error, %", rangemode="tozero")
 # Key of a difference between two configurations in compare.json -> what it is divided by (eq. 3.2).
 DEVIATIONS = {"difference_of_means": "sd of the means of clips", "difference": "sd of single frames"}
@@ -54,8 +54,9 @@ def section(found: Json, material: ReportMaterial) -> PageSection:
     # Readers may take the number in _hurt1 for a severity, so endings of names are explained.
     endings = [end for end in ("_hurt1", "_mirror") if any(end in row["clip"] for row in found["clips"])]
     introduction = words("accuracy.introduction", *(f"accuracy.{end[1:]}" for end in endings))
-    heads = CLIP_HEADS | {"position_error_cm": "position error, cm"}
-    of_clips = table(f"{material.name}-accuracy", _measured(found), heads, show={"split": NAMES.__getitem__})
+    of_clips = table(
+        f"{material.name}-accuracy", _measured(found), CLIP_HEADS, show={"split": NAMES.__getitem__}
+    )
     # Only gait cycles are measured, so the clips are longer.
     seconds = sum(found[split]["frames"] for split in NAMES) / 60
     duration = parts.format_duration(seconds)

@@ -81,23 +81,6 @@ TIME_AXIS = axis("ms per frame", rangemode="tozero")
 FEWEST_STEPS = 10  # if the character takes fewer steps, the mean foot slide is not shown
 FRAME_BUDGET_MS = 1000 / 60  # the time that a frame may take at 60 Hz
 FLIP_DEGREES = 60  # if a joint turns by more than this in one frame, it flips visibly
-# Columns of the table of laps, by the keys of a lap in responsivity.json.
-LAP_HEADS = {
-    "lap": "lap",
-    "finished": "finished",
-    "waypoints_reached": "waypoints reached",
-    "seconds": "seconds",
-    "frames": "frames",
-    "path_distance_cm": "mean distance from the track, cm",
-    "path_overshoot_cm": "largest distance from the track, cm",
-    "steps": "steps",
-    "foot_slide_cm": "mean foot slide of a step, cm",
-    "predicted_turn_degrees": "largest turn of a joint in a frame as predicted, °",
-    "largest_turn_degrees": "largest turn of a joint in a frame as drawn, °",
-    "turns_held_back": "frames in which a turn was limited",
-    **{step: f"{step}, mean ms" for step in STEPS},
-    "median": "whole frame, median ms",
-}
 
 
 def section(found: Json, material: ReportMaterial) -> PageSection:
@@ -207,12 +190,14 @@ def track_chart(found: Json) -> Chart:
 def lap_table(found: Json, name: str) -> parts.Table:
     """A row per lap: how it went, the mean time of each step of a frame, and the median time of a frame."""
     records = [
-        {**lap, **lap["milliseconds"], "median": median_time(lap)}
+        {key: value for key, value in lap.items() if key != "milliseconds"}
         | ({"foot_slide_cm": None} if lap["steps"] < FEWEST_STEPS else {})
+        | {f"{step}, mean ms": lap["milliseconds"][step] for step in STEPS}
+        | {"whole frame, median ms": median_time(lap)}
         for lap in found["laps"]
     ]
     show = {"finished": lambda finished: "yes" if finished else "no"}
-    return table(f"{name}-responsivity", records, LAP_HEADS, show=show)
+    return table(f"{name}-responsivity", records, show=show)
 
 
 def track_figures(found: Json) -> list[KeyFigure]:

@@ -78,10 +78,10 @@ def table(
 ) -> Table:
     """A table with a row for each record. Whole numbers are shown in full, others with three digits.
 
-    heads: key of a record -> heading of its column; by default all keys of the first record, each its own
-    heading. show: key -> function from a value to its text. long: keys of long texts.
+    heads: key of a record -> heading of its column; by default all keys of the first record, in words.
+    show: key -> function from a value to its text. long: keys of long texts.
     """
-    heads = heads or {key: key.replace("_", " ") for key in (records[0] if records else ())}
+    heads = heads or {key: in_words(key) for key in (records[0] if records else ())}
     columns = {}
     for key, head in heads.items():
         value = next((r[key] for r in records if r.get(key) is not None), 0.0)
@@ -92,6 +92,15 @@ def table(
         else:
             columns[key] = Column.count(head) if isinstance(value, int) else Column.number(head)
     return Table.of(name, columns, records, title or "Table of the values")
+
+
+def in_words(key: str) -> str:
+    """A key of a measurement's JSON as the heading of a column.
+
+    >>> in_words("largest_turn_degrees")
+    'largest turn, °'
+    """
+    return key.replace("_cm", ", cm").replace("_degrees", ", °").replace("_", " ")
 
 
 def boxes(name: str, colour: str, **values: Any) -> Trace:
