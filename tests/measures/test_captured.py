@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -9,13 +11,10 @@ from hobble.measures.sample import Drawn, Sample, captured_motion
 from hobble.measures.walks import acceleration, in_root_coordinates
 from hobble.rows.clip_rows import ClipRows, Excerpt, captured_stretches, save_clip_rows
 from hobble.rows.layout import GAITS, RowLayout
+from tests.measures.made_up import SKELETON, random_rows
 
 LAYOUT = RowLayout(3, channels=(("injury", 2),))
 FRAMES = 50
-JOINTS = {
-    name: {"parent": parent, "offset": [0, 9, 0]} for name, parent in zip("abc", (None, *"ab"), strict=True)
-}
-SKELETON = {"name": "rods", "joints": JOINTS, "roles": {}}
 
 
 @pytest.fixture
@@ -23,11 +22,10 @@ def world() -> dict[str, np.ndarray]:
     """A figure of three joints on a curved path."""
     rng = np.random.default_rng(1)
     t = np.arange(FRAMES + 1) / 20
-    yaw = 0.4 + 0.8 * np.sin(t)
     root = np.stack([60 * np.sin(t), 0 * t, 80 * t], axis=1)
     joints = root[:, None] + rng.normal(0, 10, (1, 3, 3)) + np.sin(3 * t)[:, None, None] * [[1.0, 2, 3]]
     joints[..., 1] += 50
-    return {"yaw": yaw, "root": root, "joints": joints}
+    return {"yaw": 0.4 + 0.8 * np.sin(t), "root": root, "joints": joints}
 
 
 def level(vectors: np.ndarray, yaw: np.ndarray) -> np.ndarray:
@@ -39,35 +37,26 @@ def level(vectors: np.ndarray, yaw: np.ndarray) -> np.ndarray:
 def rows(world) -> ClipRows:
     """Rows as the format defines them. The ground of the first fit is 3 cm below the world's zero."""
     yaw, root, joints = world["yaw"], world["root"], world["joints"]
+    out, here = random_rows("a", FRAMES, 2, 0, LAYOUT, SKELETON), yaw[:-1]
     y = np.zeros((FRAMES, LAYOUT.y_size))
-    here = yaw[:-1]
     y[:, LAYOUT.y_root_velocity] = level(np.diff(root, axis=0)[:, None], here)[:, 0, ::2]
     y[:, LAYOUT.y_turn] = -np.diff(yaw)[:, None]
     y[:, LAYOUT.y_joint_position] = in_root_coordinates(joints[:-1], root[:-1], here).reshape(FRAMES, -1)
     y[:, LAYOUT.y_joint_velocity] = level(np.diff(joints, axis=0), here).reshape(FRAMES, -1)
-    x = np.zeros((FRAMES, LAYOUT.x_terrain.start))
-    gait = np.zeros((FRAMES, len(GAITS), LAYOUT.samples))
+    gait = out.x[:, LAYOUT.x_gait].reshape(FRAMES, len(GAITS), LAYOUT.samples)
+    gait[:] = 0
     gait[:, 2, LAYOUT.samples // 2 :] = 1
     gait[:, 1, : LAYOUT.samples // 2] = 1
-    x[:, LAYOUT.x_gait] = gait.reshape(FRAMES, -1)
-    frame = np.arange(FRAMES) + 60
-    severity = np.tile([0.0, 4.0], (FRAMES, 1))
-    heights, mean = np.zeros((2 * FRAMES, 36)), np.tile([-3.0, 99.0], FRAMES)
-    fits = np.full(FRAMES, 2)
-    phase = np.linspace(0, 0.9, FRAMES)
-    return ClipRows(
-        "a", LAYOUT, SKELETON, x, y, phase, {"injury": severity}, frame, 0 * frame, fits, heights, mean
-    )
+    out.x[:, LAYOUT.x_gait] = gait.reshape(FRAMES, -1)
+    return replace(out, y=y, mean=np.tile([-3.0, 99.0], FRAMES))
 
 
 def test_captured_motion_is_recovered_from_its_rows(rows, world) -> None:
     (found,) = captured_stretches(rows)
-    assert len(found) == FRAMES
     yaw, root, joints = world["yaw"], world["root"][:-1], world["joints"][:-1]
     way = level((root - root[0])[:, None], np.full(FRAMES, yaw[0]))[:, 0]
     np.testing.assert_allclose(found.root, way, atol=1e-9)
-    # Heights are above the ground.
-    np.testing.assert_allclose(found.local[..., 1], joints[..., 1] + 3, atol=1e-9)
+    np.testing.assert_allclose(found.local[..., 1], joints[..., 1] + 3, atol=1e-9)  # above the ground
     np.testing.assert_allclose(found.acceleration[1:-1], acceleration(joints).max(axis=1), atol=1e-9)
     assert found.acceleration[0] == 0
     assert (found.gait == np.eye(len(GAITS))[2]).all()

@@ -16,7 +16,7 @@ from hobble.models.network import Network
 from hobble.rows.clip_rows import ClipRows, save_clip_rows
 from hobble.rows.layout import RowLayout
 from hobble.runtime.animation import ProceduralAnimation
-from tests.measures.made_up import random_rows
+from tests.measures.made_up import random_network, random_rows
 from tests.measures.whole_roll_outs import clip_roll_outs, roll_out
 
 
@@ -28,36 +28,22 @@ def recorded(network: Network, frames: int, ground: Any) -> tuple[RollOutInputs,
     """The inputs of a running character in each frame, and its joints (F, J, 3) in the root frame."""
     figure = ProceduralAnimation(network, foot_locking=False)
     figure.next_pose((0.0, 2.0))
-    rows: dict[str, list[Any]] = {
-        key: [] for key in ("x", "y", "mean", "phase", "root", "yaw", "local", "stand")
-    }
-    controller, state = figure._controller, figure.state
+    layout, controller, state = network.layout, figure._controller, figure.state
+    rows = []
     for f in range(frames):
-        rows["phase"].append(float(state.phase[0]))
-        speed = 0.0 if 25 <= f < 45 else 2.5
+        phase, speed = float(state.phase[0]), 0.0 if 25 <= f < 45 else 2.5
         target = (speed * np.sin(f / 40), speed * np.cos(f / 40))
         figure.next_pose(target, injury={"LeftUpLeg-LeftLeg": 4}, terrain=ground)
         root, yaw = controller.root[0].copy(), float(controller.yaw[0])
         local = in_root_coordinates(state.joint_position[0], root, np.array(yaw))
-        rows["x"].append(controller.x[0].copy())
-        rows["y"].append(controller.y[0].copy())
-        rows["stand"].append(controller.x[0, network.layout.x_gait][network.layout.samples // 2])
-        for key, value in (("mean", root[1]), ("root", root[::2]), ("yaw", yaw), ("local", local)):
-            rows[key].append(value)
-    root, yaw = np.array(rows["root"]), np.array(rows["yaw"])
-    step = np.diff(root, axis=0, append=root[-1:])
-    sin, cos = np.sin(yaw), np.cos(yaw)
+        rows.append((controller.x[0].copy(), controller.y[0].copy(), phase, root, yaw, local))
+    x, y, phases, roots, yaws, locals_ = (np.array(values) for values in zip(*rows, strict=True))
+    step = np.diff(roots[:, ::2], axis=0, append=roots[-1:, ::2])
+    sin, cos = np.sin(yaws), np.cos(yaws)
     velocity = np.stack([step[:, 0] * cos - step[:, 1] * sin, step[:, 0] * sin + step[:, 1] * cos], axis=1)
-    inputs = RollOutInputs(
-        np.array(rows["x"]),
-        np.array(rows["y"]),
-        np.array(rows["mean"]),
-        np.array(rows["phase"]),
-        -np.diff(yaw, append=yaw[-1]),
-        velocity,
-        np.maximum(0, 1 - np.array(rows["stand"])) ** 0.25,
-    )
-    return inputs, np.array(rows["local"])
+    moving = np.maximum(0, 1 - x[:, layout.x_gait][:, layout.samples // 2]) ** 0.25
+    turn = -np.diff(yaws, append=yaws[-1])
+    return RollOutInputs(x, y, roots[:, 1], phases, turn, velocity, moving), locals_
 
 
 @pytest.mark.parametrize("ground", [None, hills])
@@ -80,7 +66,6 @@ def test_a_roll_out_equals_the_motion_of_the_runtime(hurtable: Network, ground: 
     assert np.abs(moved[0] - local[1]).max() > 1
 
 
-ROOT = Path(__file__).parents[2]
 LAYOUT = RowLayout(31, channels=(("injury", 30),))
 
 
@@ -128,17 +113,14 @@ def test_after_one_frame_a_pose_is_the_mean_of_prediction_and_extrapolation(hurt
     )
 
 
-def test_results_of_splits_are_means_of_their_clips_and_reproducible(
-    hurtable: Network, tmp_path: Path, monkeypatch
-) -> None:
-    weights = tmp_path / "weights.npz"
-    save(weights, hurtable)
+def test_results_of_splits_are_means_of_their_clips_and_reproducible(tmp_path: Path, monkeypatch) -> None:
     clips = {}
     for i, (name, count) in enumerate((("a", 60), ("b", 90), ("c", 40), ("none", 0))):
         clips[name] = tmp_path / f"{name}.npz"
-        save_clip_rows(clips[name], clip_rows(hurtable, count, i))
+        save_clip_rows(clips[name], random_rows(name, count, 1, i))
     splits = {"a": "train", "b": "train", "c": "held_out", "none": "held_out"}
-    result = measure_roll_outs(weights, clips, splits, "injured", lengths=(1, 30))
+    given = random_network(tmp_path / "weights.npz"), clips, splits, "injured"
+    result = measure_roll_outs(*given, lengths=(1, 30))
     assert [entry["length"] for entry in result["lengths"]] == [1, 30]
     for entry in result["lengths"]:
         a, b, c, none = entry["clips"]
@@ -148,32 +130,9 @@ def test_results_of_splits_are_means_of_their_clips_and_reproducible(
             assert entry["held_out"][key] == c[key]
         assert none["mean"] is None
     rows = roll_out_rows(result)
-    assert len(rows) == 2 * (2 + 4)
-    assert rows[0]["clip"] is None
+    assert (len(rows), rows[0]["clip"]) == (2 * (2 + 4), None)
     json.dumps(result, allow_nan=False)
     # The same bits, however many poses and clips go at once.
-    monkeypatch.setattr("hobble.measures.rollouts_run.BATCH", 7)
-    assert measure_roll_outs(weights, clips, splits, "injured", lengths=(1, 30)) == result
-    monkeypatch.setattr("hobble.measures.rollouts_run.AT_ONCE", 1)
-    assert measure_roll_outs(weights, clips, splits, "injured", lengths=(1, 30)) == result
-
-
-def save(path: Path, network: Network) -> None:
-    """Write a network as training does."""
-    arrays: dict[str, Any] = {}
-    for i, (w, b) in enumerate(zip(network.weights, network.biases, strict=True)):
-        arrays[f"W{i}"], arrays[f"b{i}"] = w, b
-    for name, value in zip(
-        ("Xmean", "Xstd", "Ymean", "Ystd"),
-        (network.x_mean, network.x_std, network.y_mean, network.y_std),
-        strict=True,
-    ):
-        arrays[name] = value
-    assert network.skeleton is not None
-    meta = {
-        "layout": network.layout.to_dict(),
-        "skeleton": network.skeleton.to_dict(),
-        "channels": {name: list(labels) for name, labels in network.channels.items()},
-        "gaits": list(network.gaits),
-    }
-    np.savez(path, **arrays, meta=np.array(json.dumps(meta)))
+    for name, value in (("BATCH", 7), ("AT_ONCE", 1)):
+        monkeypatch.setattr(f"hobble.measures.rollouts_run.{name}", value)
+        assert measure_roll_outs(*given, lengths=(1, 30)) == result

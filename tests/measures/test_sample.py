@@ -13,18 +13,8 @@ from hobble.measures import rollouts as rollouts_page
 from hobble.measures.accuracy_run import measure_accuracy
 from hobble.measures.rollouts_run import measure_roll_outs
 from hobble.measures.sample import Drawn, Sample, draw_sample
-from hobble.rows.clip_rows import (
-    LONGEST,
-    Excerpt,
-    ExcerptKind,
-    RowsSummary,
-    cut_into_excerpts,
-    load_excerpt,
-    load_summary,
-    save_clip_rows,
-    save_summary,
-    summary_of_rows,
-)
+from hobble.rows import clip_rows
+from hobble.rows.clip_rows import Excerpt, ExcerptKind, RowsSummary, load_excerpt, save_clip_rows
 from hobble.rows.layout import GAITS
 from tests.measures.made_up import random_network, random_rows
 
@@ -43,28 +33,29 @@ def population(
         name, length, speed = f"{seed}-{number:03d}", int(rng.integers(*rows)), rng.gamma(4)
         own = rng.normal(0, 0.2)
         kinds = []
-        for one in cut_into_excerpts(name, length):
+        for one in clip_rows.cut_into_excerpts(name, length):
             kinds.append(ExcerptKind(gait, float(speed * rng.uniform(0.9, 1.1)), ("injury",) if hurt else ()))
             values[one] = (2 if gait == "jog" else 1) + hurt + 0.1 * speed + own + rng.normal(0, 0.2)
         clips.append(RowsSummary(name, length, tuple(kinds)))
     return clips, {one.clip: "held_out" if i % 12 == 0 else "train" for i, one in enumerate(clips)}, values
 
 
-def test_with_few_frames_all_clips_are_measured():
-    clips, splits, _ = population(0)
-    rows = sum(one.rows for one in clips)
-    assert draw_sample(clips, splits, rows) is None
-    assert draw_sample(clips, splits, rows - 1) is not None
-
-
 def test_the_sample_has_the_requested_size_and_half_of_it_is_held_out():
     clips, splits, _ = population(1)
+    total = sum(one.rows for one in clips)
+    assert draw_sample(clips, splits, total) is None, "all clips are measured"
+    assert draw_sample(clips, splits, total - 1) is not None
     drawn = draw_sample(clips, splits, 300_000).splits
     rows = {split: sum(one.rows for one in of.drawn) for split, of in drawn.items()}
     held_out = sum(one.rows for one in clips if splits[one.clip] == "held_out")
     assert rows["held_out"] == pytest.approx(min(150_000, held_out), rel=0.1)
     assert rows["train"] == pytest.approx(300_000 - rows["held_out"], rel=0.1)
-    assert sum(of.rows for of in drawn.values()) == sum(one.rows for one in clips)
+    assert sum(of.rows for of in drawn.values()) == total
+    # One more clip hardly changes it.
+    more = [*clips, RowsSummary("another", 900, (ExcerptKind("walk", 3.0, ()),))]
+    before = drawn["train"].drawn
+    after = draw_sample(more, {**splits, "another": "train"}, 300_000).splits["train"].drawn
+    assert len(set(before) ^ set(after)) <= 0.1 * len(before)
 
 
 def test_of_long_clips_only_excerpts_are_drawn():
@@ -72,40 +63,29 @@ def test_of_long_clips_only_excerpts_are_drawn():
     sample = draw_sample(clips, splits, 100_000)
     drawn = [one for of in sample.splits.values() for one in of.drawn]
     assert sum(one.rows for one in drawn) == pytest.approx(100_000, rel=0.1)
-    assert max(one.rows for one in drawn) <= LONGEST
+    assert max(one.rows for one in drawn) <= clip_rows.LONGEST
     assert len({one.clip for one in drawn}) > 12
     counted = {"of_excerpts": 24 * 500, "excerpts": len(drawn), "of": 24}
     assert counted.items() <= sample.to_dict().items()
 
 
-def test_an_additional_clip_hardly_changes_the_sample():
-    clips, splits, _ = population(2)
-    more = [*clips, RowsSummary("another", 900, (ExcerptKind("walk", 3.0, ()),))]
-    before = draw_sample(clips, splits, 300_000).splits["train"].drawn
-    after = draw_sample(more, {**splits, "another": "train"}, 300_000).splits["train"].drawn
-    assert len(set(before) ^ set(after)) <= 0.1 * len(before)
-
-
-@pytest.mark.parametrize("split", ["train", "held_out"])
 @pytest.mark.parametrize("long", [False, True])
-def test_the_interval_contains_the_true_mean_about_as_often_as_stated(split, long):
+def test_the_interval_contains_the_true_mean_about_as_often_as_stated(long):
     """The intervals hold in nearly 95 % of samples, although excerpts of a clip resemble each other."""
-    inside, off = [], []
+    inside, off = {"train": [], "held_out": []}, {"train": [], "held_out": []}
     for seed in range(80):
         clips, splits, values = population(seed, 48, (20_000, 60_000)) if long else population(seed)
-        own = [one for one in values if splits[one.clip] == split]
-        truth = np.average([values[one] for one in own], weights=[one.rows for one in own])
-        of_split = draw_sample(clips, splits, 200_000).splits[split]
-        rows = [one.rows for one in of_split.drawn]
-        found = np.average([values[one] for one in of_split.drawn], weights=rows)
-        inside.append(abs(found - truth) <= of_split.confidence_half_width(values))
-        off.append(found - truth)
-    assert 0.88 < np.mean(inside) < 0.99
-    assert abs(np.mean(off)) < 0.3 * np.std(off)
-
-
-def whole(name: str, rows: int) -> Excerpt:
-    return Excerpt(name, 0, rows, rows)
+        for split, drawn in draw_sample(clips, splits, 200_000).splits.items():
+            own = [one for one in values if splits[one.clip] == split]
+            truth, found = (
+                np.average([values[one] for one in some], weights=[one.rows for one in some])
+                for some in (own, drawn.drawn)
+            )
+            inside[split].append(abs(found - truth) <= drawn.confidence_half_width(values))
+            off[split].append(found - truth)
+    for split in inside:
+        assert 0.88 < np.mean(inside[split]) < 0.99
+        assert abs(np.mean(off[split])) < 0.3 * np.std(off[split])
 
 
 def test_excerpts_cover_a_clip_once_and_are_read_as_they_are(tmp_path):
@@ -113,32 +93,18 @@ def test_excerpts_cover_a_clip_once_and_are_read_as_they_are(tmp_path):
     rows.fits[::3] = 1
     rows = replace(rows, heights=rows.heights[: rows.fits.sum()], mean=rows.mean[: rows.fits.sum()])
     save_clip_rows(tmp_path / "a.npz", rows)
-    parts = cut_into_excerpts("a", 2500)
+    parts = clip_rows.cut_into_excerpts("a", 2500)
     assert [one.first for one in parts] == [0, 833, 1666]
-    fit = 0
-    for one in parts:
-        read = load_excerpt(tmp_path / "a.npz", one)
-        for name in ("x", "y", "p", "frame", "cycle", "fits"):
-            np.testing.assert_array_equal(getattr(read, name), getattr(rows, name)[one.first : one.stop])
-        np.testing.assert_array_equal(read.channels["injury"], rows.channels["injury"][one.first : one.stop])
-        after = fit + int(read.fits.sum())
-        np.testing.assert_array_equal(read.heights, rows.heights[fit:after])
-        np.testing.assert_array_equal(read.mean, rows.mean[fit:after])
-        fit = after
-    assert fit == len(rows.mean)
+    read = [load_excerpt(tmp_path / "a.npz", one) for one in parts]
+    for name in ("x", "y", "p", "frame", "cycle", "fits", "heights", "mean"):
+        joined = np.concatenate([getattr(part, name) for part in read])
+        np.testing.assert_array_equal(joined, getattr(rows, name), name)
+    injury = np.concatenate([part.channels["injury"] for part in read])
+    np.testing.assert_array_equal(injury, rows.channels["injury"])
     around = load_excerpt(tmp_path / "a.npz", parts[1], before=2, after=900)
     np.testing.assert_array_equal(around.y, rows.y[831:])
     with pytest.raises(InputError, match="as many rows as its summary"):
         load_excerpt(tmp_path / "a.npz", Excerpt("a", 2400, 200, 2600))
-
-
-@pytest.fixture
-def clips(tmp_path: Path) -> dict[str, Path]:
-    files = {}
-    for seed, name in enumerate("abcdefgh"):
-        files[name] = tmp_path / f"{name}.npz"
-        save_clip_rows(files[name], random_rows(name, 20 + 5 * seed, 1, seed))
-    return files
 
 
 def flat(clip):
@@ -146,50 +112,50 @@ def flat(clip):
     return {key: value for key, value in clip.items() if key != "as_published"}
 
 
-def test_accuracy_and_roll_outs_of_a_sample_have_intervals(tmp_path, clips):
-    weights = random_network(tmp_path / "w.npz")
-    splits = dict.fromkeys(clips, "train")
-    chosen = tuple(whole(name, 20 + 5 * i) for i, name in enumerate("abcde"))
-    sample = Sample({"train": Drawn(chosen, 8, 465)}, 8)
-    everything = measure_accuracy(weights, clips, splits, "holden")
-    found = measure_accuracy(weights, clips, splits, "holden", sample=sample)
+def test_accuracy_and_roll_outs_of_a_sample_have_intervals(tmp_path: Path):
+    rows = {name: 20 + 5 * i for i, name in enumerate("abcdefgh")}
+    clips = {name: tmp_path / f"{name}.npz" for name in rows}
+    for seed, (name, count) in enumerate(rows.items()):
+        save_clip_rows(clips[name], random_rows(name, count, 1, seed))
+    given = random_network(tmp_path / "w.npz"), clips, dict.fromkeys(clips, "train"), "holden"
+    chosen = tuple(Excerpt(name, 0, rows[name], rows[name]) for name in "abcde")
+    sample = Sample({"train": Drawn(chosen, 8, sum(rows.values()))}, 8)
+    everything, found = measure_accuracy(*given), measure_accuracy(*given, sample=sample)
     means = {clip["clip"]: clip["mean"] for clip in everything["clips"]}
     assert list(map(flat, found["clips"])) == [pytest.approx(flat(clip)) for clip in everything["clips"][:5]]
-    expected = np.average([means[n] for n in "abcde"], weights=[20, 25, 30, 35, 40])
+    expected = np.average([means[n] for n in "abcde"], weights=[rows[n] for n in "abcde"])
     assert found["train"]["mean"] == pytest.approx(expected)
     assert found["train"]["mean_of_clips"] == pytest.approx(np.mean([means[n] for n in "abcde"]))
     width = sample.splits["train"].confidence_half_width({one: means[one.clip] for one in chosen})
     assert found["train"]["interval"]["mean"] == pytest.approx(width)
     assert found["sample"] == {"excerpts": 5, "of_excerpts": 8, "clips": 5, "of": 8}
     assert "sample" not in everything
-    rolled = measure_roll_outs(weights, clips, splits, "holden", lengths=(1, 4), sample=sample)
-    entries = measure_roll_outs(weights, clips, splits, "holden", lengths=(1, 4))["lengths"][0]["clips"]
+    rolled = measure_roll_outs(*given, lengths=(1, 4), sample=sample)
+    entries = measure_roll_outs(*given, lengths=(1, 4))["lengths"][0]["clips"]
     of_clip = {one: entries[i]["position_error_cm"] for i, one in enumerate(chosen)}
     width = sample.splits["train"].confidence_half_width(of_clip)
     assert rolled["lengths"][0]["train"]["interval"]["position_error_cm"] == pytest.approx(width)
-    assert rolled["lengths"][0]["train"]["ended"] == sum(c["ended"] for c in entries[:5])
-    charts = [part.content for part in rollouts_page.section(rolled, None).parts]
-    assert len(charts[0].traces[0]["error_y"]["array"]) == 2
-    assert "5 of 8 excerpts" in charts[0].caption
+    (part,) = rollouts_page.section(rolled, None).parts
+    assert len(part.content.traces[0]["error_y"]["array"]) == 2
+    assert "5 of 8 excerpts" in part.content.caption
 
 
 def test_all_excerpts_of_a_clip_together_measure_what_the_clip_does(tmp_path):
     """Roll-outs that begin in an excerpt go on after it, so none is cut short but at the end of the clip."""
-    weights, file = random_network(tmp_path / "w.npz"), tmp_path / "a.npz"
+    file = tmp_path / "a.npz"
     save_clip_rows(file, random_rows("a", 120, 1, 3))
     parts = [Excerpt("a", 40 * i, 40, 120) for i in range(3)]
     sample = Sample({"train": Drawn(tuple(parts), 3, 120)}, 1)
-    given = weights, {"a": file}, {"a": "train"}, "holden"
+    given = random_network(tmp_path / "w.npz"), {"a": file}, {"a": "train"}, "holden"
     cut, uncut = measure_accuracy(*given, sample=sample), measure_accuracy(*given)
     assert list(map(flat, cut["clips"])) == [pytest.approx(flat(uncut["clips"][0]))]
     assert cut["train"]["mean_of_clips"] == pytest.approx(uncut["train"]["mean_of_clips"])
     assert [(e["first_frame"], e["last_frame"]) for e in cut["excerpts"]] == [(0, 39), (40, 79), (80, 119)]
-    rolled = measure_roll_outs(*given, lengths=(1, 20), sample=sample)
-    every = measure_roll_outs(*given, lengths=(1, 20))
-    assert rolled["lengths"][0]["clips"] == [pytest.approx(every["lengths"][0]["clips"][0])]
+    rolled = measure_roll_outs(*given, lengths=(1, 20), sample=sample)["lengths"]
+    every = measure_roll_outs(*given, lengths=(1, 20))["lengths"]
+    assert rolled[0]["clips"] == [pytest.approx(every[0]["clips"][0])]
     # Starts in steps of 10: at 1, 11, ... in the clip, at 1, 11, ..., 40, 50, ..., 80, ... in the excerpts.
-    assert every["lengths"][1]["train"]["ended"] == 10
-    assert rolled["lengths"][1]["train"]["ended"] == 4 + 4 + 2
+    assert (every[1]["train"]["ended"], rolled[1]["train"]["ended"]) == (10, 4 + 4 + 2)
 
 
 def test_facts_of_a_clip_survive_their_file(tmp_path):
@@ -198,15 +164,13 @@ def test_facts_of_a_clip_survive_their_file(tmp_path):
     gait[:] = 0
     gait[:, GAITS.index("jog")] = 1
     rows.y[:, rows.layout.y_root_velocity] = [3, 4]
-    found = summary_of_rows(rows)
-    assert (found.clip, found.rows) == ("a", 30)
-    assert [(kind.gait, kind.channels) for kind in found.kinds] == [("jog", ("injury",))]
-    assert found.kinds[0].speed == pytest.approx(5)
-    save_summary(tmp_path / "a.json", found)
-    assert load_summary(tmp_path / "a.json") == found
-    (tmp_path / "a.json").write_text('{"clip": "a"}')
-    with pytest.raises(InputError, match=r"a\.json: the summary: "):
-        load_summary(tmp_path / "a.json")
-    save_summary(tmp_path / "a.json", RowsSummary("a", 30, ()))
+    found, file = clip_rows.summary_of_rows(rows), tmp_path / "a.json"
+    assert found == RowsSummary("a", 30, (ExcerptKind("jog", pytest.approx(5), ("injury",)),))
+    clip_rows.save_summary(file, found)
+    assert clip_rows.load_summary(file) == found
+    clip_rows.save_summary(file, RowsSummary("a", 30, ()))
     with pytest.raises(InputError, match="has not one kind for each excerpt"):
-        load_summary(tmp_path / "a.json")
+        clip_rows.load_summary(file)
+    file.write_text('{"clip": "a"}')
+    with pytest.raises(InputError, match=r"a\.json: the summary: "):
+        clip_rows.load_summary(file)
