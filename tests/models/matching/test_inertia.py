@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 
 from hobble.core import quat
-from hobble.models.matching.network import OFFSETS, OFFSETS_PER_JOINT, ROW, show_rows
+from hobble.models.matching.network import ROW, Matching
+from hobble.rows.layout import RowLayout
 
 J, HALFLIFE = 3, 6.0
-MEMORY = OFFSETS + OFFSETS_PER_JOINT * J
-AT = np.array([0, 3 * J, 6 * J, 9 * J])  # positions, velocities, rotations, change of phase
+LAYOUT = RowLayout(J)
+BLOCKS = LAYOUT.y_joint_position, LAYOUT.y_joint_velocity, LAYOUT.y_joint_rotation
 
 
 def two_runs(rng: np.random.Generator) -> np.ndarray:
@@ -25,88 +26,69 @@ def two_runs(rng: np.random.Generator) -> np.ndarray:
             quat.exp(0.01 * axis[None] * t[:, :, None]), quat.exp(rng.normal(0, 0.5, (J, 3)))[None]
         )
         rotation = quat.log(turn).reshape(60, -1)
-        out.append(
-            np.hstack([position, np.broadcast_to(speed, position.shape), rotation, np.full((60, 1), 0.02)])
-        )
-    return np.concatenate(out).astype(np.float32)
+        y = np.zeros((60, LAYOUT.y_size), np.float32)
+        for block, values in zip(BLOCKS, (position, speed, rotation), strict=True):
+            y[:, block] = values
+        y[:, LAYOUT.y_phase_change] = 0.02
+        out.append(y)
+    return np.concatenate(out)
 
 
-def played(frames: np.ndarray, rows: list[int]) -> np.ndarray:
-    """What is shown if these rows are played, one in each frame."""
-    memory, shown = np.zeros((1, MEMORY)), []
-    phases = (0.02 * np.arange(len(frames)) % 1).astype(np.float32)
-    before = -1
+def played(frames: np.ndarray, rows: list[int], phase: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+    """What is shown if a search finds these rows, one in each frame, and the phase of the character."""
+    zeros, shown, lag = np.zeros(LAYOUT.x_size, np.float32), [], []
+    remaining = np.tile(np.arange(60)[::-1], 2)
+    network = Matching(
+        x_mean=zeros, x_std=zeros + 1, y_mean=frames[0] * 0, y_std=frames[0] * 0 + 1, layout=LAYOUT,
+        features=zeros[None, :1].repeat(120, axis=0), frames=frames, remaining=remaining,
+        phases=(0.02 * np.arange(120) % 1).astype(np.float32), columns=np.array([0]), weights=zeros[:1],
+        every=1, halflife=HALFLIFE,
+    )  # fmt: skip
+    predictor, memory, phases = network.predictor(), np.zeros((1, network.memory_size)), np.array([phase])
     for row in rows:
-        out = np.zeros((1, frames.shape[1]), np.float32)
-        following, due = before + 1 if before >= 0 else -1, row != before + 1
-        choice = tuple(np.array([value]) for value in (before, following, due, row))
-        table = (frames, np.ones(frames.shape[1], np.float32), phases)
-        show_rows(memory, table, choice, phases[row : row + 1].astype(float), (J, AT, HALFLIFE), out)
-        shown.append(out[0].astype(float))
-        before = row
+        predictor._search = lambda *_, row=row: np.array([row])  # type: ignore[method-assign]
+        y = predictor.predict(zeros[None], phases, None, memory)
         assert memory[0, ROW] == row + 1
-    return np.array(shown)
+        phases = (phases + y[0, LAYOUT.y_phase_change]) % 1
+        shown.append(np.concatenate([y[0, block] for block in BLOCKS]).astype(float))
+        lag.append(float(abs((phases[0] - 0.02 * (row + 1) + 0.5) % 1 - 0.5)))
+    return np.array(shown), np.array(lag)
 
 
 def test_without_a_transition_the_frames_are_played_unchanged() -> None:
     frames = two_runs(np.random.default_rng(1))
-    np.testing.assert_allclose(played(frames, list(range(5, 50))), frames[5:50], atol=1e-6)
+    expected = np.concatenate([frames[5:50, block] for block in BLOCKS], axis=1)
+    np.testing.assert_allclose(played(frames, list(range(5, 50)))[0], expected, atol=1e-6)
 
 
-def test_a_transition_is_continuous_and_ends_in_the_new_run() -> None:
-    frames = two_runs(np.random.default_rng(2))
-    shown = played(frames, [*range(1, 20), *range(70, 115)])
-    position, velocity = shown[:, : 3 * J], shown[:, 3 * J : 6 * J]
-    apart = np.abs(frames[20, : 3 * J] - frames[70, : 3 * J]).max()
-    # Without inertialisation the step would be that distance. The spring starts with the old velocity.
-    np.testing.assert_allclose(position[19] - position[18], velocity[18], atol=0.12 * apart)
-    np.testing.assert_allclose(shown[-1], frames[114], atol=0.02)
+def spring(x0: np.ndarray, v0: np.ndarray, frames: int = 30) -> np.ndarray:
+    """x = (x0 + (v0 + d x0) t) e^(-d t), with d = 2 ln 2 / halflife, after 1, 2, ... frames."""
+    d, t = 2 * np.log(2) / HALFLIFE, np.arange(1, frames + 1)[:, None]
+    return (x0 + (v0 + d * x0) * t) * np.exp(-d * t)
 
 
-def test_an_offset_decays_like_a_critically_damped_spring() -> None:
-    """x = (x0 + (v0 + d x0) t) e^(-d t), with d = 2 ln 2 / halflife."""
+def test_an_offset_decays_like_a_critically_damped_spring_into_the_new_run() -> None:
     frames = two_runs(np.random.default_rng(3))
-    shown = played(frames, [*range(1, 20), *range(70, 100)])
-    x0 = frames[20, : 3 * J].astype(float) - frames[70, : 3 * J]
-    v0 = frames[20, 3 * J : 6 * J].astype(float) - frames[70, 3 * J : 6 * J]
-    d = 2 * np.log(2) / HALFLIFE
-    t = np.arange(1, 31)[:, None]
-    expected = (x0 + (v0 + d * x0) * t) * np.exp(-d * t)
-    np.testing.assert_allclose(shown[19:, : 3 * J] - frames[70:100, : 3 * J], expected, atol=2e-4)
+    shown, _ = played(frames, [*range(1, 20), *range(70, 100)])
+    position, velocity = (frames[:, block].astype(float) for block in BLOCKS[:2])
+    expected = spring(position[20] - position[70], velocity[20] - velocity[70])
+    np.testing.assert_allclose(shown[19:, : 3 * J] - position[70:100], expected, atol=2e-4)
 
 
-def test_rotations_go_the_shorter_way_and_keep_turning() -> None:
+def test_rotations_do_so_the_shorter_way_and_with_their_speeds() -> None:
+    """Both runs turn about Y. Half angles of 1.4 and -1.4 are .34 apart over half a turn."""
     frames = two_runs(np.random.default_rng(4))
-    shown = played(frames, [*range(1, 20), *range(70, 115)])
-    turns = quat.exp(shown[:, 6 * J : 9 * J].reshape(len(shown), J, 3))
-    angles = quat.angle(turns[1:], turns[:-1])
-    apart = quat.angle(
-        quat.exp(frames[20, 6 * J : 9 * J].reshape(J, 3)), quat.exp(frames[70, 6 * J : 9 * J].reshape(J, 3))
-    )
-    assert (angles[18] < 0.25 * apart).all(), "no jump"
-    np.testing.assert_allclose(
-        quat.angle(turns[-1], quat.exp(frames[114, 6 * J : 9 * J].reshape(J, 3))), 0, atol=1e-3
-    )
-
-
-def test_offsets_of_overlapping_transitions_add_up() -> None:
-    frames = two_runs(np.random.default_rng(5))
-    there_and_back = played(frames, [*range(1, 20), 70, *range(21, 30)])
-    assert np.abs(there_and_back[20:24, : 3 * J] - frames[21:25, : 3 * J]).max() > 0.01
-    memory = np.zeros((1, MEMORY))
-    assert memory.shape[1] == OFFSETS + OFFSETS_PER_JOINT * J
+    half = np.r_[1.4 - 0.02 * np.arange(-20, 40), -1.4 + 0.01 * np.arange(-10, 50)]
+    frames[:, BLOCKS[2]] = np.outer(half, np.tile([0, 1, 0], J))
+    shown, _ = played(frames, [*range(1, 20), *range(70, 100)])
+    turns = [quat.exp(table.reshape(-1, J, 3)) for table in (shown[19:, 6 * J :], frames[70:100, BLOCKS[2]])]
+    offset = quat.log(quat.mul(turns[0], quat.inv(turns[1])))
+    expected = spring(np.full(1, 2.8 - np.pi), np.full(1, -0.02 - 0.01))
+    np.testing.assert_allclose(offset[..., 1], np.tile(expected, J), atol=1e-4)
 
 
 @pytest.mark.parametrize("off", [0.3, -0.3])
 def test_the_phase_moves_to_that_of_the_clips(off: float) -> None:
-    frames = two_runs(np.random.default_rng(6))
-    memory, phases = np.zeros((1, MEMORY)), (0.02 * np.arange(120) % 1).astype(np.float32)
-    phase = np.array([off % 1.0])
-    for row in range(60):
-        out = np.zeros((1, frames.shape[1]), np.float32)
-        choice = tuple(np.array([value]) for value in (row - 1, row if row else -1, False, row))
-        table = (frames, np.ones(frames.shape[1], np.float32), phases)
-        show_rows(memory, table, choice, phase, (J, AT, HALFLIFE), out)
-        phase = (phase + out[0, AT[3]]) % 1
-    away = abs((phase[0] - 60 * 0.02 + 0.5) % 1 - 0.5)
-    assert away == pytest.approx(0.3 - 59 * 0.002, abs=1e-4)
+    """By .002 cycles a frame, from the second frame on."""
+    lag = played(two_runs(np.random.default_rng(6)), list(range(60)), off % 1.0)[1]
+    np.testing.assert_allclose(lag, 0.3 - 0.002 * np.arange(60), atol=1e-4)

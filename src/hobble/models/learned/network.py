@@ -26,9 +26,7 @@ from hobble.models.matching.network import (
     MOST_WEIGHT,
     OFFSETS_PER_JOINT,
     Playing,
-    first_columns,
-    pull_phase,
-    smooth_jumps,
+    Transitions,
 )
 from hobble.models.network import LEARNED, Export, inverse_or_0, standardise_inputs
 from hobble.models.onnx_file import Graph, Node, OnnxNetwork, add_layers, write_checked
@@ -203,7 +201,7 @@ class LearnedPredictor(StandardisingPredictor):
         self.decompressor, self.stepper, self.projector = (
             Stack(*layers, storage) for layers in (network.decompressor, network.stepper, network.projector)
         )
-        self._at = first_columns(network.layout)
+        self._transitions = Transitions(network.layout, network.halflife)
         self._states = slice(STATE, STATE + len(network.columns) + network.latent)
 
     def evaluate(self, z: Array, phase: Array, out: Array, memory: Any = None, *_: Any) -> None:
@@ -228,17 +226,21 @@ class LearnedPredictor(StandardisingPredictor):
                 np.square((wish - s[:, :features]) * network.std).sum(axis=1) for s in (state[due], found)
             )
             jumps[due] = new[due] | (there < here)
-        following = state.copy() if jumps.any() else state
+        following = state.copy()
         if len(due):
             state[due] = np.where(jumps[due, None], found, state[due])
         shown = _run(self.decompressor, state, out.shape[1] + PHASE_OUTPUTS)
-        before = shown
-        if (jumps & ~new).any():
-            before = _run(self.decompressor, following, shown.shape[1])
         jumps &= ~new
-        out[:] = shown[:, :-PHASE_OUTPUTS]
-        smooth_jumps(memory[:, self._states.stop :], before, jumps, self._at, network.halflife, out)
-        pull_phase(np.arctan2(shown[:, -2], shown[:, -1]) / (2 * np.pi), phase, ~new, self._at, out)
+        offsets = self._transitions.of(memory[:, self._states.stop :])
+        if jumps.any():
+            would_come = _run(self.decompressor, following[jumps], shown.shape[1])
+            changed = offsets[jumps]
+            self._transitions.add(changed, would_come, shown[jumps])
+            offsets[jumps] = changed
+        out[:] = pose = shown[:, :-PHASE_OUTPUTS]
+        self._transitions.advance(offsets, out)
+        self._transitions.pull_phase(np.arctan2(shown[:, -2], shown[:, -1]) / (2 * np.pi), phase, out)
+        out[new] = pose[new]
         states[:] = state
         memory[:, SHOWN] = 1
 

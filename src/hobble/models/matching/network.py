@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 from scipy.spatial import cKDTree
 
-from hobble.core.compiled import njit
+from hobble.core import quat
 from hobble.core.declared import ArrayOf, read_declared
 from hobble.core.errors import InputError
 from hobble.core.quat import Array
@@ -49,9 +49,6 @@ SINCE = 1  # frames since the last search
 OFFSETS = 2  # the first of the offsets
 # A joint has offsets of position, velocity, rotation and rotation speed, in this order, three numbers each.
 OFFSETS_PER_JOINT = 12
-# Indices in `at`, the array with the first columns in Y of the joints' positions, velocities and rotations,
-# and the column of the change of phase.
-POSITION, VELOCITY, ROTATION, PHASE_CHANGE = 0, 1, 2, 3
 FASTEST_PULL = 0.002  # cycles per frame: the phase is corrected toward the clip's phase by at most this
 
 
@@ -71,7 +68,7 @@ class Matching(Network):
     features: (R, n) float32, these columns of each frame, times their factors. frames: (R, Y) float32, the Y
     of each frame, in raw units. phases: (R,) float32, in cycles. remaining: (R,) how many frames follow each
     frame in its run. every: frames between two searches. halflife: of the offsets that smooth a transition
-    to another frame, in frames (see `show_rows`).
+    to another frame, in frames (see `Transitions`).
     """
 
     kind: ClassVar[str] = "matching"
@@ -237,26 +234,62 @@ class MatchingPredictor(StandardisingPredictor):
         if storage == "int16":
             self.scale = np.maximum(np.abs(network.frames).max(axis=0) / 32767, 1e-30).astype(np.float32)
             self.frames = np.round(network.frames / self.scale).astype(np.int16)
-        self._first_columns = first_columns(network.layout)
+        self._transitions = Transitions(network.layout, network.halflife)
         _ = network.tree  # build the tree now, not in the first frame
 
     def evaluate(self, z: Array, phase: Array, out: Array, memory: Any = None, *_: Any) -> None:
         """As in `Predictor`. memory: (C, M) float64 with M = `Network.memory_size`. With None or zeros, each
         character shows the frame nearest to its inputs."""
-        network, count = self.network, len(z)
+        network, transitions = self.network, self._transitions
         if memory is None:
-            memory = np.zeros((count, network.memory_size))
-        before, following = np.empty(count, np.int64), np.empty(count, np.int64)
-        due = np.empty(count, np.bool_)
-        find_following(memory, network.remaining, network.every, before, following, due)
+            memory = np.zeros((len(z), network.memory_size))
+        before, following = self._rows_in_turn(memory[:, ROW])
+        # `not <` and not `>=`, so that a NaN in the memory leads to a search.
+        due, new = (following < 0) | ~(memory[:, SINCE] + 1 < network.every), before < 0
         shown = following.copy()
         if due.any():
-            searching = np.flatnonzero(due)
-            shown[searching] = self._search(network.input_features(z[searching]), following[searching])
-        table, choice = (self.frames, self.scale, network.phases), (before, following, due, shown)
-        show_rows(
-            memory, table, choice, phase, (network.layout.joints, self._first_columns, network.halflife), out
-        )
+            shown[due] = self._search(network.input_features(z[due]), following[due])
+        memory[new] = 0.0
+        memory[:, ROW], memory[:, SINCE] = shown + 1, np.where(due, 0, memory[:, SINCE] + 1)
+        offsets, jumps = transitions.of(memory[:, OFFSETS:]), ~new & (shown != following)
+        if jumps.any():
+            offsets[jumps] = self._jump(offsets[jumps], before[jumps], following[jumps], shown[jumps])
+        out[:] = pose = self._poses(shown)
+        transitions.advance(offsets, out)
+        transitions.pull_phase(network.phases[shown], phase, out)
+        out[new] = pose[new]
+
+    def _poses(self, rows: NDArray[np.int64]) -> Array:
+        return np.asarray(self.frames[rows] * self.scale)
+
+    def _rows_in_turn(self, stored: Array) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """The last row (C,) that each character showed, or -1, and the next row (C,) of its run, or -1.
+
+        stored: (C,) the numbers at ROW in the memories, which may be any.
+        """
+        remaining = self.network.remaining
+        valid = (stored >= 1) & (stored <= len(remaining))
+        before = np.where(valid, stored, 0).astype(np.int64) - 1
+        return before, np.where(valid & (remaining[before] > 0), before + 1, -1)
+
+    def _jump(
+        self, offsets: Array, before: NDArray[np.int64], following: NDArray[np.int64], row: NDArray[np.int64]
+    ) -> Array:
+        """The offsets (C, J, 4, 3) after C characters have jumped to rows (C,), instead of to `following`.
+
+        If the old run has ended (`following` is -1), the last pose shown takes the place of the next one, and
+        rotation speeds are not known. They are rotations of joints from one row to the next of a run, so a
+        search finds no row that is the first of a run.
+        """
+        goes_on, transitions = following >= 0, self._transitions
+        transitions.add(offsets, self._poses(np.where(goes_on, following, before)), self._poses(row))
+        speeds = offsets[goes_on]
+        before, following, row = before[goes_on], following[goes_on], row[goes_on]
+        transitions.add_rotation_speeds(speeds, self._poses(before), self._poses(following), 1.0)
+        previous = np.maximum(row - 1, 0)
+        transitions.add_rotation_speeds(speeds, self._poses(previous), self._poses(row), -1.0)
+        offsets[goes_on] = speeds
+        return offsets
 
     def _search(self, queries: Array, following: NDArray[np.int64]) -> NDArray[np.int64]:
         """The rows (C,) to show for the features `queries` (C, n) of C characters.
@@ -276,213 +309,66 @@ class MatchingPredictor(StandardisingPredictor):
         return np.where(stay & (following >= 0), following, found)
 
 
-def first_columns(layout: RowLayout) -> NDArray[np.int64]:
-    """The columns of Y at POSITION, VELOCITY, ROTATION and PHASE_CHANGE."""
-    blocks = layout.y_joint_position, layout.y_joint_velocity, layout.y_joint_rotation, layout.y_phase_change
-    return np.array([block.start for block in blocks], np.int64)
+@dataclass(frozen=True)
+class Transitions:
+    """Keeps the offsets of characters, which make the transitions to other frames smooth.
 
-
-@njit
-def find_following(memory: Any, remaining: Any, every: int, before: Any, following: Any, due: Any) -> None:
-    """Find the next row of each character's run, and whether the character needs a search.
-
-    memory: (C, M) for C characters. remaining: (R,) how many frames follow each row in its run. every: frames
-    between two searches.
-
-    Writes three arrays (C,). before: the last row shown, or -1 if there is none. following: the row after
-    `before`, or -1 if the run ends or `before` is -1. due: whether to search.
+    The offsets of C characters are (C, J, 4, 3): position, velocity, rotation and rotation speed of J joints.
+    halflife: in frames. After as many frames, 60 % is left of an offset that was at rest.
     """
-    rows = len(remaining)
-    for c in range(len(memory)):
-        row = memory[c, ROW]
-        valid = 1 <= row <= rows
-        before[c] = np.int64(row) - 1 if valid else -1
-        following[c] = before[c] + 1 if valid and remaining[before[c]] > 0 else -1
-        # `not <` and not `>=`, so that a NaN in the memory leads to a search.
-        due[c] = following[c] < 0 or not memory[c, SINCE] + 1 < every
+
+    layout: RowLayout
+    halflife: float
+
+    def of(self, memory: Array) -> Array:
+        """The offsets in the memories (C, 12 J) of C characters, as a view."""
+        return memory.reshape(len(memory), self.layout.joints, 4, 3)
+
+    def add(self, offsets: Array, old: Array, new: Array) -> None:
+        """Add the differences between the poses `old`, which would have come, and `new`, both rows of Y."""
+        (position, velocity, rotation), (to, speed, turn) = self._joints(old), self._joints(new)
+        offsets[:, :, 0] += position - to
+        offsets[:, :, 1] += velocity - speed
+        offsets[:, :, 2] = _turned(offsets[:, :, 2], _turn_between(turn, rotation))
+
+    def add_rotation_speeds(self, offsets: Array, before: Array, pose: Array, sign: float) -> None:
+        """Add the rotations of the joints from the poses `before` to the next ones, times `sign`."""
+        earlier, later = self._joints(before)[2], self._joints(pose)[2]
+        offsets[:, :, 3] += sign * _turn_between(earlier, later)
+
+    def advance(self, offsets: Array, out: Array) -> None:
+        """Advance the offsets by one frame, and add them to the poses `out` (C, Y).
+
+        An offset x with the damping d follows x'' = -2 d x' - d^2 x (Holden's article). The solution is
+        x = e^(-d t) (x0 + j t), and x' = e^(-d t) (v0 - d j t), with j = v0 + d x0.
+        """
+        damping = 2.0 * np.log(2.0) / self.halflife
+        fade, (x, v) = np.exp(-damping), (offsets[:, :, ::2], offsets[:, :, 1::2])
+        j = v + x * damping
+        x[...], v[...] = fade * (x + j), fade * (v - j * damping)
+        position, velocity, rotation = self._joints(out)
+        position += offsets[:, :, 0].astype(np.float32)
+        velocity += offsets[:, :, 1].astype(np.float32)
+        rotation[...] = _turned(offsets[:, :, 2], rotation)
+
+    def pull_phase(self, wanted: Array, phase: Array, out: Array) -> None:
+        """Change the change of phase in `out` (C, Y), so that the phases (C,) approach the `wanted` ones."""
+        lag = wanted - phase
+        lag -= np.floor(lag + 0.5)  # at most half a cycle, forwards or backwards
+        out[:, self.layout.y_phase_change.start] += np.clip(lag, -FASTEST_PULL, FASTEST_PULL)
+
+    def _joints(self, y: Array) -> list[Array]:
+        """Positions, velocities and rotations (C, J, 3) in rows of Y, as views."""
+        layout = self.layout
+        blocks = layout.y_joint_position, layout.y_joint_velocity, layout.y_joint_rotation
+        return [y[:, block].reshape(len(y), layout.joints, 3) for block in blocks]
 
 
-# Each of these types is a tuple of arguments of `show_rows`. The comment names its items in their order.
-#
-# frames: (R, Y), the poses divided by `scale`. scale: (Y,). phases: (R,).
-Table = tuple[Any, Any, Any]
-# before, following, due: from `find_following`. shown: (C,) the row that each character shows now.
-Choice = tuple[Any, Any, Any, Any]
-# joints: number of joints. at: (4,) columns in Y, see POSITION. halflife: of the offsets, in frames.
-Shape = tuple[int, Any, float]
+def _turned(turn: Array, rotation: Array) -> Array:
+    """The rotation vectors (..., 3) of `rotation`, followed by `turn`."""
+    return quat.log(quat.mul(quat.exp(turn), quat.exp(rotation)))
 
 
-@njit(error_model="numpy")
-def show_rows(memory: Any, table: Table, choice: Choice, phase: Any, shape: Shape, out: Any) -> None:
-    """Write the pose of each character, the row to show plus the offsets, into `out` (C, Y).
-
-    Updates memory (C, M). phase: (C,) the characters' phases; the change of phase in `out` is corrected, so
-    that the character's phase approaches that of the row. If the row to show is not the following one, a
-    transition starts. The row should then not be the first of a run, because its rotation speed is computed
-    from the row before it.
-    """
-    frames, scale, phases = table
-    before, following, due, shown = choice
-    joints, at, halflife = shape
-    # As in Holden's article. After `halflife` frames, 60 % is left of an offset that was at rest.
-    damping = 2.0 * np.log(2.0) / halflife
-    for c in range(len(memory)):
-        row = shown[c]
-        out[c] = frames[row] * scale
-        if before[c] < 0:
-            memory[c] = 0.0
-        else:
-            if row != following[c]:
-                _start_transition(memory[c], frames, scale, before[c], following[c], row, joints, at)
-            _decay_offsets(memory[c, OFFSETS:], damping)
-            _add_offsets(memory[c, OFFSETS:], joints, at, out[c])
-            out[c, at[PHASE_CHANGE]] += _pull(phases[row], phase[c])
-        memory[c, ROW] = row + 1
-        memory[c, SINCE] = 0 if due[c] else memory[c, SINCE] + 1
-
-
-@njit(error_model="numpy")
-def smooth_jumps(offsets: Any, before: Any, jumps: Any, at: Any, halflife: float, out: Any) -> None:
-    """Add the offsets (C, 12 joints) of C characters to their poses in `out` (C, Y), after they have decayed.
-
-    Where `jumps` (C,) is true, the difference between the pose that would have come, in `before` (C, Y), and
-    that in `out` is first added to the offsets. at, halflife: as in `show_rows`.
-    """
-    joints, damping = offsets.shape[1] // OFFSETS_PER_JOINT, 2.0 * np.log(2.0) / halflife
-    for c in range(len(out)):
-        if jumps[c]:
-            _add_difference(offsets[c], before[c], out[c], joints, at)
-        _decay_offsets(offsets[c], damping)
-        _add_offsets(offsets[c], joints, at, out[c])
-
-
-@njit(error_model="numpy")
-def pull_phase(phases: Any, phase: Any, chosen: Any, at: Any, out: Any) -> None:
-    """Correct the change of phase in `out` (C, Y) of the `chosen` (C,) characters, as `show_rows` does.
-
-    phases, phase: (C,) of the poses and of the characters, in cycles.
-    """
-    for c in range(len(out)):
-        if chosen[c]:
-            out[c, at[PHASE_CHANGE]] += _pull(phases[c], phase[c])
-
-
-@njit(forceinline=True, cache=False)
-def _pull(wanted: float, phase: float) -> float:
-    """What to add to the change of a phase so that it approaches the phase `wanted`."""
-    lag = wanted - phase
-    lag -= np.floor(lag + 0.5)  # at most half a cycle, forwards or backwards
-    return min(max(lag, -FASTEST_PULL), FASTEST_PULL)
-
-
-@njit(forceinline=True, cache=False)
-def _start_transition(
-    memory: Any, frames: Any, scale: Any, before: int, following: int, row: int, joints: int, at: Any
-) -> None:
-    """Add the difference between two poses to the offsets: the pose that would have come next, minus `row`'s.
-
-    If the old run has ended (`following` is -1), the last pose shown takes the place of the next one.
-    """
-    offsets = memory[OFFSETS:]
-    old, new = frames[following if following >= 0 else before] * scale, frames[row] * scale
-    # A joint's rotation speed is its rotation from one row to the next of the same run.
-    before_old, before_new = frames[before] * scale, frames[max(row - 1, 0)] * scale
-    _add_difference(offsets, old, new, joints, at)
-    if following < 0:
-        return
-    r = np.empty(3)
-    for j in range(joints):
-        column, k = at[ROTATION] + 3 * j, OFFSETS_PER_JOINT * j + 9
-        _rotation_since(before_old, old, column, r)
-        for i in range(3):
-            offsets[k + i] += r[i]
-        _rotation_since(before_new, new, column, r)
-        for i in range(3):
-            offsets[k + i] -= r[i]
-
-
-@njit(forceinline=True, cache=False)
-def _add_difference(offsets: Any, old: Any, new: Any, joints: int, at: Any) -> None:
-    """Add pose `old` minus pose `new`, rows of Y, to the offsets of positions, velocities and rotations."""
-    q, p, r = np.empty(4), np.empty(4), np.empty(3)  # two quaternions and a rotation vector
-    for j in range(joints):
-        k = OFFSETS_PER_JOINT * j
-        for i in range(3):
-            offsets[k + i] += old[at[POSITION] + 3 * j + i] - new[at[POSITION] + 3 * j + i]
-            offsets[k + 3 + i] += old[at[VELOCITY] + 3 * j + i] - new[at[VELOCITY] + 3 * j + i]
-        column = at[ROTATION] + 3 * j
-        _exp(old, column, q)
-        _exp(new, column, p)
-        _rotation_between(q, p, r)
-        _exp(offsets, k + 6, p)
-        _exp(r, 0, q)
-        _log_of_product(p, q, offsets, k + 6)
-
-
-@njit(forceinline=True, cache=False)
-def _decay_offsets(offsets: Any, damping: float) -> None:
-    """Advance the offsets and their speeds by one frame.
-
-    An offset x with the damping d follows x'' = -2 d x' - d^2 x. The solution is x = e^(-d t) (x0 + j t), and
-    x' = e^(-d t) (v0 - d j t), with j = v0 + d x0.
-    """
-    fade = np.exp(-damping)
-    for k in range(0, len(offsets), 6):  # three offsets, then their three speeds
-        for i in range(k, k + 3):
-            j = offsets[i + 3] + offsets[i] * damping
-            offsets[i], offsets[i + 3] = fade * (offsets[i] + j), fade * (offsets[i + 3] - j * damping)
-
-
-@njit(forceinline=True, cache=False)
-def _add_offsets(offsets: Any, joints: int, at: Any, y: Any) -> None:
-    """Add the offsets to the pose in the row y (Y,)."""
-    q, p = np.empty(4), np.empty(4)
-    for j in range(joints):
-        k, column = OFFSETS_PER_JOINT * j, at[ROTATION] + 3 * j
-        for i in range(3):
-            y[at[POSITION] + 3 * j + i] += offsets[k + i]
-            y[at[VELOCITY] + 3 * j + i] += offsets[k + 3 + i]
-        _exp(offsets, k + 6, q)
-        _exp(y, column, p)
-        _log_of_product(q, p, y, column)
-
-
-@njit(forceinline=True, cache=False)
-def _exp(v: Any, i: int, q: Any) -> None:
-    """Write the quaternion (w, x, y, z) of the rotation vector v[i : i + 3] into q."""
-    half_angle = np.sqrt(v[i] * v[i] + v[i + 1] * v[i + 1] + v[i + 2] * v[i + 2])
-    scale = np.sin(half_angle) / half_angle if half_angle > 1e-8 else 1.0
-    q[0], q[1], q[2], q[3] = np.cos(half_angle), v[i] * scale, v[i + 1] * scale, v[i + 2] * scale
-
-
-@njit(forceinline=True, cache=False)
-def _log_of_product(a: Any, b: Any, v: Any, i: int) -> None:
-    """Write the rotation vector of the quaternion product a b into v[i : i + 3], the shorter way round."""
-    w = a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3]
-    x = a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2]
-    y = a[0] * b[2] - a[1] * b[3] + a[2] * b[0] + a[3] * b[1]
-    z = a[0] * b[3] + a[1] * b[2] - a[2] * b[1] + a[3] * b[0]
-    if w < 0:
-        w, x, y, z = -w, -x, -y, -z
-    length = np.sqrt(x * x + y * y + z * z)
-    scale = np.arctan2(length, w) / length if length > 1e-8 else 1.0
-    v[i], v[i + 1], v[i + 2] = x * scale, y * scale, z * scale
-
-
-@njit(forceinline=True, cache=False)
-def _rotation_between(a: Any, b: Any, v: Any) -> None:
-    """Write the rotation vector from b to a, that of a b^-1, into v. Replaces b by its inverse."""
-    b[1], b[2], b[3] = -b[1], -b[2], -b[3]
-    _log_of_product(a, b, v, 0)
-
-
-@njit(forceinline=True, cache=False)
-def _rotation_since(earlier: Any, now: Any, column: int, v: Any) -> None:
-    """Write the rotation vector of a joint from row `earlier` to row `now` into v.
-
-    column: the first column of the joint's rotation.
-    """
-    q, p = np.empty(4), np.empty(4)
-    _exp(now, column, q)
-    _exp(earlier, column, p)
-    _rotation_between(q, p, v)
+def _turn_between(before: Array, after: Array) -> Array:
+    """The rotation vectors (..., 3) from `before` to `after`."""
+    return _turned(after, -np.asarray(before, float))
