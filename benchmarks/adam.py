@@ -23,7 +23,7 @@ from hobble.models.step import FusedStep
 from hobble.training.checkpoint import use_threads
 from hobble.training.optimiser import Adam, l1_slopes
 
-KEEP, L1, RATE, BETAS = 4, 0.97, 0.01, 1e-4, (0.9, 0.999)
+KEEP, L1, RATE, BETAS = 0.97, 0.01, 1e-4, (0.9, 0.999)
 
 
 SECONDS = 1.0  # for all calls that are compared

@@ -141,7 +141,7 @@ def main() -> int:
         return min(1, compare(Path(sys.argv[2]), Path(sys.argv[3])))
     if len(sys.argv) < 3 or sys.argv[1] != "write":
         print(__doc__)
-        return 2
+        return 0 if "--help" in sys.argv else 2
     folder = Path(sys.argv[2]).resolve()
     for part in sys.argv[3:] or PARTS:
         write_commands(folder, part) if part in ("motion", "labels") else write_workflow(folder, part)

@@ -5,7 +5,7 @@ python benchmarks/impairment_profiles.py IMPAIRED_WALKS.npz
 
 from __future__ import annotations
 
-import sys
+import argparse
 from pathlib import Path
 from typing import Any
 
@@ -106,4 +106,6 @@ def _round(value: Any) -> Any:
 
 
 if __name__ == "__main__":
-    derive_profiles(sys.argv[1])
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("walks")
+    derive_profiles(parser.parse_args().walks)
