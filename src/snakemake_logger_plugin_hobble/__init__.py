@@ -20,6 +20,8 @@ from typing import Any, TextIO
 from snakemake.logging import DefaultFilter, DefaultFormatter
 from snakemake_interface_logger_plugins.base import LogHandlerBase
 
+from hobble.core.messages import duration
+
 TICK_SECONDS = 1.0  # between two updates of the line of progress on a terminal
 PROGRESS_SECONDS = 30.0  # between lines of progress if the output goes to a file
 LONG_SECONDS = 15.0  # the log of a job that runs longer than this is named
@@ -131,7 +133,7 @@ class Terminal:
     def _print_summary(self) -> None:
         if not (self.jobs or self.failed):
             return
-        took = _format_duration(self.now() - self.began)
+        took = duration(self.now() - self.began)
         count = f"{self.done} of {self.total or len(self.jobs)} jobs done in {took}"
         if self.failed:
             self._print_line(f"{count}, {len(self.failed)} failed:")
@@ -195,7 +197,7 @@ class Terminal:
                 self.named.add(number)
                 self._print_line(f"{job.name}: its log is {job.log}")
         doing = list(dict.fromkeys(_doing(job) for job in self.running.values()))
-        took = _format_duration(self.now() - self.began)
+        took = duration(self.now() - self.began)
         line = f"{self.done}/{self.total} jobs, {took}" + (f": {'; '.join(doing)}" if doing else "")
         if self.live:
             self.stream.write(f"\r\x1b[K{line[: shutil.get_terminal_size((100, 24)).columns - 1]}")
@@ -277,15 +279,6 @@ def _last_match(log: str, pattern: re.Pattern[str]) -> str:
     except OSError:
         return ""
     return found[-1] if found else ""
-
-
-def _format_duration(seconds: float) -> str:
-    """A time as text, such as "3 min 20 s"."""
-    minutes, rest = divmod(round(seconds), 60)
-    hours, minutes = divmod(minutes, 60)
-    if hours:
-        return f"{hours} h {minutes:02} min"
-    return f"{minutes} min {rest:02} s" if minutes else f"{rest} s"
 
 
 class LogHandler(LogHandlerBase):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import functools
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -22,8 +23,13 @@ ASKING = {
 }
 
 
-def words(path: Path) -> Iterator[str]:
+@functools.cache
+def words(path: Path) -> list[str]:
     """The text of a script or template. Of Python only names and strings, without docstrings."""
+    return list(_words(path))
+
+
+def _words(path: Path) -> Iterator[str]:
     text = path.read_text(encoding="utf-8")
     if path.suffix != ".py":
         yield text

@@ -107,8 +107,3 @@ def test_continuous_only_flips_signs():
     mended = quat.continuous(q * signs)
     assert np.sum(mended[1:] * mended[:-1], axis=-1).min() > 0
     np.testing.assert_array_equal(np.abs(mended), np.abs(q))
-
-
-def test_yaw_turns_forward_to_the_left():
-    np.testing.assert_allclose(quat.rotate(quat.yaw(np.pi / 2), np.array([0.0, 0, 1])), [1, 0, 0], atol=1e-12)
-    np.testing.assert_allclose(quat.yaw(0.7), quat.from_axis_angle(np.array([0, 1.0, 0]), 0.7), atol=1e-15)

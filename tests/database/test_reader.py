@@ -13,9 +13,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hobble.core.errors import InputError
+from hobble.core.errors import HobbleError, InputError
 from hobble.core.files import read_json
-from hobble.database.reader import Block, Database, read_ahead
+from hobble.database.chunks import to_stored_type
+from hobble.database.reader import Block, Database
 from hobble.database.write import write_database
 from hobble.rows.clip_rows import pair_batches
 
@@ -134,8 +135,10 @@ def test_rows_are_mixed_like_independent_draws(rows_of, tmp_path):
     assert 0.85 < means.var() * 32 < 1.15  # 1 for independent draws; rows in the clips' order give 32
 
 
-@pytest.mark.parametrize(("dtype", "relative"), [("float16", 2.0**-11), ("bfloat16", 2.0**-8)])
-def test_half_precision_halves_the_size_and_hardly_changes_values(path, sources, tmp_path, dtype, relative):
+def test_half_precision_halves_the_size_and_hardly_changes_values(path, sources, tmp_path):
+    with pytest.raises(HobbleError, match=r"7e\+04 does not fit float16.* float32"):
+        to_stored_type(np.array([1.0, -7e4]), "float16")
+    relative = 2.0**-11
     splits = {name: "held_out" if name == "kept" else "train" for name in sources}
     half = write_database(
         tmp_path / "db",
@@ -144,7 +147,7 @@ def test_half_precision_halves_the_size_and_hardly_changes_values(path, sources,
         channels=["injury"],
         joint_weight=0.1,
         seed=3,
-        dtype=dtype,
+        dtype="float16",
         chunk_bytes=40_000,
     )
     full = Database.open(path, MEMORY)
@@ -186,24 +189,6 @@ def test_a_damaged_chunk_is_named(sources, tmp_path, harm):
             whole_pass(Database.open(tmp_path / "db", memory), "train", 0, 10)
 
 
-def test_any_changed_byte_of_a_chunk_is_detected(sources, tmp_path):
-    manifest = write_database(
-        tmp_path / "db", {"a": sources["rocky"]}, {"a": "train"}, channels=["injury"], joint_weight=0.1
-    )
-    (chunk,) = manifest.chunks["train"]
-    file = tmp_path / "db" / manifest.folder / chunk.file
-    whole = file.read_bytes()
-    rng = np.random.default_rng(0)
-    for at in [0, 7, 8, 9, len(whole) - 1, *rng.integers(0, len(whole), 60)]:
-        data = bytearray(whole)
-        data[at] ^= 1 << rng.integers(8)
-        file.write_bytes(data)
-        with pytest.raises(InputError, match=f"{chunk.file}: damaged"):
-            whole_pass(Database.open(tmp_path / "db", DISK), "train", 0, 10)
-    file.write_bytes(whole)
-    assert len(whole_pass(Database.open(tmp_path / "db", DISK), "train", 0, 10).p) == 400
-
-
 def test_a_manifest_that_differs_from_its_chunks_is_refused(sources, tmp_path):
     write_database(tmp_path, {"a": sources["rocky"]}, {"a": "train"}, channels=["injury"], joint_weight=0.1)
     manifest = read_json(tmp_path / "manifest.json")
@@ -226,19 +211,6 @@ def test_an_incomplete_database_is_refused(path, tmp_path):
     (tmp_path / "manifest.json").write_text(json.dumps(manifest))
     with pytest.raises(InputError, match="chunks"):
         Database.open(tmp_path)
-
-
-def test_reading_ahead_keeps_the_order_and_raises_errors():
-    assert list(read_ahead(iter(range(100)))) == list(range(100))
-
-    def breaking():
-        yield 1
-        raise ValueError("here")
-
-    items = read_ahead(breaking())
-    assert next(items) == 1
-    with pytest.raises(ValueError, match="here"):
-        next(items)
 
 
 def test_a_chunk_can_be_opened_with_numpy(path):

@@ -81,9 +81,5 @@ def no_role(name: str) -> Change:
     return lambda c: c["meta"]["skeleton"]["roles"].pop(name)
 
 
-def scaled(name: str, factor: float) -> Change:
-    return lambda c: c.update({name: c[name] * np.float32(factor)})
-
-
 def each(*names: str, factor: float) -> Change:
     return lambda c: c.update({name: c[name] * np.float32(factor) for name in names})

@@ -16,13 +16,11 @@ import torch
 from hobble.core.errors import InputError
 from hobble.core.skeleton import Skeleton
 from hobble.models import NETWORK_KINDS, network_options, options_of_kind
-from hobble.models.forward import softmax
 from hobble.models.load import network_from_arrays
 from hobble.models.mann import GATE_INPUTS, MannOptions
 from hobble.models.model import BuiltOptions, Trainable, TrainedOptions
 from hobble.models.network import STORAGES, Network, standardise_inputs
 from hobble.rows.layout import GAITS, RowLayout
-from hobble.runtime.animation import ProceduralAnimation
 
 from .matching.example import built
 
@@ -81,11 +79,6 @@ def random_inputs(network: Network, rows: int = 7) -> tuple[np.ndarray, np.ndarr
 def near(network: Network, y: np.ndarray, expected: np.ndarray, within: float) -> None:
     """Whether two outputs are nearly equal, compared in standard deviations."""
     np.testing.assert_allclose((y - expected) / network.y_std, 0, atol=within)
-
-
-def test_the_modes_that_a_kind_names_are_those_of_its_networks(made: Made) -> None:
-    kind = json.loads(str(made[1]["meta"]))["kind"]
-    assert options_of_kind(kind).modes == made[2].modes
 
 
 def test_the_read_network_equals_the_trained_one(made: Made) -> None:
@@ -148,13 +141,6 @@ def test_onnxruntime_predicts_the_same_as_python(made: Made, tmp_path: Path) -> 
     near(network, y, network.predict(x, phase), 1e-4)
 
 
-def test_a_character_moves(made: Made) -> None:
-    animation = ProceduralAnimation(made[2], characters=2)
-    for _ in range(3):
-        pose = animation.next_pose([1.0, 0.0])
-    assert np.isfinite(pose.positions).all()
-
-
 def changed() -> Iterator[tuple[str, Callable[[np.ndarray], np.ndarray | None]]]:
     yield "is gone", lambda a: None
     yield "has one row less", lambda a: a[1:]
@@ -187,8 +173,3 @@ def test_the_gate_reads_feet_gait_and_target_velocity(holden31: Skeleton) -> Non
     columns = MannOptions().gate_columns(layout, holden31)
     assert len(columns) == GATE_INPUTS
     assert x[list(columns)].tolist() == [*range(1, 13), *range(20, 26), *range(30, 36), 40, 41]
-
-
-def test_shares_sum_to_one_however_large_the_logits() -> None:
-    shares = softmax(np.array([[1e4, 0, -1e4], [0, 0, 0]], np.float32))
-    np.testing.assert_allclose(shares, [[1, 0, 0], [1 / 3] * 3], atol=1e-7)

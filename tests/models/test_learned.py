@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from hobble.core.skeleton import Skeleton
+from hobble.models.learned import train
 from hobble.models.learned.network import SINCE, Learned
 from hobble.models.matching.network import Matching
 from hobble.models.network import standardise_inputs
@@ -22,10 +23,13 @@ Made = tuple[Matching, Learned]
 
 @pytest.fixture(scope="module")
 def made(holden31: Skeleton, tmp_path_factory: Any) -> Made:
-    """Motion matching over two clips, and a network that learnt them."""
+    """Motion matching over two clips, and a network that learnt them in a short training."""
     folder = tmp_path_factory.mktemp("learned")
-    sizes = {"steps": 500, "units": 64, "decompressor_units": 128, "latent": 8}
-    return built(holden31, folder)[2], built(holden31, folder, "learned", **sizes)[2]
+    sizes = {"steps": 300, "units": 64, "decompressor_units": 128, "latent": 8}
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(train, "STRETCH", 5)
+        patch.setattr(train, "POOL", 2048)
+        return built(holden31, folder)[2], built(holden31, folder, "learned", **sizes)[2]
 
 
 def x_of(network: Matching, rows: np.ndarray) -> np.ndarray:

@@ -39,22 +39,15 @@ from tests.models.network_content import (
 MALFORMED: dict[str, tuple[Change, str]] = {
     "meta is no JSON": (text("{"), "not valid JSON"),
     "meta is a list": (text("[1]"), "meta: "),
-    "meta is a number": (text(7), "meta has shape"),
-    "meta is many texts": (text(["{}", "{}"]), "meta has shape"),
     "meta nests without end": (text("[" * 100_000), "not valid JSON"),
     "meta holds a number of 9,000 digits": (text(f'{{"a": {"9" * 9000}}}'), "not valid JSON"),
     "another kind": (meta(kind="diffusion"), "meta: kind: "),
     "a kind that is a path": (meta(kind="../../evil"), "meta: kind: "),
-    "a kind that is a list": (meta(kind=["pfnn"]), "meta: kind: "),
     "no W1": (no("W1"), "no W2|no W1"),
-    "no b2": (no("b2"), "no b2"),
     "no Ystd": (no("Ystd"), "no Ystd"),
-    "scalar W0": (array(W0=np.float32(3)), "W0 has shape"),
     "W0 of text": (array(W0=np.array([[["a"]]])), "W0 has shape"),
-    "W0 of complex numbers": (array(W0=np.ones((4, 6, 372), complex)), "W0 has shape"),
     "an empty W1": (array(W1=np.zeros((4, 0, 6), np.float32)), "b1 has shape"),
     "W1 of too few inputs": (cut("W1", 2), "W1 has shape"),
-    "b1 of too few units": (cut("b1", 1), "b1 has shape"),
     "other control points in one layer": (cut("W2", 0), "W2 has shape"),
     "one control point": (
         lambda c: c.update({k: v[:1] for k, v in c.items() if k[0] in "Wb"}),
@@ -73,20 +66,14 @@ MALFORMED: dict[str, tuple[Change, str]] = {
         "17 layers",
     ),
     "NaN in W0": (put("W0", (0, 0, 0), np.nan), "not finite"),
-    "infinity in b2": (put("b2", (1, 3), np.inf), "not finite"),
     "1e30 in W1": (put("W1", (2, 1, 1), 1e30), "above the limit"),
     "layers that overflow together": (each("W0", "W1", "W2", "b0", factor=3e5), "not predict a finite pose"),
-    "NaN in Xmean": (put("Xmean", 5, np.nan), "not finite"),
     "infinity in Ystd": (put("Ystd", 0, np.inf), "not finite"),
     "Xstd below 0": (put("Xstd", 9, -1.0), "below the limit of 0"),
     "1e30 in Ymean": (put("Ymean", 4, 1e30), "above the limit"),
-    "Xmean longer than Xstd": (cut("Xstd", 0), "Xmean has shape|Xstd has shape"),
     "a window of 6e8 frames": (layout(window=600_000_000), "window is 600000000"),
-    "a window of half a frame": (layout(window=0.5), "window is 0.5"),
     "step 0": (layout(step=0), "step is 0"),
-    "step -10": (layout(step=-10), "step is -10"),
     "a window that is no multiple of the step": (layout(window=65), "not a multiple"),
-    "joints that are true": (layout(joints=True), "joints is True"),
     "links below 0": (layout(channels=[["injury", -1]]), "injury is -1"),
     "more links than columns": (layout(channels=[["injury", 31]]), "do not fit"),
     "a layout without joints": (lambda c: c["meta"]["layout"].pop("joints"), "layout cannot be understood"),
@@ -102,36 +89,28 @@ MALFORMED: dict[str, tuple[Change, str]] = {
     "3,000 gaits": (meta(gaits=[f"gait {i}" for i in range(3000)]), "gaits"),
     "seven gaits": (meta(gaits=[*GAITS, "fly"]), "gaits"),
     "one gait six times": (meta(gaits=["walk"] * 6), "gaits"),
-    "gaits that are a text": (meta(gaits="walk"), "gaits"),
-    "gaits that are numbers": (meta(gaits=[1, 2, 3, 4, 5, 6]), "gaits"),
     "5 links for 30 columns": (meta(channels={"injury": list("abcde")}), "but 5 labels"),
     "a link with a control character": (
         meta(channels={"injury": ["a\x1b[31m", *"bcdefghijklmnopqrstuvwxyzABCD"]}),
         "channels.injury",
     ),
-    "links that are a number": (meta(channels={"injury": 30}), "channels.injury"),
     "limits of 400 digits": (
         meta(limits={"injury": {"levels": [0, 10**400], "speeds": [1, 10**400]}}),
         "limits of injury",
     ),
-    "a side that is text": (meta(terrain_side="wide"), "terrain_side"),
     "a side that is NaN": (meta(terrain_side=float("nan")), "terrain_side"),
     "a side of 1e30": (meta(terrain_side=1e30), "terrain_side"),
     "a skeleton that is a list": (meta(skeleton=[1]), "skeleton"),
     "no joints": (skeleton(joints={}), "joints"),
-    "joints that are a list": (skeleton(joints=["Hips"]), "joints"),
     "no role for a heel": (no_role("left_heel"), "left_heel"),
-    "no roles at all": (skeleton(roles={}), "hips"),
     "a role for a joint that is not there": (
         lambda c: c["meta"]["skeleton"]["roles"].update(hips="Tail"),
         "Tail",
     ),
     "a parent that comes later": (joint("LHipJoint", parent="LeftLeg"), "must be listed before"),
-    "a joint that is its own parent": (joint("LHipJoint", parent="LHipJoint"), "must be listed before"),
     "two roots": (joint("LHipJoint", parent=None), "only the first joint"),
     "an offset of two numbers": (joint("LHipJoint", offset=[1, 2]), "offset"),
     "an offset that is NaN": (joint("LHipJoint", offset=[0, float("nan"), 0]), "offset"),
-    "an offset of 1e300": (joint("LHipJoint", offset=[0, 1e300, 0]), "offset"),
     "links of three joints": (skeleton(links=[["Hips", "LHipJoint", "LeftLeg"]]), "links"),
     "an end without place": (skeleton(end_sites={"Head": None}), "end_sites.Head"),
     "one joint fewer": (
@@ -187,14 +166,10 @@ BROKEN_BINS = {
     "no phase": ("W1_017.bin", None),
     "no first layer": ("b0_000.bin", None),
     "half a number": ("Ystd.bin", b"\0\0\0"),
-    "nothing": ("Xstd.bin", b""),
     "a row too few": ("W0_003.bin", numbers(1.0)),
-    "another size of one phase": ("b1_004.bin", numbers(1, 2)),
-    "fewer units in every phase": ("b1_000.bin", numbers(1, 2)),
     "NaN": ("b0_007.bin", numbers(*[np.nan] * 6)),
     "1e30": ("b0_007.bin", numbers(*[1e30] * 6)),
     "no spline": ("b0_007.bin", numbers(1, 2, 3, 4, 5, 6)),
-    "NaN in the statistics": ("Ymean.bin", numbers(*[np.nan] * 311)),
     "a longer row": ("Xmean.bin", numbers(*[1.0] * 400)),
     "a larger file than any": ("Xmean.bin", b"\0" * (1 << 19)),
 }
@@ -246,23 +221,21 @@ def test_entries_that_overlap_take_no_memory(tmp_path: Path, holden31: Skeleton)
 
 def test_the_ground_is_sampled_as_far_to_the_side_as_in_training(tmp_path: Path, holden31: Skeleton) -> None:
     """The runtime and the page look as far to the side as the file says, or 25 cm if it does not say."""
-    for side in (40.0, None):
-        made = content(holden31)
-        if side is None:
-            del made["meta"]["terrain_side"]
-        else:
-            made["meta"]["terrain_side"] = side
-        save(tmp_path / "weights.npz", made)
-        network = load_network(tmp_path)
-        places: list[np.ndarray] = []
+    made = content(holden31)
+    del made["meta"]["terrain_side"]
+    save(tmp_path / "weights.npz", made)
+    assert load_network(tmp_path).terrain_side == 25.0
+    made["meta"]["terrain_side"] = 40.0
+    save(tmp_path / "weights.npz", made)
+    network = load_network(tmp_path)
+    assert playable_data(network, Runtime())["side"] == 40.0
+    places: list[np.ndarray] = []
 
-        def ground(x: np.ndarray, z: np.ndarray, places: list[np.ndarray] = places) -> np.ndarray:
-            places.append(np.stack([x, z], axis=-1))
-            return np.zeros_like(x)
+    def ground(x: np.ndarray, z: np.ndarray) -> np.ndarray:
+        places.append(np.stack([x, z], axis=-1))
+        return np.zeros_like(x)
 
-        ProceduralAnimation(network).next_pose((0, 0.5), terrain=ground)
-        left, path, right = places[0].reshape(-1, 3, 2).transpose(1, 0, 2)
-        expected = side or 25.0
-        np.testing.assert_allclose(np.linalg.norm(left - path, axis=-1), expected, rtol=1e-6)
-        np.testing.assert_allclose(np.linalg.norm(right - path, axis=-1), expected, rtol=1e-6)
-        assert playable_data(network, Runtime())["side"] == expected
+    ProceduralAnimation(network).next_pose((0, 0.5), terrain=ground)
+    left, path, right = places[0].reshape(-1, 3, 2).transpose(1, 0, 2)
+    for side in (left, right):
+        np.testing.assert_allclose(np.linalg.norm(side - path, axis=-1), 40.0, rtol=1e-6)

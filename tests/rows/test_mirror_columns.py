@@ -13,11 +13,12 @@ from hobble.core.skeleton import Skeleton
 from hobble.labels.label import label_clip, mirror_labels
 from hobble.labels.options import LabelOptions
 from hobble.motion.edit import mirror_clip
-from hobble.rows.build_rows import build_clip_rows, cycle_frames
+from hobble.rows.build_rows import build_clip_rows
 from hobble.rows.clip_rows import ClipRows, Pairs, pair_batches
 from hobble.rows.layout import ColumnMirror, RowLayout, mirror_of_x, mirror_of_y
 from hobble.synthetic.generate_clip import walk_from_plan
 from hobble.synthetic.plan import Segment
+from hobble.terrain.clip_fits import cycle_frames
 
 OPTIONS = {"window": 60, "step": 10, "facing_sigma": 20.0}
 SEGMENTS = [Segment("walk", 120, 60, 4), Segment("walk", 110, -20, 4)]

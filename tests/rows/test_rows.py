@@ -18,10 +18,10 @@ from hobble.labels.label import label_clip
 from hobble.labels.options import LabelOptions
 from hobble.motion.make import make_clip
 from hobble.motion.options import ClipMotion
-from hobble.rows.build_rows import build_clip_rows, cycle_frames, cycle_phase, phase_change
+from hobble.rows.build_rows import build_clip_rows, cycle_phase, phase_change
 from hobble.rows.clip_rows import ClipRows, pair_batches
 from hobble.rows.layout import GAITS, RowLayout
-from hobble.terrain.clip_fits import clip_fits
+from hobble.terrain.clip_fits import clip_fits, cycle_frames
 from hobble.terrain.heightmaps import TerrainMap
 from hobble.terrain.options import HeightSampling, Terrain
 from hobble.terrain.patches import draw_patches

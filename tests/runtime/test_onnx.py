@@ -9,7 +9,6 @@ import onnxruntime
 import pytest
 
 from hobble.cli.__main__ import main
-from hobble.models.onnx_file import TOLERANCE, write_checked
 from hobble.models.pfnn import OPTIONS
 from hobble.models.pfnn.release import write_release
 
@@ -25,7 +24,7 @@ def test_onnxruntime_predicts_the_same_as_the_runtime(
     make_network, tmp_path: Path, mode: str, points: int
 ) -> None:
     network = make_network(control_points=points, scale=20.0)
-    assert 0 <= write_checked(tmp_path / "network.onnx", network, mode) <= TOLERANCE
+    assert "by at most" in network.export("onnx", tmp_path / "network.onnx", mode)
     rng = np.random.default_rng(3)
     for rows in (1, 7):
         x = rng.normal(0, 20, (rows, network.layout.x_size)).astype(np.float32)

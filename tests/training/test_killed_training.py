@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-import torch
 
 from hobble.core.files import _HOST, load_npz, save_npz
 from hobble.database.reader import Database
@@ -43,28 +42,20 @@ train(Database.open(sys.argv[1], 64), checkpoints=Path(sys.argv[2]), threads=2, 
 def test_a_training_killed_at_any_moment_ends_with_the_same_bits(
     small_database: Path, data: Database, network: Settings, training: Settings, tmp_path: Path
 ) -> None:
-    settings = {"network": network, "training": training | {"passes": 15}}
+    settings = {"network": network, "training": training | {"passes": 8}}
     plain = {name: section.model_dump(mode="json") for name, section in settings.items()}
     killed = tmp_path / "killed"
     command = [sys.executable, "-c", PROCESS, str(small_database), str(killed), json.dumps(plain)]
-    for wait in (0.02, 0.0):
-        before = _sections(killed)
-        process = subprocess.Popen(command)
-        while process.poll() is None and _sections(killed) == before:
-            time.sleep(0.005)
-        time.sleep(wait)
-        process.send_signal(signal.SIGKILL)
-        assert process.wait() == -signal.SIGKILL
-        assert before < _sections(killed) < 45
+    process = subprocess.Popen(command)
+    while process.poll() is None and not _sections(killed):
+        time.sleep(0.002)
+    process.send_signal(signal.SIGKILL)
+    assert process.wait() == -signal.SIGKILL
+    assert 0 < _sections(killed) < 24
     (next(killed.iterdir()) / f".checkpoint.npz{LEFT}").write_bytes(b"what a kill leaves")
     final = train(data, **settings, checkpoints=killed, threads=2)
-    undisturbed = train(data, **settings, checkpoints=tmp_path / "undisturbed", threads=2)
-    assert torch.equal(final.network.flat, undisturbed.network.flat)
-    assert torch.equal(final.adam.second_moment, undisturbed.adam.second_moment)
-    assert final.best is not None
-    assert undisturbed.best is not None
-    assert torch.equal(final.best, undisturbed.best)
-    assert len(final.history) == 45
+    assert _numbers(final) == _numbers(train(data, **settings, checkpoints=tmp_path / "whole", threads=2))
+    assert len(final.history) == 24
     assert not list(killed.rglob("*.part"))
 
 
@@ -75,7 +66,7 @@ def _sections(folder: Path) -> int:
 
 @pytest.mark.parametrize(
     ("recipe", "written", "number"),
-    [({}, False, 0), (HURRIED, True, 1), (HURRIED, False, 3)],
+    [(HURRIED, True, 1), (HURRIED, False, 3)],
 )
 def test_a_training_killed_at_any_write_ends_with_the_same_bits(
     data: Database,

@@ -15,7 +15,7 @@ from hobble.core import files
 from hobble.core.errors import HobbleError
 from hobble.database.reader import Block, Database
 from hobble.training import checkpoint, train
-from hobble.training.batches import HeldOutErrors, HostRows
+from hobble.training.batches import HostRows
 from hobble.training.checkpoint import State, columns, write_history
 from hobble.training.optimiser import Update
 
@@ -60,13 +60,6 @@ def test_batches_are_the_sections_samples_in_order(data: Database, size: int) ->
     assert sum(len(batch.p) for batch in seen) == sum(whole) == data.section_sample_count("train", 2, 3)
 
 
-@pytest.mark.parametrize(("batch", "precision"), [(300, "auto"), (32, "bfloat16"), (5000, "float32")])
-def test_batches_of_any_size_train(run: Run, batch: int, precision: str) -> None:
-    state = run(batch=batch, precision=precision, passes=4)
-    assert state.samples == 4 * 2300
-    assert state.history[-1][4] < state.history[0][4]
-
-
 def test_history_counts_and_agrees_with_the_network(run: Run, data: Database, tmp_path: Path) -> None:
     state = run()
     path = tmp_path / "history.csv"
@@ -84,16 +77,6 @@ def test_history_counts_and_agrees_with_the_network(run: Run, data: Database, tm
     assert float(rows[-1]["held_out_mse"]) == pytest.approx(float(squares.mean()), rel=1e-5)
     for name, part in data.layout.blocks("y").items():
         assert float(rows[-1][f"held_out_{name}"]) == pytest.approx(float(squares[:, part].mean()), rel=1e-5)
-
-
-def test_without_held_out_clips_the_errors_are_left_empty(
-    run: Run, monkeypatch: pytest.MonkeyPatch, data: Database, tmp_path: Path
-) -> None:
-    monkeypatch.setattr(HeldOutErrors, "_batches", lambda self: iter(()))
-    write_history(tmp_path / "history.csv", data.layout.blocks("y"), run(passes=1).history)
-    row = next(csv.DictReader((tmp_path / "history.csv").open()))
-    assert row["held_out_mse"] == row["held_out_turn"] == ""
-    assert float(row["train_mse"]) > 0
 
 
 def poisoned(data: Database, monkeypatch: pytest.MonkeyPatch, turn: int, value: float) -> None:

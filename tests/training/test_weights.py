@@ -8,37 +8,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hobble.core.files import load_npz
 from hobble.database.reader import Database
 from hobble.models.network import TrainingFacts
-from hobble.models.pfnn import PfnnOptions
 from hobble.rows.layout import GAITS
-from hobble.training.train import write_weights
-
-from .conftest import figure
 
 
 @pytest.fixture
 def data(small_database: Path) -> Database:
     return Database.open(small_database, 64)
-
-
-def write(path: Path, data: Database, seed: int = 1) -> dict[str, np.ndarray]:
-    """Write an untrained network, and return the expected arrays."""
-    made = PfnnOptions(units=6).untrained_network(data.layout, figure(), seed)
-    write_weights(path, made, data, "mine", {"passes": 3})
-    return {name: np.array(array) for name, array in made.arrays().items()}
-
-
-def test_the_file_holds_the_network_bit_for_bit(data: Database, tmp_path: Path) -> None:
-    expected = write(tmp_path / "weights.npz", data)
-    found = load_npz(tmp_path / "weights.npz")
-    assert len(expected) == 6
-    for name, array in expected.items():
-        assert found[name].dtype == array.dtype
-        np.testing.assert_array_equal(found[name], array)
-    for name in ("x_mean", "x_std", "y_mean", "y_std"):
-        np.testing.assert_array_equal(found[name[0].upper() + name[2:]], getattr(data.statistics, name))
 
 
 @pytest.mark.parametrize("memory", [64, 0])

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import re
 from pathlib import Path
 
@@ -13,12 +12,10 @@ from hobble.workflow.datasets import LEAST_BATCHES, batch_of
 from hobble.workflow.demands import (
     WEEK_MINUTES,
     bvh_seconds,
-    expected_seconds,
     job_request,
     measure_request,
     sentences_about_plan,
     training_request,
-    training_samples,
 )
 from hobble.workflow.project import Project
 
@@ -100,29 +97,9 @@ def test_the_length_of_a_clip_is_counted_from_its_rows(tmp_path) -> None:
     assert bvh_seconds(tmp_path / "not there.bvh") is None
 
 
-def test_earlier_trainings_tell_the_speed_of_the_machine(root, tmp_path, monkeypatch) -> None:
-    monkeypatch.chdir(tmp_path)
-    project, plan = Project(root, {}), [("training", {"configuration": "limp"})]
-
-    def trained(name: str, times_as_long: float) -> float:
-        """Write the history of a training that took so many times as long as expected."""
-        configuration = project.configuration(name)
-        training = configuration.settings.training.model_dump()
-        seconds = times_as_long * expected_seconds(configuration, training)
-        row = {"seconds": seconds, "samples": training_samples(configuration, training["passes"])}
-        Path("results", name, "network").mkdir(parents=True)
-        with open(Path("results", name, "network", "history.csv"), "w", newline="", encoding="utf-8") as file:
-            writer = csv.DictWriter(file, list(row))
-            writer.writeheader()
-            writer.writerow(row)
-        return seconds
-
-    (unknown,) = sentences_about_plan(project, plan)
-    assert "min on two quiet cores" in unknown
-    trained("test", 100.0)  # a tiny training, which is mostly start, tells nothing
-    assert sentences_about_plan(project, plan) == [unknown]
-    trained("fast", 6.0)
-    (known,) = sentences_about_plan(project, plan)
-    limp = project.configuration("limp")
-    minutes = round(6.0 * expected_seconds(limp, limp.settings.training.model_dump()) / 60)
-    assert known.startswith(f"training limp: about {minutes} min")
+def test_a_plan_says_how_long_its_trainings_take_and_names_a_faster_recipe(root: Path) -> None:
+    project = Project(root, {})
+    plan = [("training", {"configuration": name}) for name in ("holden", "test", "matching")]
+    slow, quick = sentences_about_plan(project, [*plan, ("report", {"configuration": "fast"})])
+    assert re.fullmatch(r"training holden: \d+ to \d+ min on .*; with --config training=fast \d+ to .*", slow)
+    assert quick == "training test: 1 min."

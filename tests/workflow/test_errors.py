@@ -13,13 +13,6 @@ from tests.checkout import Workflow
 
 pytestmark = pytest.mark.workflow
 
-# A figure of one bone, whatever its joints are called.
-STICK = (
-    "HIERARCHY\nROOT Hips\n{\nOFFSET 0 0 0\n"
-    "CHANNELS 6 Xposition Yposition Zposition Zrotation Xrotation Yrotation\n"
-    "End Site\n{\nOFFSET 0 90 0\n}\n}\nMOTION\nFrames: 200\nFrame Time: 0.0083333\n" + "0 90 0 0 0 0\n" * 200
-)
-
 
 @pytest.fixture
 def mine(clips: list[Path], workflow: Workflow) -> Path:
@@ -51,58 +44,32 @@ def on_a_terminal(workflow: Workflow, *arguments: str) -> tuple[int, str]:
 def test_each_bad_file_is_refused_with_its_place_and_the_others_are_made(
     workflow: Workflow, mine: Path
 ) -> None:
-    """One run with three bad clips, two bad status files and two good clips."""
+    """One run with a bad clip, a bad status file and a good clip."""
     good, status = (mine / "uneven-1.bvh").read_text(), (mine / "uneven-1_injuries.txt").read_text()
-    frames = status.splitlines()[0]
-    files = {
-        "torn.bvh": good[: len(good) // 2],
-        "stick.bvh": STICK,
-        "binary.bvh": "\0\1\2" * 999,
-        "wing.bvh": f"{good}\n",
-        "wing_injuries.txt": f"{frames}\n1-20 LeftWing-LeftTip[5];\n",
-        "back.bvh": f"{good}\n\n",
-        "back_injuries.txt": f"{frames}\n20-1 LeftUpLeg-LeftLeg[5];\n",
-    }
-    for name, text in files.items():
-        (mine / name).write_text(text)
-    asked = ["uneven-1", "walk-straight-1", *(Path(name).stem for name in files if name.endswith(".bvh"))]
-    targets = [f"results/datasets/mine/channels/injury/{name}.npz" for name in asked]
+    (mine / "torn.bvh").write_text(good[: len(good) // 2])
+    (mine / "wing.bvh").write_text(f"{good}\n")
+    (mine / "wing_injuries.txt").write_text(f"{status.splitlines()[0]}\n1-20 LeftWing-LeftTip[5];\n")
+    targets = [f"results/datasets/mine/channels/injury/{name}.npz" for name in ("uneven-1", "torn", "wing")]
     ended, said = on_a_terminal(workflow, "-c2", *targets, "--keep-going", "--config", "mocap=mocap")
     assert ended == 1
     assert "Traceback" not in said
     lines = [line.rpartition("\x1b[K")[2] for line in said.splitlines()]
-    for start, piece in {
-        "motion_clips: .*torn.bvh": "line",
-        "motion_clips: .*stick.bvh": "",
-        "motion_clips: .*binary.bvh": "",
-        "channel_clips: .*wing_injuries.txt": "LeftWing-LeftTip",
-        "channel_clips: .*back_injuries.txt": "20-1",
-    }.items():
-        (message,) = [line for line in lines if re.match(start, line)]
-        assert piece in message, message
-    assert re.search(r"^\d+ of \d+ jobs done in .*, 5 failed:", "\n".join(lines), re.M)
-    made = {path.stem for path in (workflow.folder / "results/datasets/mine/channels/injury").glob("*.npz")}
-    assert made == {"uneven-1", "walk-straight-1"}
+    for start in ("motion_clips: .*torn.bvh, line", "channel_clips: .*wing_injuries.txt.*LeftWing-LeftTip"):
+        assert len([line for line in lines if re.match(start, line)]) == 1, said
+    assert re.search(r"^\d+ of \d+ jobs done in .*, 2 failed:", "\n".join(lines), re.M)
+    made = (workflow.folder / "results/datasets/mine/channels/injury").glob("*.npz")
+    assert [path.stem for path in made] == ["uneven-1"]
 
 
-def test_a_plan_takes_few_lines_and_all_of_snakemakes_with_p(workflow: Workflow, mine: Path) -> None:
+def test_a_plan_takes_few_lines_and_all_of_snakemakes_with_p(workflow: Workflow) -> None:
     target = "results/datasets/tiny/channels/injury/walk-straight-1.npz"
     assert len(workflow.run("-n", target).splitlines()) < 20
     assert "rule synthetic_clips:" in workflow.run("-np", target)
-    text = workflow.run("-n", "results/datasets/mine/motion/a.npz", "--config", "mocap=nowhere", ok=False)
-    assert "nowhere/mine: no such folder" in text
-    assert "mocap=FOLDER" in text
 
 
-@pytest.mark.parametrize(
-    ("override", "message"),
-    [
-        ("training={learning_rate: -1}", "training.learning_rate: input should be greater than 0"),
-        ("trainnig={passes: 1}", "trainnig: there is no such key. Allowed here"),
-    ],
-)
-def test_a_bad_configuration_is_refused_before_planning(workflow, override: str, message: str) -> None:
+def test_a_bad_configuration_is_refused_before_planning(workflow: Workflow) -> None:
+    override = "trainnig={passes: 1}"
     text = workflow.run("-np", "results/test/report.html", "--config", override, ok=False)
-    assert message in text
+    assert "trainnig: there is no such key. Allowed here" in text
     assert "Building DAG" not in text
     assert "Traceback" not in text

@@ -15,6 +15,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from hobble.core.clip import Clip
+from hobble.core.declared import read_declared
 from hobble.core.quat import Array
 from hobble.core.section import Section
 
@@ -146,6 +147,35 @@ class Channel(ABC):
             for label, column in zip(labels, values.T, strict=True)
             if column.any()
         }
+
+
+class ClipChannel(Channel):
+    """A channel whose values are the same in all frames of a clip.
+
+    Value: the type of what the clip's entry says, for pydantic.
+    """
+
+    Value: Any
+
+    @abstractmethod
+    def values_of(self, source: ClipSource) -> Sequence[float] | None:
+        """The clip's C values; None if nothing says them."""
+
+    def is_neutral(self, source: ClipSource) -> bool:
+        """As in `Channel`."""
+        return not any(self.values_of(source) or ())
+
+    def check(self, source: ClipSource, rig: HasLinks) -> None:
+        """As in `Channel`."""
+        if source.value is not None:
+            read_declared(f"{source.clip}.channels.{self.name}", "the value", self.Value, source.value)
+
+    def read(self, clip: Clip, source: ClipSource, motion: Mapping[str, Any]) -> tuple[Array, list[str]]:
+        """Values (F, C) of a clip with F frames, all 0 with a warning if nothing says them."""
+        values = self.values_of(source)
+        warnings = [f"nothing says the {self.name} of {source.clip}; it counts as neutral."]
+        row = np.zeros(len(self.columns(clip.skeleton)), np.float32) if values is None else values
+        return np.tile(np.asarray(row, np.float32), (len(clip), 1)), warnings * (values is None)
 
 
 SILENCING_STD = 1e10  # divisor of an input that must have no effect

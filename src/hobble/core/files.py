@@ -357,6 +357,29 @@ def write_tables(folder: str | Path, tables: Mapping[str, Sequence[Mapping[str, 
         write_csv(Path(folder) / f"{name}.csv", rows)
 
 
+def read_table(path: str | Path, columns: Sequence[str]) -> Iterator[tuple[int, dict[str, str]]]:
+    """The number of each line of a CSV file, and its values: column -> text.
+
+    columns: those that it must have. Raises InputError, which names the line, if it is not such a table.
+    """
+    # newline=None: lines may end in \n, \r\n, or \r as in old Macintosh files.
+    reader = csv.reader(io.StringIO(read_text(path), newline=None), skipinitialspace=True)
+    try:
+        names = [name.strip() for name in next(reader, [])]
+        if missing := [name for name in columns if name not in names]:
+            fix = f"The first line must name them: {','.join(columns)}."
+            raise InputError(path, f"has no column {' and no '.join(missing)}", line=1, fix=fix)
+        for values in reader:
+            if values and len(values) != len(names):
+                problem = f"the line must have {len(names)} values: {printable(', '.join(names))}"
+                raise InputError(path, problem, line=reader.line_num)
+            if values:
+                yield reader.line_num, dict(zip(names, map(str.strip, values), strict=True))
+    except csv.Error as error:
+        fix = "Look for a quotation mark left open."
+        raise InputError(path, f"not CSV: {error}", line=reader.line_num, fix=fix) from None
+
+
 def read_numbers(path: str | Path) -> dict[str, list[float | None]]:
     """Read a CSV file of numbers, such as history.csv, as column -> values.
 

@@ -1,4 +1,4 @@
-"""Groups messages about many clips by kind, so that one that matters is not lost among hundreds."""
+"""Words for messages: many of them in groups by kind, so that one that matters is not lost, and durations."""
 
 from __future__ import annotations
 
@@ -39,3 +39,17 @@ def in_words(group: Group) -> str:
     if len(group.clips) == 1:
         return f"{group.clips[0]}: {group.message}"
     return f"{len(group.clips)} clips, such as {group.clips[0]}: {group.message}"
+
+
+def duration(seconds: float) -> str:
+    """A duration as text.
+
+    >>> duration(42.4), duration(754), duration(7512)
+    ('42 s', '12 min 34 s', '2 h 05 min')
+    """
+    seconds = round(seconds)
+    if seconds < 60:
+        return f"{seconds} s"
+    if seconds < 3600:
+        return f"{seconds // 60} min {seconds % 60:02d} s"
+    return f"{seconds // 3600} h {seconds % 3600 // 60:02d} min"

@@ -19,44 +19,31 @@ from hobble.core.files import read_json, write_json
 from hobble.core.quat import Array
 from hobble.core.section import Positive, PositiveFloat
 from hobble.core.skeleton import skeleton_from_data
-from hobble.core.untrusted import printable
-from hobble.rows.layout import RowLayout, column_count_without_terrain, fit_column_count
+from hobble.rows.layout import (
+    RowLayout,
+    column_count_without_terrain,
+    fit_column_count,
+    layout_from_data,
+)
 
-Precision = Literal["float32", "float16", "bfloat16"]
+Precision = Literal["float32", "float16"]
 # Name of a precision -> NumPy's type of the stored numbers.
-STORED: dict[str, np.dtype[Any]] = {
-    "float32": np.dtype("<f4"),
-    "float16": np.dtype("<f2"),
-    "bfloat16": np.dtype("<u2"),
-}
+STORED: dict[str, np.dtype[Any]] = {"float32": np.dtype("<f4"), "float16": np.dtype("<f2")}
 
 
 def to_stored_type(values: Array, precision: str) -> np.ndarray:
     """Convert float values to the type that is stored for `precision`, a key of STORED.
 
-    Rounds to the nearest number, and a value halfway between two numbers to the one whose last bit is 0.
     Raises HobbleError if a value is too large for the type.
     """
-    if precision != "bfloat16":
-        with np.errstate(over="ignore"):
-            out = np.asarray(values, STORED[precision])
-        if not np.isfinite(out).all():
-            largest = float(np.abs(values).max())
-            raise HobbleError(
-                f"a standardised value of {largest:.3g} does not fit {precision}. "
-                "Set database.dtype to bfloat16 or float32."
-            )
-        return out
-    # The lower 16 bits are cut off. To round, add 0x7FFF first, and 1 more if the last bit that stays is 1.
-    bits = np.asarray(values, "<f4").view("<u4")
-    return ((bits + np.uint32(0x7FFF) + ((bits >> 16) & 1)) >> 16).astype("<u2")
-
-
-def to_floats(values: np.ndarray) -> Array:
-    """Convert stored bfloat16 (uint16) to float32. Other types are returned unchanged."""
-    if values.dtype != STORED["bfloat16"]:
-        return values
-    return (values.astype("<u4") << 16).view("<f4")
+    with np.errstate(over="ignore"):
+        out = np.asarray(values, STORED[precision])
+    if not np.isfinite(out).all():
+        raise HobbleError(
+            f"a standardised value of {float(np.abs(values).max()):.3g} does not fit {precision}. "
+            "Set database.dtype to float32."
+        )
+    return out
 
 
 # Chunks: a database stores its rows in files of a few MB, each with a checksum in the database's manifest.
@@ -67,8 +54,7 @@ def to_floats(values: np.ndarray) -> Array:
 
 INDEX_BYTES = 16  # in a chunk, for each row: its number of terrain fits, clip, frame and phase
 LENGTH = 8  # bytes of the number, at the start of the file, that says how long the header is
-# NumPy's name of a type -> its name in safetensors. NumPy has no bfloat16, so uint16 numbers hold its bits.
-TYPES = {"<f2": "F16", "<u2": "BF16", "<f4": "F32", "<i4": "I32"}
+TYPES = {"<f2": "F16", "<f4": "F32", "<i4": "I32"}  # NumPy's name of a type -> its name in safetensors
 HINT = "Delete the folder of the database; the next run makes it again."
 
 
@@ -230,13 +216,10 @@ class Manifest:
         values = read_declared(file, "the manifest", dict, read_json(file, HINT), HINT)
         if (values.pop("format", ""), values.pop("version", 0)) != ("hobble database", VERSION):
             raise InputError(file, f"not a database of format version {VERSION}", fix=HINT)
-        try:
-            values["layout"] = RowLayout.from_dict(values["layout"])
-            skeleton_from_data(file, values["skeleton"], fix=HINT)
-            skeleton = json.loads(values["skeleton"])
-        except (KeyError, TypeError, ValueError, AttributeError) as error:
-            raise InputError(file, printable(f"not a database's manifest ({error})"), fix=HINT) from error
-        manifest = read_declared(file, "the manifest", cls, {**values, "skeleton": skeleton}, HINT)
+        values["layout"] = layout_from_data(file, values.get("layout"), HINT)
+        skeleton_from_data(file, values.get("skeleton"), fix=HINT)
+        values["skeleton"] = json.loads(values["skeleton"])
+        manifest = read_declared(file, "the manifest", cls, values, HINT)
         read_declared(file, "clips", list[ClipEntry], manifest.clips, HINT)
         read = {split: sum(c["rows"] for c in manifest.clips if c["split"] == split) for split in SPLITS}
         if read != {split: manifest.row_count(split) for split in manifest.chunks}:

@@ -31,8 +31,8 @@ class Merging(Section):
     joint_weight: PositiveFloat = Field(
         0.1, description="factor of the standardised joints in the network's input"
     )
-    dtype: Literal["float32", "float16", "bfloat16"] = Field(
-        "float32", description="type of the rows on disk; float16 and bfloat16 take half the bytes"
+    dtype: Literal["float32", "float16"] = Field(
+        "float32", description="type of the rows on disk; float16 takes half the bytes"
     )
     seed: int = Field(1, description="seed of the order in which rows are stored")
     every: Positive = Field(

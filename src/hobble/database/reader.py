@@ -26,7 +26,6 @@ from hobble.database.chunks import (
     STORED,
     Manifest,
     read_chunk,
-    to_floats,
     to_stored_type,
 )
 from hobble.database.statistics import Statistics, read_statistics
@@ -256,8 +255,8 @@ class Database:
             for start in range(0, len(loaded.count), BLOCK_ROWS):
                 part = slice(start, start + BLOCK_ROWS)
                 first, count = loaded.first_fit[part], loaded.count[part]
-                fits = to_floats(loaded.fits[first[0] : first[-1] + count[-1]]).astype(np.float32)
-                x, y = (to_floats(table[part]).astype(np.float32) for table in (loaded.x, loaded.y))
+                fits = loaded.fits[first[0] : first[-1] + count[-1]].astype(np.float32)
+                x, y = (table[part].astype(np.float32) for table in (loaded.x, loaded.y))
                 yield UncomposedRows(x, y, loaded.phase[part], loaded.clip[part], fits, first - first[0])
 
     def _pick_rows(
@@ -358,7 +357,7 @@ class Database:
             row, fit = rows.stop, fits.stop
         for table, columns, factor in self._factors:
             values = tables[table][:, columns]
-            changed = to_floats(values).astype(np.float32) * np.float32(factor)
+            changed = values.astype(np.float32) * np.float32(factor)
             values[...] = to_stored_type(changed, self.manifest.dtype)
         return ChunkWindow(numbers, [c.rows for c in wanted], order.first_fits(tables["count"]), **tables)
 
@@ -386,13 +385,11 @@ class Database:
         rows: (n,) indices of the rows. fits: (n,) indices of their fits. One core composes 2 million rows (31
         joints) a second.
         """
-        frames, ground = to_floats(window.x[rows]), to_floats(window.fits[fits])
+        frames, ground = window.x[rows], window.fits[fits]
         if window.y.dtype == y.dtype:
-            np.take(
-                window.y, rows, axis=0, out=y, mode="clip"
-            )  # mode "raise", the default, makes another copy
+            np.take(window.y, rows, axis=0, out=y, mode="clip")  # the default mode makes another copy
         else:
-            y[...] = to_floats(window.y[rows])
+            y[...] = window.y[rows]
         lift = ground[:, -1:].astype(np.float32)
         lift_or_none = lift if lift.any() else None  # None skips the subtraction
         stds = self.statistics.x_std, self.statistics.y_std

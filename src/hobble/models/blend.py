@@ -23,8 +23,8 @@ from hobble.core.skeleton import Skeleton
 from hobble.models.forward import forward
 from hobble.models.load import read_layers
 from hobble.models.model import LayerMirror, Trainable, TrainedOptions, TrainingStep
-from hobble.models.network import FIXED, Export, standardise_inputs
-from hobble.models.onnx_file import Graph, Node, OnnxNetwork, add_layers, write_checked
+from hobble.models.network import FIXED, standardise_inputs
+from hobble.models.onnx_file import Graph, Node, OnnxNetwork, add_layers
 from hobble.rows.layout import ColumnMirror, RowLayout
 
 if TYPE_CHECKING:
@@ -165,16 +165,6 @@ class BlendedNetwork(OnnxNetwork):
         stack = Stack([first, *weights[1:]], biases, storage, self.y_mean, self.y_std)
         sizes = {"form": FIXED, "layers": len(weights), "sets": len(first), "extra": self.extra_inputs}
         return sizes, stack.sections()
-
-    @property
-    def exports(self) -> dict[str, Export]:
-        """As in `Network`: the format "onnx"."""
-
-        def write_onnx(target: Path, mode: str) -> str:
-            difference = write_checked(target, self, mode)
-            return f"{target}: differs from Hobble's runtime by at most {difference:.1g}"
-
-        return {"onnx": write_onnx}
 
     def layers_in_words(self) -> str:
         """Such as "2 hidden layers"."""

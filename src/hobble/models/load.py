@@ -25,10 +25,10 @@ from hobble.core.files import load_npz
 from hobble.core.quat import Array
 from hobble.core.section import ShortName
 from hobble.core.skeleton import NEEDED_ROLES, Skeleton, skeleton_from_data
-from hobble.core.untrusted import printable, read_yaml
+from hobble.core.untrusted import read_yaml
 from hobble.models import DEFAULT_KIND, NETWORK_KINDS, options_of_kind
 from hobble.models.network import FACTS, TERRAIN_SIDE, Network, TrainingFacts
-from hobble.rows.layout import GAITS, RowLayout
+from hobble.rows.layout import GAITS, RowLayout, layout_from_data
 
 MOST_LAYERS = 16  # in a network
 # At most this many numbers in an array: 256 MB as float32. The largest array of known networks has 3 million.
@@ -161,13 +161,10 @@ def _read_layout(
 
     x_size, y_size: number of columns of X and Y in the file. Raises InputError if the layout has other sizes.
     """
-    try:
-        if meta.layout is None:
-            layout = _guess_layout(x_size, y_size, skeleton)
-        else:
-            layout = RowLayout.from_dict(meta.layout)
-    except (KeyError, TypeError, ValueError) as error:
-        raise InputError(path, printable(f"its layout cannot be understood: {error}", 400)) from None
+    if meta.layout is None:
+        layout = _guess_layout(x_size, y_size, skeleton)
+    else:
+        layout = layout_from_data(path, meta.layout)
     if unknown := [name for name, _ in layout.channels if name not in CHANNEL_NAMES]:
         known = ", ".join(CHANNEL_NAMES)
         raise InputError(path, f"has the unknown channel {unknown[0]!a:.40}; known channels: {known}")

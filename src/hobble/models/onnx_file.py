@@ -18,7 +18,7 @@ import numpy as np
 from hobble.core.errors import HobbleError, InputError
 from hobble.core.files import atomic_path
 from hobble.core.quat import Array
-from hobble.models.network import Network, inverse_or_0
+from hobble.models.network import Export, Network, inverse_or_0
 
 OPSET = 15  # version of the ONNX operators
 # Largest allowed difference from Hobble's runtime, in units of Y; relative for values above 1.
@@ -122,6 +122,18 @@ class OnnxNetwork(Network):
     def onnx_outputs(self, g: Graph, z: Node, mode: str) -> Node:
         """Add the nodes that find the standardised outputs to a graph. z: the standardised inputs."""
 
+    @property
+    def exports(self) -> dict[str, Export]:
+        """As in `Network`: the format "onnx"."""
+
+        def write_onnx(target: Path, mode: str) -> str:
+            with atomic_path(target) as temporary:
+                export(temporary, self, mode)
+                difference = check(temporary, self, mode)
+            return f"{target}: differs from Hobble's runtime by at most {difference:.1g}"
+
+        return {"onnx": write_onnx}
+
 
 def export(path: str | Path, network: OnnxNetwork, mode: str) -> None:
     """Write the network, with a metadata entry `hobble` that describes columns, skeleton and channels.
@@ -149,8 +161,7 @@ def export(path: str | Path, network: OnnxNetwork, mode: str) -> None:
     )
     helper.set_model_props(model, {"hobble": json.dumps(_metadata(network, mode))})
     onnx.checker.check_model(model, full_check=True)
-    with atomic_path(path) as temporary:
-        temporary.write_bytes(model.SerializeToString(deterministic=True))
+    Path(path).write_bytes(model.SerializeToString(deterministic=True))
 
 
 def check(path: str | Path, network: OnnxNetwork, mode: str) -> float:
@@ -178,13 +189,6 @@ def check(path: str | Path, network: OnnxNetwork, mode: str) -> float:
         problem = f"onnxruntime and Hobble's runtime differ by {difference:.2g}, more than {TOLERANCE:g}"
         raise InputError(path, problem)
     return difference
-
-
-def write_checked(path: str | Path, network: OnnxNetwork, mode: str) -> float:
-    """`export` to a temporary file, `check` it, then rename it to `path`. Returns what `check` returns."""
-    with atomic_path(path) as temporary:
-        export(temporary, network, mode)
-        return check(temporary, network, mode)
 
 
 def _metadata(network: OnnxNetwork, mode: str) -> dict[str, Any]:

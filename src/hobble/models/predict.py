@@ -113,7 +113,8 @@ class StandardisingPredictor(ABC):
 
     def standardise(self, x: Array, z: Array) -> None:
         """As in `Predictor`."""
-        standardise_columns(x, self._x_mean, self._x_inverse, z)
+        np.subtract(x, self._x_mean, out=z)
+        z *= self._x_inverse
 
     @abstractmethod
     def evaluate(self, z: Array, phase: Array, out: Array, *memory: Any) -> None:
@@ -152,14 +153,6 @@ class BlendPredictor(StandardisingPredictor):
     def evaluate(self, z: Array, phase: Array, out: Array, *memory: Any) -> None:
         """As in `Predictor`."""
         self._stack.run(self._shares(z, phase), self._extended(z, phase), out)
-
-
-@njit(fastmath=True)
-def standardise_columns(x: Any, mean: Any, factor: Any, z: Any) -> None:
-    """z = (x - mean) * factor, column by column."""
-    for c in range(x.shape[0]):
-        for i in range(x.shape[1]):
-            z[c, i] = (x[c, i] - mean[i]) * factor[i]
 
 
 _catmull_rom = njit(forceinline=True, cache=False)(catmull_rom)

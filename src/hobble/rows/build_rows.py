@@ -27,6 +27,7 @@ from hobble.motion.root import (
 )
 from hobble.rows.clip_rows import ClipRows
 from hobble.rows.layout import CONTACTS, GAITS, RowLayout
+from hobble.terrain.clip_fits import cycle_frames
 
 Arrays = Mapping[str, np.ndarray]
 
@@ -126,21 +127,6 @@ def _body_columns(
         rotation[frame],
     ]
     return x, y
-
-
-def cycle_frames(cycles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The frame of the clip (R,) and the number of the cycle (R,) of each row.
-
-    cycles: (C, 2) first and last frame of each cycle. Both belong to the cycle. So a frame in which one cycle
-    ends and the next begins has two rows.
-
-    >>> cycle_frames(np.array([[60, 62], [62, 63]]))
-    (array([60, 61, 62, 62, 63]), array([0, 0, 0, 1, 1]))
-    """
-    lengths = cycles[:, 1] - cycles[:, 0] + 1
-    cycle = np.repeat(np.arange(len(cycles)), lengths)
-    frame_in_cycle = np.arange(len(cycle)) - np.repeat(np.cumsum(lengths) - lengths, lengths)
-    return np.repeat(cycles[:, 0], lengths) + frame_in_cycle, cycle
 
 
 def cycle_phase(phase: Array, cycles: np.ndarray) -> Array:

@@ -19,11 +19,10 @@ from pydantic import Field
 
 from hobble.core.declared import ArrayOf, check_arrays, read_declared
 from hobble.core.errors import InputError
-from hobble.core.files import DELETE_IT, load_npz, map_npz, read_json, save_npz, write_json
+from hobble.core.files import DELETE_IT, Arrays, load_npz, map_npz, read_json, save_npz, write_json
 from hobble.core.quat import Array
 from hobble.core.section import Finite
 from hobble.core.skeleton import skeleton_from_data
-from hobble.core.untrusted import printable
 from hobble.rows.layout import (
     GAITS,
     RowLayout,
@@ -31,12 +30,15 @@ from hobble.rows.layout import (
     body_layout,
     compose,
     frame_inputs,
+    layout_from_data,
     lower_joints,
 )
 
 CHANNEL_PREFIX = "channel_"  # in a file, the name of each channel's array begins with it
 VISITS = ArrayOf((), "iu", 1, 1000)
 MOST_ROWS = 1 << 28  # of a clip
+# Fields of `ClipRows` with a value for each row, and those with one for each terrain fit.
+BY_ROW, BY_FIT = ("x", "y", "p", "frame", "cycle", "fits"), ("heights", "mean")
 
 
 @dataclass(frozen=True)
@@ -86,14 +88,10 @@ class ClipRows:
         kept = np.zeros(len(self), bool)
         kept[rows] = True
         kept_fits = np.repeat(kept, self.fits)
-        by_row = {name: getattr(self, name)[kept] for name in ("x", "y", "p", "frame", "cycle", "fits")}
-        return replace(
-            self,
-            **by_row,
-            channels={name: values[kept] for name, values in self.channels.items()},
-            heights=self.heights[kept_fits],
-            mean=self.mean[kept_fits],
-        )
+        by_row = {name: getattr(self, name)[kept] for name in BY_ROW}
+        by_fit = {name: getattr(self, name)[kept_fits] for name in BY_FIT}
+        channels = {name: values[kept] for name, values in self.channels.items()}
+        return replace(self, **by_row, **by_fit, channels=channels)
 
     def check(self, where: str | Path) -> None:
         """Raise InputError if shapes do not match, a row has no fit, or a value is not finite.
@@ -195,13 +193,18 @@ def read_outline(source: ClipRows | str | Path) -> Outline:
     if isinstance(source, ClipRows):
         return Outline(source.layout, source.skeleton, source.fits, source.visits)
     data = load_npz(source, ("layout", "skeleton", "fits", "visits"))
-    try:
-        layout = RowLayout.from_dict(json.loads(str(data["layout"])))
-        check_arrays(source, data, {"fits": ArrayOf(("rows",), "iu", 1), "visits": VISITS}, fix=DELETE_IT)
-        skeleton_from_data(source, str(data["skeleton"]), fix=DELETE_IT)
-        return Outline(layout, json.loads(str(data["skeleton"])), data["fits"], int(data["visits"]))
-    except (AttributeError, KeyError, TypeError, ValueError) as error:
-        raise InputError(source, printable(f"not a file of rows ({error})"), fix=DELETE_IT) from error
+    layout, skeleton = _described(source, data)
+    check_arrays(source, data, {"fits": ArrayOf(("rows",), "iu", 1)}, fix=DELETE_IT)
+    return Outline(layout, skeleton, data["fits"], int(data["visits"]))
+
+
+def _described(path: str | Path, data: Mapping[str, np.ndarray]) -> tuple[RowLayout, dict[str, Any]]:
+    """Layout and skeleton of a file of rows. Raises InputError if one of them or `visits` is wrong."""
+    texts = {name: ArrayOf((), "U") for name in ("layout", "skeleton")}
+    check_arrays(path, data, {**texts, "visits": VISITS}, fix=DELETE_IT)
+    skeleton_from_data(path, str(data["skeleton"]), fix=DELETE_IT)
+    layout = layout_from_data(path, str(data["layout"]), DELETE_IT)
+    return layout, json.loads(str(data["skeleton"]))
 
 
 def load_clip_rows(path: str | Path, part: tuple[int, int] | None = None) -> ClipRows:
@@ -210,19 +213,17 @@ def load_clip_rows(path: str | Path, part: tuple[int, int] | None = None) -> Cli
     part: (first, stop), to read the rows from `first` up to `stop`, which is not included; None reads all
     rows. The file's checksums are checked only if all rows are read.
     """
-    try:
-        data: dict[str, Any] = load_npz(path) if part is None else _read_part(map_npz(path), *part)
-        data["clip"] = str(data["clip"])
-        data["layout"] = RowLayout.from_dict(json.loads(str(data["layout"])))
-        skeleton_from_data(path, str(data["skeleton"]), fix=DELETE_IT)
-        data["skeleton"] = json.loads(str(data["skeleton"]))
-        check_arrays(path, data, {"visits": VISITS}, fix=DELETE_IT)
-        data["visits"] = int(data["visits"])
-        channel_keys = [key for key in data if key.startswith(CHANNEL_PREFIX)]
-        data["channels"] = {key.removeprefix(CHANNEL_PREFIX): data.pop(key) for key in channel_keys}
-        rows = ClipRows(**data)
-    except (AttributeError, IndexError, KeyError, TypeError, ValueError) as error:
-        raise InputError(path, printable(f"not a file of rows ({error})"), fix=DELETE_IT) from error
+    data = load_npz(path) if part is None else _read_part(path, *part)
+    layout, skeleton = _described(path, data)
+    keys = [key for key in data if key.startswith(CHANNEL_PREFIX)]
+    rows = ClipRows(
+        clip=str(data["clip"]),
+        layout=layout,
+        skeleton=skeleton,
+        channels={key.removeprefix(CHANNEL_PREFIX): data[key] for key in keys},
+        visits=int(data["visits"]),
+        **{name: data[name] for name in (*BY_ROW, *BY_FIT)},
+    )
     rows.check(path)
     return rows
 
@@ -232,14 +233,17 @@ def row_count(path: str | Path) -> int:
     return len(map_npz(path)["p"])
 
 
-def _read_part(file: Mapping[str, Array], first: int, stop: int) -> dict[str, Any]:
+def _read_part(path: str | Path, first: int, stop: int) -> Arrays:
     """Read all arrays of a file, but only for the rows from `first` up to `stop`, which is not included."""
-    of_fits = ("heights", "mean")
-    whole = {name: np.array(file[name]) for name in ("clip", "layout", "skeleton", "visits")}
-    rows = {n: np.array(file[n][first:stop]) for n in file if n not in (*whole, *of_fits)}
+    file = map_npz(path)
     first_fit = int(file["fits"][:first].sum())  # number of fits of the rows before `first`
-    fits = slice(first_fit, first_fit + int(rows["fits"].sum()))
-    return {**whole, **rows, **{name: np.array(file[name][fits]) for name in of_fits}}
+    rows = slice(first, stop)
+    fits = slice(first_fit, first_fit + int(file["fits"][rows].sum()))
+    parts: dict[str, Any] = {
+        **dict.fromkeys(("clip", "layout", "skeleton", "visits"), ...),
+        **dict.fromkeys(BY_FIT, fits),
+    }
+    return Arrays(path, [(name, np.array(array[parts.get(name, rows)])) for name, array in file.items()])
 
 
 # Cuts clips into excerpts, from which a sample of a large data set is drawn.
@@ -264,11 +268,6 @@ class Excerpt(NamedTuple):
     first: int
     rows: int
     clip_rows: int
-
-    @property
-    def is_whole_clip(self) -> bool:
-        """Whether the excerpt is the whole clip."""
-        return self.rows == self.clip_rows
 
     @property
     def stop(self) -> int:

@@ -5,18 +5,21 @@ The columns depend on the skeleton, the window of the trajectory, and the channe
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from hobble.channels import channel
-from hobble.core.errors import HobbleError
+from hobble.core.errors import HobbleError, InputError
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
+from hobble.core.untrusted import printable
 
 GAITS = ("stand", "walk", "jog", "crouch", "jump", "bump")
 CONTACTS = ("left_heel", "left_toe", "right_heel", "right_toe")
@@ -182,6 +185,18 @@ class RowLayout:
         """All blocks of X ("x") or Y ("y") by name, in column order: {"position": slice(0, 24), ...}."""
         blocks = self._x_blocks if prefix == "x" else self._y_blocks
         return {name: block for name, block in blocks.items() if block.stop > block.start}
+
+
+def layout_from_data(path: str | Path, data: Any, fix: str | None = None) -> RowLayout:
+    """The layout of `RowLayout.to_dict`, or of its JSON text, in the file `path`.
+
+    Raises InputError, with the advice `fix`, if it is not valid.
+    """
+    try:
+        return RowLayout.from_dict(json.loads(data) if isinstance(data, str) else data)
+    except (AttributeError, KeyError, TypeError, ValueError, RecursionError) as error:
+        problem = printable(f"its layout cannot be understood: {error}", 400)
+        raise InputError(path, problem, fix=fix) from None
 
 
 # Composes rows of X from the body's columns, the channels, and the ground heights of one terrain fit.

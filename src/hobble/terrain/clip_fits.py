@@ -95,7 +95,7 @@ def clip_fits(
         fitted.append((fit, feet.soles[around], feet.contacts[around]))
         if c in shown and np.any(heights[-1]):
             pictures.append(make_picture(clip, c, fit, feet, around))
-    frame, cycle = _frame_and_cycle_of_rows(cycles)
+    frame, cycle = cycle_frames(cycles)
     return ClipFits(
         frame=frame,
         cycle=cycle,
@@ -197,15 +197,20 @@ def heights_under(ground: CycleGround, samples: Array, start: int, end: int, off
     return np.moveaxis(heights[:, :, point_of_row], 2, 0).reshape(-1, 3 * len(offsets))
 
 
-def _frame_and_cycle_of_rows(cycles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The frame (R,) and the number of the cycle (R,) of each row."""
-    frames = [np.arange(start, end + 1) for start, end in cycles]
-    numbers = [np.full(len(f), c) for c, f in enumerate(frames)]
-    nothing = np.zeros(0, int)
-    return (
-        np.concatenate([nothing, *frames]).astype(np.int32),
-        np.concatenate([nothing, *numbers]).astype(np.int32),
-    )
+def cycle_frames(cycles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The frame of the clip (R,) and the number of the cycle (R,) of each row, int32.
+
+    cycles: (C, 2) first and last frame of each cycle. Both belong to the cycle. So a frame in which one cycle
+    ends and the next begins has two rows.
+
+    >>> [each.tolist() for each in cycle_frames(np.array([[60, 62], [62, 63]]))]
+    [[60, 61, 62, 62, 63], [0, 0, 0, 1, 1]]
+    """
+    lengths = cycles[:, 1] - cycles[:, 0] + 1
+    cycle = np.repeat(np.arange(len(cycles)), lengths)
+    frame_in_cycle = np.arange(len(cycle)) - np.repeat(np.cumsum(lengths) - lengths, lengths)
+    frame = np.repeat(cycles[:, 0], lengths) + frame_in_cycle
+    return frame.astype(np.int32), cycle.astype(np.int32)
 
 
 def save_fits(path: str | Path, fits: ClipFits) -> None:
@@ -274,11 +279,8 @@ def cycles_to_picture(count: int) -> set[int]:
 def make_picture(clip: Clip, cycle: int, ground: CycleGround, feet: Feet, around: slice) -> FitPicture:
     """The picture of the best fit of a cycle. around: the frames that the ground was fitted to."""
     soles = feet.soles[around]
-    low, high = (
-        soles[..., [0, 2]].min(axis=(0, 1)) - MARGIN_CM,
-        soles[..., [0, 2]].max(axis=(0, 1)) + MARGIN_CM,
-    )
-    x, z = np.linspace(low[0], high[0], GRID_POINTS), np.linspace(low[1], high[1], GRID_POINTS)
+    low, high = (edge(soles[..., [0, 2]], axis=(0, 1)) for edge in (np.min, np.max))
+    x, z = np.linspace(low - MARGIN_CM, high + MARGIN_CM, GRID_POINTS).T
     points = np.stack(np.meshgrid(x, z, indexing="ij"), axis=-1).reshape(-1, 2)
     heights = ground.heights_at(points)[0].reshape(GRID_POINTS, GRID_POINTS)
     frames = np.linspace(around.start, around.stop - 1, 5).astype(int)[1:4]

@@ -57,20 +57,6 @@ def _cell(column: int, value: float) -> str:
     return str(round(value)) if column < 3 else f"{value:.3f}" if column == 3 else f"{value:.8g}"
 
 
-def duration(seconds: float) -> str:
-    """A duration as text.
-
-    >>> duration(42.4), duration(754), duration(7512)
-    ('42 s', '12 min 34 s', '2 h 05 min')
-    """
-    seconds = round(seconds)
-    if seconds < 60:
-        return f"{seconds} s"
-    if seconds < 3600:
-        return f"{seconds // 60} min {seconds % 60:02d} s"
-    return f"{seconds // 3600} h {seconds % 3600 // 60:02d} min"
-
-
 # Checkpoints. Each is one file with the complete state of a training.
 
 

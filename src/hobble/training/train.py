@@ -22,6 +22,7 @@ from torch import Tensor
 from hobble.channels import channel
 from hobble.core.errors import HobbleError
 from hobble.core.files import save_npz
+from hobble.core.messages import duration
 from hobble.core.skeleton import Skeleton
 from hobble.database.reader import Database
 from hobble.models.load import load_network
@@ -33,7 +34,6 @@ from hobble.training.batches import HELD_OUT, TRAIN, HeldOutErrors, HostRows, Lo
 from hobble.training.checkpoint import (
     State,
     begin_or_resume,
-    duration,
     pack,
     recipe_hash,
     step_for,

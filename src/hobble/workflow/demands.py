@@ -8,20 +8,16 @@ with what a finished run used.
 
 from __future__ import annotations
 
-import contextlib
-import csv
 import functools
 import math
 import os
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from statistics import median
 from typing import Any, NamedTuple
 
 from hobble.channels import channel
 from hobble.core.clip_files import is_hurt_version, original
-from hobble.core.errors import HobbleError
 from hobble.measures.measure import Cost, measure_named
 from hobble.models.model import TrainedOptions
 from hobble.rows.layout import RowLayout
@@ -248,7 +244,6 @@ STEP_SECONDS, SAMPLE_SECONDS = 1.07e-9, 7.6e-12
 SLOWEST = 11.0
 FAST = "fast"  # the configuration with the recipe that is named if it is much faster
 LONG_SECONDS = 300.0  # for a training that takes longer than this
-SHORT_SECONDS = 10.0  # a shorter training is mostly start, checks and saving: it tells nothing of the machine
 
 
 def sentences_about_plan(project: Project, jobs: Sequence[tuple[str, Mapping[str, str]]]) -> list[str]:
@@ -259,18 +254,18 @@ def sentences_about_plan(project: Project, jobs: Sequence[tuple[str, Mapping[str
     names = [wildcards["configuration"] for rule, wildcards in jobs if rule == "training"]
     if not names:
         return []
-    measured, sentences = slowness(project), []
+    sentences = []
     fast = FAST in project.catalogue.names() and project.catalogue.configuration(FAST).training.model_dump()
     for configuration in map(project.configuration, names):
         training = configuration.settings.training
         if gpus(configuration) or not parameter_count(configuration):
             continue
         seconds = expected_seconds(configuration, training.model_dump()) / training.count
-        sentence = f"training {configuration.name}: {_range(seconds, measured)}"
-        if fast and seconds * (measured or SLOWEST) > LONG_SECONDS:
+        sentence = f"training {configuration.name}: {_range(seconds)}"
+        if fast and seconds * SLOWEST > LONG_SECONDS:
             faster = expected_seconds(configuration, fast) / training.count
             if faster < seconds / 2:
-                sentence += f"; with --config training={FAST} {_range(faster, measured)} (docs/training.md)"
+                sentence += f"; with --config training={FAST} {_range(faster)} (docs/training.md)"
         sentences.append(f"{sentence}.")
     return sentences
 
@@ -282,26 +277,8 @@ def expected_seconds(configuration: NamedConfiguration, training: Mapping[str, A
     return samples / training["batch"] * step * parameter_count(configuration)
 
 
-def slowness(project: Project) -> float | None:
-    """How many times as long as expected the trainings took whose results are here; None without any."""
-    ratios = []
-    for name in project.catalogue.names():
-        with contextlib.suppress(OSError, ValueError, KeyError, IndexError, HobbleError):
-            with open(Path("results", name, "network", "history.csv"), newline="", encoding="utf-8") as file:
-                last = list(csv.DictReader(file))[-1]
-            configuration = project.configuration(name)
-            training = configuration.settings.training.model_dump()
-            expected = expected_seconds(configuration, training)
-            samples = training_samples(configuration, training["passes"])
-            if expected >= SHORT_SECONDS:
-                ratios.append(float(last["seconds"]) / float(last["samples"]) * samples / expected)
-    return median(ratios) if ratios else None
-
-
-def _range(seconds: float, measured: float | None) -> str:
-    """A time as text: for a machine that has trained before, or from the fastest to the slowest known one."""
-    if measured:
-        return f"about {_minutes(seconds * measured)} min"
+def _range(seconds: float) -> str:
+    """A time as text, from the fastest to the slowest known machine."""
     fastest, slowest = _minutes(seconds), _minutes(seconds * SLOWEST)
     return f"{fastest} min" if fastest == slowest else f"{fastest} to {slowest} min on two quiet cores"
 

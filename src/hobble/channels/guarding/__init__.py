@@ -9,14 +9,14 @@ from __future__ import annotations
 
 import math
 import zlib
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Annotated, Any
 
-import numpy as np
+from pydantic import Field
 
-from hobble.channels.channel import Channel, ClipSource, HasLinks
+from hobble.channels.channel import ClipChannel, ClipSource, HasLinks
 from hobble.core.clip import Clip
-from hobble.core.errors import InputError
 from hobble.core.quat import Array
 
 MIRROR_SUFFIX = "_mirror"  # end of the name of a mirrored clip
@@ -32,7 +32,7 @@ def guarding_of_clip(name: str) -> float:
     return math.modf(zlib.crc32(name.removesuffix(MIRROR_SUFFIX).encode()) * GOLDEN)[0]
 
 
-class Guarding(Channel):
+class Guarding(ClipChannel):
     """Has one column. The clip's entry in the data set may give its value, else it is `guarding_of_clip`."""
 
     name = "guarding"
@@ -41,6 +41,7 @@ class Guarding(Channel):
     highest = 1.0
     rate = 1.0
     default = 0.6
+    Value = Annotated[float, Field(ge=0, le=1)]
 
     def columns(self, rig: HasLinks) -> tuple[str, ...]:
         """The only column."""
@@ -50,18 +51,13 @@ class Guarding(Channel):
         """Always. A network without this channel may train on any clip."""
         return True
 
-    def check(self, source: ClipSource, rig: HasLinks) -> None:
-        """Raise InputError if the clip's entry is not a number from 0 to 1."""
-        if source.value is not None and not (
-            isinstance(source.value, int | float) and 0 <= source.value <= self.highest
-        ):
-            where = f"{source.clip}.channels.{self.name}"
-            raise InputError(where, f"cannot be {source.value!r:.80}", fix="Write a number from 0 to 1.")
+    def values_of(self, source: ClipSource) -> Sequence[float]:
+        """As in `ClipChannel`."""
+        return [guarding_of_clip(source.clip) if source.value is None else source.value]
 
     def read(self, clip: Clip, source: ClipSource, motion: Mapping[str, Any]) -> tuple[Array, list[str]]:
-        """Values (F, 1), the same in each frame, and no warnings."""
-        value = guarding_of_clip(clip.name) if source.value is None else float(source.value)
-        return np.full((len(clip), 1), value, np.float32), []
+        """As in `ClipChannel`. Hurt versions of a clip have other values than the clip."""
+        return super().read(clip, replace(source, clip=clip.name), motion)
 
 
 CHANNEL = Guarding()

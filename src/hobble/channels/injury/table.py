@@ -12,16 +12,14 @@ frame, an empty `to` the last::
 
 from __future__ import annotations
 
-import csv
-import io
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 from hobble.channels.injury.status import InjurySpell, Status, check_link, parse_severity, write_status
 from hobble.core.clip_files import find_clips, require_single_file
 from hobble.core.errors import InputError
-from hobble.core.untrusted import read_text
+from hobble.core.files import read_table
 
 WHOLE_NUMBER = re.compile(r"\d{1,12}")
 COLUMNS = ("clip", "link", "severity", "from", "to")
@@ -39,7 +37,7 @@ def write_statuses(table: str | Path, folder: str | Path, links: Sequence[str]) 
     frames: dict[str, int] = {}
     # Clip -> (first frame, last frame) -> pairs of link and severity.
     spells: dict[str, dict[tuple[int, int], list[tuple[str, float]]]] = {}
-    for line, row in _rows(Path(table)):
+    for line, row in read_table(table, COLUMNS):
         clip, link = row["clip"], row["link"]
         check_link(table, line, link, links)
         severity = parse_severity(table, line, link, row["severity"])
@@ -60,26 +58,6 @@ def write_statuses(table: str | Path, folder: str | Path, links: Sequence[str]) 
         lines = tuple(InjurySpell(*span, tuple(pairs)) for span, pairs in of_clip.items())
         write_status(written[-1], Status(frames[clip], lines))
     return written
-
-
-def _rows(path: Path) -> Iterator[tuple[int, dict[str, str]]]:
-    """The number of each line of the table, and its values: column -> text."""
-    # newline=None: lines may end in \n, \r\n, or \r as in old Macintosh files.
-    reader = csv.reader(io.StringIO(read_text(path), newline=None), skipinitialspace=True)
-    try:
-        names = [name.strip() for name in next(reader, [])]
-        if sorted(names) != sorted(COLUMNS):
-            shown = f"{', '.join(names) or 'none':.200}"
-            raise InputError(path, f"has columns {shown}, not {', '.join(COLUMNS)}", line=1)
-        for values in reader:
-            if len(values) != len(names) and values:
-                problem = f"the line must have {len(COLUMNS)} values: {', '.join(COLUMNS)}"
-                raise InputError(path, problem, line=reader.line_num)
-            if values:
-                yield reader.line_num, dict(zip(names, map(str.strip, values), strict=True))
-    except csv.Error as error:
-        fix = "Look for a quotation mark left open."
-        raise InputError(path, f"not CSV: {error}", line=reader.line_num, fix=fix) from None
 
 
 def bvh_frames(path: Path) -> int:

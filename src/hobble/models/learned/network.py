@@ -28,8 +28,8 @@ from hobble.models.matching.network import (
     Playing,
     Transitions,
 )
-from hobble.models.network import LEARNED, Export, inverse_or_0, standardise_inputs
-from hobble.models.onnx_file import Graph, Node, OnnxNetwork, add_layers, write_checked
+from hobble.models.network import LEARNED, inverse_or_0, standardise_inputs
+from hobble.models.onnx_file import Graph, Node, OnnxNetwork, add_layers
 from hobble.models.predict import Stack, StandardisingPredictor
 
 PHASE_OUTPUTS = 2  # of the decompressor, after the columns of Y: sine and cosine of the frame's phase
@@ -171,7 +171,7 @@ class Learned(OnnxNetwork):
         return sizes, stacks[0] | stacks[1] | predictor.projector.sections("search_") | sections
 
     def onnx_outputs(self, g: Graph, z: Node, mode: str) -> Node:
-        """As in `OnnxNetwork`: projector and decompressor, as in `predict`."""
+        """As in `OnnxNetwork`: for each row the pose that the projector finds, without stepper and memory."""
         at = self.columns
         raw = g("Gather", z, at, axis=1) * (self.x_std[at] * self.weights) + self.x_mean[at] * self.weights
         within = g("Min", g("Max", raw, self.low), self.high)
@@ -179,16 +179,6 @@ class Learned(OnnxNetwork):
         y = add_layers(g, *self.decompressor, add_layers(g, *self.projector, wish))
         y = g("Slice", y, [0], [self.layout.y_size], [1])
         return (y - self.y_mean) * inverse_or_0(self.y_std)
-
-    @property
-    def exports(self) -> dict[str, Export]:
-        """The format "onnx": for each row the pose that the projector finds, without stepper and memory."""
-
-        def write_onnx(target: Path, mode: str) -> str:
-            difference = write_checked(target, self, mode)
-            return f"{target}: searches in every frame; differs from Hobble by at most {difference:.1g}"
-
-        return {"onnx": write_onnx}
 
 
 class LearnedPredictor(StandardisingPredictor):
