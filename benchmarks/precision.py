@@ -3,7 +3,7 @@
     python benchmarks/precision.py [FOLDER] [--passes 3] [--seeds 1 2]
 
 FOLDER has a data set's results with rows (results/datasets/synthetic). They are merged into three databases,
-in float32, float16 and bfloat16. The default network is trained on each, with each seed, by the default
+in float32 and in float16. The default network is trained on each, with each seed, by the default
 recipe. Accuracy is measured as in the evaluation, on rows that are not rounded. A difference counts only if
 it is larger than that between seeds.
 """
@@ -23,7 +23,7 @@ from hobble.models.pfnn import PfnnOptions
 from hobble.training.options import Training
 from hobble.training.train import run
 
-DTYPES = ("float32", "float16", "bfloat16")
+DTYPES = ("float32", "float16")
 
 
 def trained(database: Path, folder: Path, passes: int, seed: int, threads: int) -> Path:
