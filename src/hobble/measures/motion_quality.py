@@ -9,7 +9,6 @@ heights above it.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -132,38 +131,11 @@ def window_features(skeleton: Skeleton, positions: Array) -> Array:
     return np.array(rows).reshape(len(rows), POSES * len(BODY) * 3)
 
 
-@dataclass(frozen=True)
-class Reference:
-    """The windows of motion with which other motion is compared.
-
-    mean: (D,). components: (D, C) principal components. scale: square root of the windows' total variance,
-    leg lengths. windows: (N, C) the reference's own windows.
-    """
-
-    mean: Array = field(repr=False)
-    components: Array = field(repr=False)
-    scale: float
-    windows: Array = field(repr=False)
-
-    @classmethod
-    def of(cls, features: Array) -> Reference:
-        """Made of features (N, D), N >= 2, which must not all be equal."""
-        mean = features.mean(axis=0)
-        _, sizes, axes = np.linalg.svd(features - mean, full_matrices=False)
-        components = axes[:COMPONENTS].T
-        scale = float(np.sqrt(np.sum(sizes**2) / len(features)))
-        return cls(mean, components, scale, (features - mean) @ components / scale)
-
-    def project(self, features: Array) -> Array:
-        """(N, C) windows in the reference's components, in units of `scale`. features: (N, D)."""
-        return (features - self.mean) @ self.components / self.scale
-
-
 def frechet_distance(a: Array, b: Array) -> float:
     """Frechet distance of two normal distributions fitted to a (N, C) and b (M, C) (Dowson, Landau 1982).
 
-    |mean a - mean b|^2 + trace(A + B - 2 (A B)^(1/2)), where A and B are the covariances. In windows that
-    `Reference` projected, 1 is the variance of the reference.
+    |mean a - mean b|^2 + trace(A + B - 2 (A B)^(1/2)), where A and B are the covariances. In windows of
+    `compare_windows`, 1 is the variance of the reference.
     """
     cov_a, cov_b = (np.cov(x, rowvar=False, bias=True) for x in (a, b))
     # The trace of (A B)^(1/2) is the sum of the square roots of the eigenvalues of A B.
@@ -205,10 +177,13 @@ def compare_windows(
     features, reference: (N, D) and (M, D) from `window_features`. first_half: (M,) which windows are one half
     of the reference. Its own Frechet distance is that of its halves; nan if one has fewer than two windows.
     """
-    basis = Reference.of(reference)
-    windows, halves = basis.project(features), (basis.windows[first_half], basis.windows[~first_half])
+    middle = reference.mean(axis=0)
+    _, sizes, axes = np.linalg.svd(reference - middle, full_matrices=False)
+    scale = np.sqrt(np.sum(sizes**2) / len(reference))  # of the windows' total variance
+    windows, theirs = ((rows - middle) @ axes[:COMPONENTS].T / scale for rows in (features, reference))
+    halves = theirs[first_half], theirs[~first_half]
     between = frechet_distance(*halves) if min(map(len, halves)) > 1 else float("nan")
     return (
-        {"frechet": frechet_distance(windows, basis.windows), "diversity": diversity(windows)},
-        {"frechet": between, "diversity": diversity(basis.windows)},
+        {"frechet": frechet_distance(windows, theirs), "diversity": diversity(windows)},
+        {"frechet": between, "diversity": diversity(theirs)},
     )

@@ -19,19 +19,7 @@ from hobble.measures import compare, measure
 from hobble.measures.measure import Row
 from hobble.measures.shown import chart, ours_and_published, table, words
 from hobble.report import parts
-from hobble.report.parts import (
-    Chart,
-    Compared,
-    Hint,
-    KeyFigure,
-    PageSection,
-    SectionPart,
-    Trace,
-    axis,
-    format_number,
-    line_trace,
-    marker_trace,
-)
+from hobble.report.parts import Chart, Compared, Hint, KeyFigure, PageSection, SectionPart, Trace
 from hobble.runtime.options import Runtime
 
 if TYPE_CHECKING:
@@ -77,7 +65,7 @@ STEPS = {
 }
 
 OFF_TRACK = 100.0  # cm from the line between two waypoints; places farther away are marked in the chart
-TIME_AXIS = axis("ms per frame", rangemode="tozero")
+TIME_AXIS = parts.axis("ms per frame", rangemode="tozero")
 FEWEST_STEPS = 10  # if the character takes fewer steps, the mean foot slide is not shown
 FRAME_BUDGET_MS = 1000 / 60  # the time that a frame may take at 60 Hz
 FLIP_DEGREES = 60  # if a joint turns by more than this in one frame, it flips visibly
@@ -103,12 +91,12 @@ def figures(found: Json, material: ReportMaterial) -> Iterator[KeyFigure]:
     """A key figure for the top of the report: the time of a frame."""
     if found.get("milliseconds"):
         milliseconds = median_time(found)
-        characters = format_number(FRAME_BUDGET_MS / milliseconds, 3)
+        characters = parts.format_number(FRAME_BUDGET_MS / milliseconds, 3)
         note = f"median; one core can run {characters} characters at 60 Hz"
         if published := material.published_entry("responsivity"):
-            mean = format_number(found["milliseconds"]["total"], 2)
+            mean = parts.format_number(found["milliseconds"]["total"], 2)
             note += f"; mean {mean} ms, published mean {published['milliseconds']} ms"
-        yield KeyFigure("Time per frame", format_number(milliseconds, 2), "ms", note, 20)
+        yield KeyFigure("Time per frame", parts.format_number(milliseconds, 2), "ms", note, 20)
 
 
 def hints(found: Json, material: ReportMaterial) -> Iterator[Hint]:
@@ -126,7 +114,7 @@ def lap_chart(found: Json, material: ReportMaterial) -> Chart:
     laps, fewest = (pick(len(entry["laps"]) for entry in entries) for pick in (max, min))
     layout: dict[str, Any] = {
         "barmode": "stack",
-        "xaxis": axis("lap", dtick=1 if laps < 25 else None),
+        "xaxis": parts.axis("lap", dtick=1 if laps < 25 else None),
         "yaxis": TIME_AXIS,
     }
     if published := material.published_entry("responsivity"):
@@ -146,7 +134,7 @@ def _lap_bars(laps: Sequence[Json]) -> list[Trace]:
     diamond = {"symbol": "diamond", "size": 8, "color": "@ink"}
     return [
         *bars,
-        marker_trace("median", numbers, list(map(median_time, laps)), diamond, hovertemplate=hover),
+        parts.marker_trace("median", numbers, list(map(median_time, laps)), diamond, hovertemplate=hover),
     ]
 
 
@@ -156,8 +144,8 @@ def track_chart(found: Json) -> Chart:
     corners_x, corners_z = ([*track[key], track[key][0]] for key in "xz")
     x, z = ([v for run in runs for v in (*run[key], None)] for key in "xz")  # None: a gap between two laps
     traces = [
-        line_trace("track", corners_x, corners_z, "@faint", dash="dash", width=1.2, hoverinfo="skip"),
-        line_trace("laps", x, z, "@accent", width=1.5, hoverinfo="skip"),
+        parts.line_trace("track", corners_x, corners_z, "@faint", dash="dash", width=1.2, hoverinfo="skip"),
+        parts.line_trace("laps", x, z, "@accent", width=1.5, hoverinfo="skip"),
     ]
     places = [
         (x, z, [cm, run["lap"]])
@@ -168,7 +156,7 @@ def track_chart(found: Json) -> Chart:
         hover = "lap %{customdata[1]}: %{customdata[0]:.0f} cm off<extra></extra>"
         red, name = {"size": 6, "color": "@hurt-high"}, f"more than {OFF_TRACK:.0f} cm off"
         x, z, cm_and_lap = map(list, zip(*off_track, strict=True))
-        traces.append(marker_trace(name, x, z, red, customdata=cm_and_lap, hovertemplate=hover))
+        traces.append(parts.marker_trace(name, x, z, red, customdata=cm_and_lap, hovertemplate=hover))
     labels = {
         "mode": "markers+text",
         "text": [f"{i}, {gait}" for i, gait in enumerate(track["gaits"])],
@@ -176,10 +164,10 @@ def track_chart(found: Json) -> Chart:
         "textfont": {"size": 11, "color": "@soft"},
     }
     circle = {"symbol": "circle-open", "size": 12, "color": "@ink"}
-    traces.append(marker_trace("waypoints", track["x"], track["z"], circle, hoverinfo="skip", **labels))
+    traces.append(parts.marker_trace("waypoints", track["x"], track["z"], circle, hoverinfo="skip", **labels))
     layout = {
-        "xaxis": axis("x, m", constrain="domain", zeroline=False),
-        "yaxis": axis("z, m", scaleanchor="x", autorange="reversed", zeroline=False),
+        "xaxis": parts.axis("x, m", constrain="domain", zeroline=False),
+        "yaxis": parts.axis("z, m", scaleanchor="x", autorange="reversed", zeroline=False),
     }
     largest, more = f"{max(place[2][0] for place in places):.0f}", ["off"] if off_track else []
     return chart(
@@ -211,7 +199,7 @@ def track_figures(found: Json) -> list[KeyFigure]:
         "speed.turn",
         limit=f"{np.degrees(FASTEST_TURN):.0f}",
         limited=f"{found['turns_held_back']:,} of {sum(lap['frames'] for lap in laps):,} frames",
-        drawn=format_number(found["largest_turn_degrees"]),
+        drawn=parts.format_number(found["largest_turn_degrees"]),
     )
     reached, of_steps = f"{found['waypoints_reached']} of {found['waypoints']}", f"{steps:,}"
     overshoot, slow = found["path_overshoot_cm"], found["milliseconds"]["spread"]["p99"]
@@ -223,7 +211,7 @@ def track_figures(found: Json) -> list[KeyFigure]:
         ("Slow frames", slow, "ms", "1 % of the frames are slower"),
     )
     return [
-        KeyFigure(label, value if isinstance(value, str) else format_number(value), unit, note)
+        KeyFigure(label, value if isinstance(value, str) else parts.format_number(value), unit, note)
         for label, value, unit, note in figures
     ]
 
@@ -501,6 +489,6 @@ def fit_chart(compared: Compared) -> Chart:
         if fit["slope"] is not None:
             ends = [min(fit["x"]), max(fit["x"])]
             values = [fit["intercept"] + fit["slope"] * x for x in ends]
-            traces.append(line_trace(f"{label}, straight fit", ends, values, colour, width=1.4))
-    x = axis("parameters of one frame", tickformat="~s", rangemode="tozero")
+            traces.append(parts.line_trace(f"{label}, straight fit", ends, values, colour, width=1.4))
+    x = parts.axis("parameters of one frame", tickformat="~s", rangemode="tozero")
     return chart("compare-fit", traces, {"xaxis": x, "yaxis": TIME_AXIS})

@@ -23,17 +23,8 @@ import numpy as np
 from hobble.core.files import Json
 from hobble.core.quat import Array
 from hobble.measures.measure import SPLITS, MeasureInputs, SampleOptions
-from hobble.rows.clip_rows import (
-    Captured,
-    ClipRows,
-    Excerpt,
-    RowsSummary,
-    captured_stretches,
-    load_clip_rows,
-    load_excerpt,
-    load_summary,
-    shuffle_key,
-)
+from hobble.rows import clip_rows
+from hobble.rows.clip_rows import Captured, ClipRows, Excerpt, RowsSummary
 
 # A hurt version is a copy of a healthy clip that `hobble.hurt` made limp. Its name ends like this:
 HURT_VERSION = re.compile(r"_hurt[1-9](_mirror)?$")
@@ -103,7 +94,7 @@ def draw_sample(summaries: Iterable[RowsSummary], splits: Mapping[str, str], fra
     for split, excerpts in of_split.items():
         # Half of the rows, or more if the other split has less than half.
         wanted = max(frames / 2, frames - sum(count for other, count in rows.items() if other != split))
-        order = sorted(excerpts, key=lambda excerpt: shuffle_key(f"{excerpt.clip} {excerpt.first}"))
+        order = sorted(excerpts, key=lambda excerpt: clip_rows.shuffle_key(f"{excerpt.clip} {excerpt.first}"))
         before = np.cumsum([0, *(excerpt.rows for excerpt in order)])[:-1]  # rows before each excerpt
         chosen = tuple(sorted(order[: max(2, int(np.searchsorted(before, wanted)))]))
         drawn[split] = Drawn(chosen, len(excerpts), rows[split])
@@ -131,9 +122,9 @@ class ClipPart:
     def load(self, before: int = 0, after: int = 0) -> LoadedPart:
         """Read the rows, and up to `before` rows before an excerpt and `after` rows after it."""
         if self.excerpt is None:
-            rows = load_clip_rows(self.path)
+            rows = clip_rows.load_clip_rows(self.path)
             return LoadedPart(rows, 0, len(rows))
-        rows = load_excerpt(self.path, self.excerpt, before, after)
+        rows = clip_rows.load_excerpt(self.path, self.excerpt, before, after)
         first = min(before, self.excerpt.first)
         return LoadedPart(rows, first, first + self.excerpt.rows)
 
@@ -170,7 +161,7 @@ def captured_motion(clips: Mapping[str, str | Path], sample: Sample | None) -> I
     clips: name -> file of rows. sample: the excerpts to read; None for all clips.
     """
     for part in clip_parts(clips, sample):
-        yield from captured_stretches(part.load().rows)
+        yield from clip_rows.captured_stretches(part.load().rows)
 
 
 def errors_of_sums(sums: Array) -> dict[str, Any]:
@@ -217,7 +208,7 @@ def summed_up(
 
 def sample_to_measure(inputs: MeasureInputs, options: SampleOptions) -> Sample | None:
     """Draw the sample to measure; None if the data set is so small that all clips are measured."""
-    return draw_sample(map(load_summary, inputs.summaries), inputs.splits, options.sample_frames)
+    return draw_sample(map(clip_rows.load_summary, inputs.summaries), inputs.splits, options.sample_frames)
 
 
 def with_sample(result: Json, sample: Sample | None) -> Json:
