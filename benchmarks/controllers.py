@@ -21,6 +21,7 @@ from stability import random_targets, stability
 
 from hobble.core.processors import processor_name
 from hobble.database.chunks import Manifest
+from hobble.measures.measure import MeasureInputs
 from hobble.measures.responsivity import Options as Laps
 from hobble.measures.responsivity_run import measure_responsivity
 from hobble.measures.rollouts_run import measure_roll_outs
@@ -61,7 +62,7 @@ def roll_outs(weights: Path, database: Path) -> str:
         c["clip"]: c["split"] for c in Manifest.load(database).clips if c["split"] == "held_out" and c["rows"]
     }
     files = {name: database.parent / "clips" / f"{name}.npz" for name in clips}
-    found = measure_roll_outs(weights, files, clips, "benchmark", lengths=LENGTHS)
+    found = measure_roll_outs(MeasureInputs("", {"weights": weights}, files, clips), lengths=LENGTHS)
     return " ".join(f"{entry['held_out']['position_error_cm']:.2f}" for entry in found["lengths"])
 
 

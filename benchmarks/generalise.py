@@ -28,6 +28,7 @@ import torch
 import yaml
 
 from hobble.database.reader import Database
+from hobble.measures.measure import MeasureInputs
 from hobble.measures.responsivity import Options as Laps
 from hobble.measures.responsivity_run import measure_responsivity
 from hobble.measures.rollouts_run import measure_roll_outs
@@ -58,7 +59,7 @@ def measure_recipe(
         weights = Path(folder) / "weights.npz"
         state = train(database, network=network, training=training, checkpoints=Path(folder), threads=threads)
         write_weights(weights, state.network, database, "benchmark", {})
-        rolled = measure_roll_outs(weights, files, clips, "benchmark", lengths=LENGTHS)
+        rolled = measure_roll_outs(MeasureInputs("", {"weights": weights}, files, clips), lengths=LENGTHS)
         character = load_network(weights)
     lap = measure_responsivity(
         character, Laps(laps=1, modes=()), configuration="", runtime=Runtime(), track=track

@@ -20,6 +20,7 @@ from stability import stability
 from hobble.core.processors import processor_name
 from hobble.database.reader import Database
 from hobble.measures.accuracy_run import measure_accuracy
+from hobble.measures.measure import MeasureInputs
 from hobble.measures.responsivity import Options as Laps
 from hobble.measures.responsivity_run import measure_responsivity
 from hobble.measures.rollouts_run import measure_roll_outs
@@ -44,8 +45,8 @@ def values(folder: Path, files: dict[str, Path], splits: dict[str, str], minutes
     weights = folder / "network/weights.npz"
     network = load_network(weights)
     out: dict[str, object] = {}
-    steps = measure_accuracy(weights, files, splits, folder.name)
-    rolled = measure_roll_outs(weights, files, splits, folder.name, lengths=LENGTHS)
+    inputs = MeasureInputs(folder.name, {"weights": weights}, files, splits)
+    steps, rolled = measure_accuracy(inputs), measure_roll_outs(inputs, lengths=LENGTHS)
     for split in ("train", "held_out"):
         out[f"{split}: one step, share"] = steps[split]["mean"]
         out[f"{split}: one step, cm"] = steps[split]["position_error_cm"]

@@ -19,6 +19,7 @@ import numpy as np
 from hobble.database.chunks import Manifest
 from hobble.database.write import write_database
 from hobble.measures.accuracy_run import measure_accuracy
+from hobble.measures.measure import MeasureInputs
 from hobble.models.pfnn import PfnnOptions
 from hobble.training.options import Training
 from hobble.training.train import run
@@ -67,7 +68,8 @@ def main() -> None:
                 weights = trained(
                     database, Path(name, f"{dtype}-{seed}"), arguments.passes, seed, arguments.threads
                 )
-                found = measure_accuracy(weights, clips, splits, "precision")["held_out"]
+                inputs = MeasureInputs("", {"weights": weights}, clips, splits)
+                found = measure_accuracy(inputs)["held_out"]
                 errors[dtype, seed] = found["mean"]
                 more = found["mean"] / errors["float32", seed] - 1
                 print(f"{dtype:<10} {manifest.bytes / manifest.original_bytes:29.1%} {seed:6}", end="")

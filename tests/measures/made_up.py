@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from hobble.measures.measure import MeasureInputs
 from hobble.models.load import NEEDED_ROLES
-from hobble.rows.clip_rows import Captured, ClipRows
+from hobble.rows.clip_rows import Captured, ClipRows, save_clip_rows
 from hobble.rows.layout import GAITS, RowLayout
 
 LAYOUT = RowLayout(3, channels=(("injury", 1),))
@@ -61,6 +62,17 @@ def random_rows(
         rng.normal(size=(rows * fits, 36)).astype(np.float32),
         rng.normal(size=rows * fits).astype(np.float32),
     )
+
+
+def made_up_inputs(
+    folder: Path, clips: Mapping[str, ClipRows], held_out: Collection[str] = ()
+) -> MeasureInputs:
+    """A random network and these clips as the inputs of a measurement, with files in `folder`."""
+    files = {name: folder / f"{name}.npz" for name in clips}
+    for name, rows in clips.items():
+        save_clip_rows(files[name], rows)
+    splits = {name: "held_out" if name in held_out else "train" for name in clips}
+    return MeasureInputs("made up", {"weights": random_network(folder / "weights.npz")}, files, splits)
 
 
 def random_network(path: Path) -> Path:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,14 +13,9 @@ from hobble.measures import accuracy_run as module
 from hobble.measures.accuracy_run import at_stored_phases, joint_errors, measure_accuracy, predict_function
 from hobble.measures.measure import JointOptions, MeasureInputs
 from hobble.models.load import load_network
-from hobble.rows.clip_rows import pair_batches, save_clip_rows
+from hobble.rows.clip_rows import pair_batches
 from hobble.rows.layout import RowLayout
-from tests.measures.made_up import LAYOUT, random_network, random_rows
-
-
-@pytest.fixture
-def weights(tmp_path: Path) -> Path:
-    return random_network(tmp_path / "weights.npz")
+from tests.measures.made_up import LAYOUT, made_up_inputs, random_rows
 
 
 @pytest.mark.shared
@@ -50,16 +44,17 @@ def test_an_error_of_a_tenth_in_one_joint_gives_the_documented_error():
 
 
 @pytest.mark.parametrize("fits", [1, 10])
-def test_the_errors_of_a_clip_cover_all_its_pairs(weights, tmp_path, fits):
-    network, rows = load_network(weights), random_rows("a", 37, fits, 5)
-    save_clip_rows(tmp_path / "a.npz", rows)
+def test_the_errors_of_a_clip_cover_all_its_pairs(tmp_path, fits):
+    rows = random_rows("a", 37, fits, 5)
+    inputs = made_up_inputs(tmp_path, {"a": rows})
+    network = load_network(inputs.weights)
     relative, distance = np.concatenate(
         [
             joint_errors(LAYOUT, pairs.y, network.predict(pairs.x, pairs.p), range(3)).reshape(-1, 2)
             for pairs in pair_batches(rows, rows.layout)
         ]
     ).T
-    (got,) = measure_accuracy(weights, {"a": tmp_path / "a.npz"}, {"a": "train"}, "x")["clips"]
+    (got,) = measure_accuracy(inputs)["clips"]
     assert got["frames"] == 37
     expected = {"mean": relative.mean(), "sd": relative.std(), "position_error_cm": distance.mean()}
     assert {key: got[key] for key in expected} == pytest.approx(expected, rel=1e-4)
@@ -67,13 +62,11 @@ def test_the_errors_of_a_clip_cover_all_its_pairs(weights, tmp_path, fits):
         assert got[name] == pytest.approx(np.quantile(relative, share), rel=0.05)
 
 
-def test_accuracy_per_clip_and_split(weights, tmp_path):
-    clips = {}
-    for i, (name, n, fits) in enumerate((("b", 20, 1), ("a", 40, 10), ("c", 30, 1), ("none", 0, 1))):
-        clips[name] = tmp_path / f"{name}.npz"
-        save_clip_rows(clips[name], random_rows(name, n, fits, i))
-    splits = {"a": "train", "b": "train", "c": "held_out", "none": "held_out"}
-    result = measure_accuracy(weights, clips, splits, "injured")
+def test_accuracy_per_clip_and_split(tmp_path):
+    sizes = {"b": (20, 1), "a": (40, 10), "c": (30, 1), "none": (0, 1)}  # frames, fits
+    clips = {name: random_rows(name, *size, i) for i, (name, size) in enumerate(sizes.items())}
+    inputs = made_up_inputs(tmp_path, clips, held_out=("c", "none"))
+    result = measure_accuracy(inputs)
     a, b, c, none = result["clips"]
     assert [entry["clip"] for entry in result["clips"]] == ["a", "b", "c", "none"]
     assert result["train"]["frames"] == 60
@@ -94,22 +87,20 @@ def test_accuracy_per_clip_and_split(weights, tmp_path):
     assert result["train"]["as_published"] == spread
     assert result["held_out"]["as_published"]["sd_of_clips"] is None
     json.dumps(result, allow_nan=False)
-    assert result == measure_accuracy(weights, clips, splits, "injured")
+    assert result == measure_accuracy(inputs)
 
 
-def test_only_the_first_positions_of_a_clip_count_as_published(weights, tmp_path, monkeypatch) -> None:
+def test_only_the_first_positions_of_a_clip_count_as_published(tmp_path, monkeypatch) -> None:
     """Of three joints, 30 positions are those of ten frames; a frame counts with all its fits."""
     rows = random_rows("a", 40, 10, 0)
-    files = {"a": tmp_path / "a.npz", "first": tmp_path / "first.npz"}
-    save_clip_rows(files["a"], rows)
-    save_clip_rows(files["first"], rows.part(slice(10)))
     monkeypatch.setattr(module, "PUBLISHED_POSITIONS", 32)
-    clip, first = measure_accuracy(weights, files, dict.fromkeys(files, "train"), "x")["clips"]
+    inputs = made_up_inputs(tmp_path, {"a": rows, "first": rows.part(slice(10))})
+    clip, first = measure_accuracy(inputs)["clips"]
     assert (clip["frames"], clip["as_published"]["frames"]) == (40, 10)
     assert clip["as_published"] == first["as_published"]
 
 
-def test_equivalent_joints_leave_out_joints_of_larger_skeletons(weights, tmp_path):
+def test_equivalent_joints_leave_out_joints_of_larger_skeletons(tmp_path):
     for skeleton, expected in (
         ({"maps": {"holden31": {"Foot": "LeftFoot", "Hips": "Hips"}}}, ["Foot", "Hips"]),
         ({"joints": {}}, None),
@@ -118,22 +109,20 @@ def test_equivalent_joints_leave_out_joints_of_larger_skeletons(weights, tmp_pat
         inputs = MeasureInputs("x", {"skeleton": tmp_path / "skeleton.yaml"})
         assert module.joints_to_measure(inputs, JointOptions(joints="equivalent")) == expected
         assert module.joints_to_measure(inputs, JointOptions()) is None
-    save_clip_rows(tmp_path / "a.npz", random_rows("a", 20, 1, 0))
-    given = weights, {"a": tmp_path / "a.npz"}, {"a": "train"}, "ava-m"
-    each = [measure_accuracy(*given, [name])["train"]["mean"] for name in ("Foot", "Hips")]
-    both = measure_accuracy(*given, ["Foot", "Hips"])
+    inputs = made_up_inputs(tmp_path, {"a": random_rows("a", 20, 1, 0)})
+    each = [measure_accuracy(inputs, [name])["train"]["mean"] for name in ("Foot", "Hips")]
+    both = measure_accuracy(inputs, ["Foot", "Hips"])
     assert (both["joints"], both["train"]["mean"]) == (2, pytest.approx(np.mean(each)))
     with pytest.raises(HobbleError, match="Tail"):
-        measure_accuracy(*given, ["Tail"])
+        measure_accuracy(inputs, ["Tail"])
 
 
-def test_rows_of_another_layout_are_refused(weights, tmp_path):
+def test_rows_of_another_layout_are_refused(tmp_path):
     other = replace(
         random_rows("a", 0, 1, 0),
         layout=RowLayout(4, channels=(("injury", 1),)),
         x=np.zeros((0, 144)),
         y=np.zeros((0, 68)),
     )
-    save_clip_rows(tmp_path / "a.npz", other)
     with pytest.raises(InputError, match=r"a\.npz: its rows .* are not those the network has learnt"):
-        measure_accuracy(weights, {"a": tmp_path / "a.npz"}, {"a": "train"}, "holden")
+        measure_accuracy(made_up_inputs(tmp_path, {"a": other}))

@@ -13,10 +13,10 @@ import pytest
 from hobble.measures.rollouts_run import RollOutInputs, inputs_of_clip, measure_roll_outs, roll_out_rows
 from hobble.measures.walks import in_root_coordinates
 from hobble.models.network import Network
-from hobble.rows.clip_rows import ClipRows, save_clip_rows
+from hobble.rows.clip_rows import ClipRows
 from hobble.rows.layout import RowLayout
 from hobble.runtime.animation import ProceduralAnimation
-from tests.measures.made_up import random_network, random_rows
+from tests.measures.made_up import made_up_inputs, random_rows
 from tests.measures.whole_roll_outs import clip_roll_outs, roll_out
 
 
@@ -114,13 +114,10 @@ def test_after_one_frame_a_pose_is_the_mean_of_prediction_and_extrapolation(hurt
 
 
 def test_results_of_splits_are_means_of_their_clips_and_reproducible(tmp_path: Path, monkeypatch) -> None:
-    clips = {}
-    for i, (name, count) in enumerate((("a", 60), ("b", 90), ("c", 40), ("none", 0))):
-        clips[name] = tmp_path / f"{name}.npz"
-        save_clip_rows(clips[name], random_rows(name, count, 1, i))
-    splits = {"a": "train", "b": "train", "c": "held_out", "none": "held_out"}
-    given = random_network(tmp_path / "weights.npz"), clips, splits, "injured"
-    result = measure_roll_outs(*given, lengths=(1, 30))
+    sizes = {"a": 60, "b": 90, "c": 40, "none": 0}
+    clips = {name: random_rows(name, count, 1, i) for i, (name, count) in enumerate(sizes.items())}
+    inputs = made_up_inputs(tmp_path, clips, held_out=("c", "none"))
+    result = measure_roll_outs(inputs, lengths=(1, 30))
     assert [entry["length"] for entry in result["lengths"]] == [1, 30]
     for entry in result["lengths"]:
         a, b, c, none = entry["clips"]
@@ -135,4 +132,4 @@ def test_results_of_splits_are_means_of_their_clips_and_reproducible(tmp_path: P
     # The same bits, however many poses and clips go at once.
     for name, value in (("BATCH", 7), ("AT_ONCE", 1)):
         monkeypatch.setattr(f"hobble.measures.rollouts_run.{name}", value)
-        assert measure_roll_outs(*given, lengths=(1, 30)) == result
+        assert measure_roll_outs(inputs, lengths=(1, 30)) == result

@@ -16,7 +16,7 @@ from hobble.measures.sample import Drawn, Sample, draw_sample
 from hobble.rows import clip_rows
 from hobble.rows.clip_rows import Excerpt, ExcerptKind, RowsSummary, load_excerpt, save_clip_rows
 from hobble.rows.layout import GAITS
-from tests.measures.made_up import random_network, random_rows
+from tests.measures.made_up import made_up_inputs, random_rows
 
 
 def population(
@@ -114,13 +114,11 @@ def flat(clip):
 
 def test_accuracy_and_roll_outs_of_a_sample_have_intervals(tmp_path: Path):
     rows = {name: 20 + 5 * i for i, name in enumerate("abcdefgh")}
-    clips = {name: tmp_path / f"{name}.npz" for name in rows}
-    for seed, (name, count) in enumerate(rows.items()):
-        save_clip_rows(clips[name], random_rows(name, count, 1, seed))
-    given = random_network(tmp_path / "w.npz"), clips, dict.fromkeys(clips, "train"), "holden"
+    clips = {name: random_rows(name, count, 1, seed) for seed, (name, count) in enumerate(rows.items())}
+    inputs = made_up_inputs(tmp_path, clips)
     chosen = tuple(Excerpt(name, 0, rows[name], rows[name]) for name in "abcde")
     sample = Sample({"train": Drawn(chosen, 8, sum(rows.values()))}, 8)
-    everything, found = measure_accuracy(*given), measure_accuracy(*given, sample=sample)
+    everything, found = measure_accuracy(inputs), measure_accuracy(inputs, sample=sample)
     means = {clip["clip"]: clip["mean"] for clip in everything["clips"]}
     assert list(map(flat, found["clips"])) == [pytest.approx(flat(clip)) for clip in everything["clips"][:5]]
     expected = np.average([means[n] for n in "abcde"], weights=[rows[n] for n in "abcde"])
@@ -130,8 +128,8 @@ def test_accuracy_and_roll_outs_of_a_sample_have_intervals(tmp_path: Path):
     assert found["train"]["interval"]["mean"] == pytest.approx(width)
     assert found["sample"] == {"excerpts": 5, "of_excerpts": 8, "clips": 5, "of": 8}
     assert "sample" not in everything
-    rolled = measure_roll_outs(*given, lengths=(1, 4), sample=sample)
-    entries = measure_roll_outs(*given, lengths=(1, 4))["lengths"][0]["clips"]
+    rolled = measure_roll_outs(inputs, lengths=(1, 4), sample=sample)
+    entries = measure_roll_outs(inputs, lengths=(1, 4))["lengths"][0]["clips"]
     of_clip = {one: entries[i]["position_error_cm"] for i, one in enumerate(chosen)}
     width = sample.splits["train"].confidence_half_width(of_clip)
     assert rolled["lengths"][0]["train"]["interval"]["position_error_cm"] == pytest.approx(width)
@@ -142,17 +140,15 @@ def test_accuracy_and_roll_outs_of_a_sample_have_intervals(tmp_path: Path):
 
 def test_all_excerpts_of_a_clip_together_measure_what_the_clip_does(tmp_path):
     """Roll-outs that begin in an excerpt go on after it, so none is cut short but at the end of the clip."""
-    file = tmp_path / "a.npz"
-    save_clip_rows(file, random_rows("a", 120, 1, 3))
+    inputs = made_up_inputs(tmp_path, {"a": random_rows("a", 120, 1, 3)})
     parts = [Excerpt("a", 40 * i, 40, 120) for i in range(3)]
     sample = Sample({"train": Drawn(tuple(parts), 3, 120)}, 1)
-    given = random_network(tmp_path / "w.npz"), {"a": file}, {"a": "train"}, "holden"
-    cut, uncut = measure_accuracy(*given, sample=sample), measure_accuracy(*given)
+    cut, uncut = measure_accuracy(inputs, sample=sample), measure_accuracy(inputs)
     assert list(map(flat, cut["clips"])) == [pytest.approx(flat(uncut["clips"][0]))]
     assert cut["train"]["mean_of_clips"] == pytest.approx(uncut["train"]["mean_of_clips"])
     assert [(e["first_frame"], e["last_frame"]) for e in cut["excerpts"]] == [(0, 39), (40, 79), (80, 119)]
-    rolled = measure_roll_outs(*given, lengths=(1, 20), sample=sample)["lengths"]
-    every = measure_roll_outs(*given, lengths=(1, 20))["lengths"]
+    rolled = measure_roll_outs(inputs, lengths=(1, 20), sample=sample)["lengths"]
+    every = measure_roll_outs(inputs, lengths=(1, 20))["lengths"]
     assert rolled[0]["clips"] == [pytest.approx(every[0]["clips"][0])]
     # Starts in steps of 10: at 1, 11, ... in the clip, at 1, 11, ..., 40, 50, ..., 80, ... in the excerpts.
     assert (every[1]["train"]["ended"], rolled[1]["train"]["ended"]) == (10, 4 + 4 + 2)

@@ -8,7 +8,7 @@ network gets the captured input of every frame, never its own output.
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -115,16 +115,12 @@ def values_of_sums(sums: Array) -> dict[str, Any]:
 
 
 def measure_accuracy(
-    weights: str | Path,
-    clips: Mapping[str, str | Path],
-    splits: Mapping[str, str],
-    configuration: str,
+    inputs: MeasureInputs,
     joint_names: Sequence[str] | None = None,
     sample: samples.Sample | None = None,
 ) -> dict[str, Any]:
     """The content of accuracy.json: errors over the frames of each split, and of each clip, sorted by name.
 
-    weights: the network's file. clips: name -> file of rows. splits: name -> "train" or "held_out".
     joint_names: the joints to measure; all by default. sample: the excerpts to measure in place of all clips;
     then the result also has the size of the sample, confidence intervals, and `excerpts`, the errors of each
     excerpt. In the result, `mean_of_clips` is the mean of the mean errors of clips, as in the published
@@ -132,12 +128,12 @@ def measure_accuracy(
     the first PUBLISHED_POSITIONS of each clip; of a split, mean and standard deviation (n - 1) of the clips'
     means. It is left out of a sample. Raises InputError if rows and network have different layouts.
     """
-    network = load_network(weights)
+    network, splits = load_network(inputs.weights), inputs.splits
     joints, predict = joint_indices(network, joint_names), predict_function(network)
     constant, first_frames = at_stored_phases(network, predict), PUBLISHED_POSITIONS // network.layout.joints
     sums: dict[samples.ClipPart, Array] = {}
     published, excerpts = {}, []
-    for part in samples.clip_parts(clips, sample):
+    for part in samples.clip_parts(inputs.clips, sample):
         rows = part.load().rows
         check_layout(part.path, rows, network)
         sums[part] = clip_sums(network, rows, joints, predict)
@@ -163,7 +159,7 @@ def measure_accuracy(
             result[split]["as_published"] = {"mean_of_clips": mean, "sd_of_clips": sd}
     for clip in result["clips"] if sample is None else ():
         clip["as_published"] = published[clip["clip"]]
-    result = {"configuration": configuration, "joints": len(joints), **result}
+    result = {"configuration": inputs.configuration, "joints": len(joints), **result}
     return {**samples.with_sample(result, sample), **({"excerpts": excerpts} if sample else {})}
 
 
@@ -212,8 +208,6 @@ def check_layout(where: str | Path, rows: ClipRows, network: Network) -> None:
 def run(inputs: MeasureInputs, options: Options) -> Outcome:
     """accuracy.json, and the tables `clips` and, if a sample was measured, `excerpts`, with their errors."""
     joints, sample = joints_to_measure(inputs, options), samples.sample_to_measure(inputs, options)
-    result = measure_accuracy(
-        inputs.weights, inputs.clips, inputs.splits, inputs.configuration, joints, sample
-    )
+    result = measure_accuracy(inputs, joints, sample)
     excerpts = {"excerpts": result.pop("excerpts")} if sample else {}
     return Outcome(result, {"clips": flat_rows([result], "clips"), **excerpts})

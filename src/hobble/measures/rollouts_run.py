@@ -12,10 +12,9 @@ by one. A roll-out in a crowd is the same as alone, to the last bit.
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, fields
 from functools import partial
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -244,26 +243,21 @@ def values_of_sums(sums: Array, phase: bool = True) -> dict[str, Any]:
 
 
 def measure_roll_outs(
-    weights: str | Path,
-    clips: Mapping[str, str | Path],
-    splits: Mapping[str, str],
-    configuration: str,
-    equivalents: Sequence[str] | None = None,
+    inputs: MeasureInputs,
+    joint_names: Sequence[str] | None = None,
     lengths: Sequence[int] = LENGTHS,
-    mode: str = "cubic",
     sample: samples.Sample | None = None,
 ) -> Json:
     """The content of rollouts.json: for each of `lengths`, the errors of the splits and of the clips.
 
-    clips: name -> file of rows. splits: name -> "train" or "held_out". equivalents: names of the joints to
-    measure; all by default. mode: the network's phase mode. sample: measure only the roll-outs that begin in
-    its excerpts; the result then has the size of the sample in `sample` and half widths of 95 % confidence
+    joint_names: the joints to measure; all by default. sample: measure only the roll-outs that begin in its
+    excerpts; the result then has the size of the sample in `sample` and half widths of 95 % confidence
     intervals in `interval`. Raises InputError if rows and network have different layouts.
     """
-    network = load_network(weights)
-    predictor, joints = network.predictor(mode), joint_indices(network, equivalents)
+    network, mode = load_network(inputs.weights), inputs.runtime.mode
+    predictor, joints = network.predictor(mode), joint_indices(network, joint_names)
     of_parts: dict[int, dict[samples.ClipPart, Array]] = {length: {} for length in lengths}
-    for batch in _part_batches(samples.clip_parts(clips, sample), network, lengths):
+    for batch in _part_batches(samples.clip_parts(inputs.clips, sample), network, lengths):
         stretches = [stretch for some in batch.values() for stretch in some]
         ends = np.cumsum([len(some) for some in batch.values()])[:-1]
         for length, sums in of_parts.items():
@@ -272,10 +266,10 @@ def measure_roll_outs(
         log.info("rolled out: %s", ", ".join(str(part.excerpt or part.clip) for part in batch))
     values = partial(values_of_sums, phase=network.uses_phase)
     entries = [
-        {"length": length, **samples.summed_up(sums, splits, sample, values, {"position_error_cm": 3})}
+        {"length": length, **samples.summed_up(sums, inputs.splits, sample, values, {"position_error_cm": 3})}
         for length, sums in of_parts.items()
     ]
-    result = {"configuration": configuration, "joints": len(joints), "mode": mode, "lengths": entries}
+    result = {"configuration": inputs.configuration, "joints": len(joints), "mode": mode, "lengths": entries}
     return samples.with_sample(result, sample)
 
 
@@ -310,14 +304,6 @@ def roll_out_rows(result: Json) -> list[Row]:
 
 def run(inputs: MeasureInputs, options: Options) -> Outcome:
     """rollouts.json, and its rows as a table."""
-    result = measure_roll_outs(
-        inputs.weights,
-        inputs.clips,
-        inputs.splits,
-        inputs.configuration,
-        joints_to_measure(inputs, options),
-        options.rollouts,
-        inputs.runtime.mode,
-        samples.sample_to_measure(inputs, options),
-    )
+    joints, sample = joints_to_measure(inputs, options), samples.sample_to_measure(inputs, options)
+    result = measure_roll_outs(inputs, joints, options.rollouts, sample)
     return Outcome(result, {"lengths": roll_out_rows(result)})
