@@ -11,18 +11,20 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+import numpy as np
+
 from hobble.channels.injury.status import read_status
 from hobble.cli.gait import read_clip
 from hobble.core.errors import InputError
 from hobble.gait.cycles import measure_cycles
 from hobble.gait.profile import NO_CYCLE
-from hobble.measures.limp_run import INJURY, CapturedWalk, compare_held_out
+from hobble.measures.limp_run import INJURY, Walk, compare_held_out, healthy_reference, walk_figures
 from hobble.models.load import load_network
 from hobble.models.network import Network
 from hobble.runtime.options import Runtime
 
 
-def captured_limp(path: Path, network: Network) -> CapturedWalk:
+def captured_limp(path: Path, network: Network) -> Walk:
     clip = read_clip(path)
     spells = read_status(path.with_name(f"{path.stem}_injuries.txt"), network.channels[INJURY]).spells
     if len({spell.links for spell in spells}) != 1:
@@ -30,7 +32,7 @@ def captured_limp(path: Path, network: Network) -> CapturedWalk:
     walk = measure_cycles(clip.skeleton, clip.positions, clip.fps)
     if not len(walk):
         raise InputError(path, NO_CYCLE)
-    return CapturedWalk(path.stem, dict(spells[0].links), walk)
+    return Walk(dict(spells[0].links), walk, np.zeros((0, 0, 3)), path.stem)
 
 
 def main() -> None:
@@ -43,9 +45,11 @@ def main() -> None:
     options = parser.parse_args()
     network = load_network(options.weights)
     limps = [captured_limp(path, network) for path in options.clips]
-    held_out = {limp.clip: "held_out" for limp in limps}
+    cases = [{}, *({INJURY: limp.injury} for limp in limps)]
+    healthy, *figures = walk_figures(network, cases, "walk", options.seconds, Runtime())
     print(f"{'clip':44}{'healthy':>9}{'hurt':>7}")
-    for row in compare_held_out(network, limps, held_out, options.seconds, Runtime()):
+    for limp, figure in zip(limps, figures, strict=True):
+        row = compare_held_out(limp, figure, healthy, healthy_reference(limp, limps))
         print(f"{row['clip']:44}{row['healthy']:9.2f}{row['hurt']:7.2f}")
 
 

@@ -255,8 +255,8 @@ def sizes_of_versions(folder: Path) -> None:
 def sizes_of_network(file: Path) -> None:
     """Walks of 20 s at 1.2 m/s."""
     cases = [(part, severity) for part in PARTS for severity in SEVERITIES]
-    injuries = [{}, *({PARTS[part]: severity} for part, severity in cases)]
-    figures = walk_figures(load_network(file), injuries, 2.0, "walk", 20.0, Runtime())
+    injuries = [{}, *({"injury": {PARTS[part]: severity}} for part, severity in cases)]
+    figures = walk_figures(load_network(file), injuries, "walk", 20.0, Runtime())
     healthy, *hurt = (figure.profile for figure in figures)
     assert healthy is not None
     print_sizes(str(file), healthy, {case: p for case, p in zip(cases, hurt, strict=True) if p is not None})

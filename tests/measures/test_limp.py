@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -11,23 +12,16 @@ import pytest
 
 from hobble.channels import channel
 from hobble.gait.cycles import CURVES, SCALARS, SIGN_CHANGES, Cycle, WalkCycles
-from hobble.gait.profile import NORMAL, profile_of_walk, read_people
+from hobble.gait.profile import NORMAL, read_people
 from hobble.measures import limp_run as module
 from hobble.measures.limp import gallery_chart
-from hobble.measures.limp_run import (
-    SEVERITIES,
-    CapturedWalk,
-    FigureWalk,
-    healthy_reference,
-    hurt_side,
-    limp_distance,
-    measure_limps,
-)
+from hobble.measures.limp_run import SEVERITIES, Walk, healthy_reference, hurt_side, measure_limps
 from hobble.measures.sample import HURT_VERSION
 from hobble.runtime.options import Runtime
 
 LEFT_KNEE, RIGHT_KNEE = "LeftUpLeg-LeftLeg", "RightUpLeg-RightLeg"
 FRAMES = 480
+POSES = np.arange(24.0)[:, None, None] * np.ones((24, 31, 3))  # of all mean cycles
 
 
 def mirrored(cycle: Cycle) -> Cycle:
@@ -44,7 +38,7 @@ def mirrored(cycle: Cycle) -> Cycle:
     return Cycle(cycle.start, cycle.end, scalars, np.array(curves))
 
 
-def walking(limp: dict[str, float], speed: float) -> FigureWalk:
+def walking(limp: dict[str, float], speed: float, injury: dict[str, float] | None = None) -> Walk:
     """A figure that walks like people and limps on one side, by a share of the limp of people with pain in
     the right leg.
     """
@@ -60,38 +54,31 @@ def walking(limp: dict[str, float], speed: float) -> FigureWalk:
     curves = np.array([mixed(f"mean {n}") + mixed(f"range {n}") * ramp for n in CURVES])
     scalars = {n: mixed(n) for n in SCALARS}
     cycles = [Cycle(start, start + 70, scalars, curves) for start in range(0, FRAMES - 70, 70)]
-    walk = WalkCycles(60.0, tuple(cycles), tuple(map(mirrored, cycles)))
-    walk = WalkCycles(60.0, walk.left, walk.right) if "left" in limp else walk
-    return FigureWalk(walk, profile_of_walk(walk), speed, FRAMES)
+    sides = tuple(cycles), tuple(map(mirrored, cycles))
+    walk = WalkCycles(60.0, *(sides[::-1] if "left" in limp else sides))
+    return Walk(injury or {}, walk, POSES, "", speed, FRAMES)
 
 
 @pytest.fixture
-def measure(hurtable, holden31, monkeypatch):
-    """measured(effect): limp.json of a character whose limp at a severity is `effect(severity)` of people's
+def measure(hurtable, monkeypatch):
+    """measure(effect): limp.json of a character whose limp at a severity is `effect(severity)` of people's
     limp.
     """
 
-    def run(
-        effect, other_side: bool = False, every: tuple[CapturedWalk, ...] = (), splits=None
-    ) -> dict[str, Any]:
-        def walk_figures(network, each, speeds, gait, seconds, runtime, others=None):
+    def run(effect, other_side: bool = False, every: Sequence[Walk] = (), splits=None) -> dict[str, Any]:
+        def walk_figures(network, cases, gait, seconds, runtime):
             out = []
-            for hurt in each:
-                amount = {hurt_side(holden31, link): effect(s) for link, s in hurt.items()}
-                if other_side:
-                    amount = {("left" if side == "right" else "right"): v for side, v in amount.items()}
-                worst = max(amount.values(), default=0.0)
-                out.append(walking(amount, speeds * (1 - 0.5 * worst)))
+            for injury in (case.get("injury", {}) for case in cases):
+                amount = {"left" if (link == LEFT_KNEE) != other_side else "right": effect(s)
+                          for link, s in injury.items()}  # fmt: skip
+                speed = module.SPEEDS[gait] * (1 - 0.5 * max(amount.values(), default=0.0))
+                out.append(walking(amount, speed, injury))
             return out
 
         monkeypatch.setattr(module, "walk_figures", walk_figures)
-        options = {
-            "configuration": "x",
-            "runtime": Runtime(),
-            "seconds": 8.0,
-            "links": [LEFT_KNEE, RIGHT_KNEE],
-        }
-        return measure_limps(hurtable, list(every), {"captured": {}, "made": {}}, splits or {}, **options)
+        options = {"configuration": "x", "runtime": Runtime(), "seconds": 8.0}
+        seconds, links = {"captured": {}, "made": {}}, [LEFT_KNEE, RIGHT_KNEE]
+        return measure_limps(hurtable, every, seconds, splits or {}, links=links, **options)
 
     return run
 
@@ -141,45 +128,35 @@ def test_a_limp_is_compared_with_the_healthy_walk_of_the_same_mood(
     links = hurtable.channels["injury"][:25]
     network = replace(hurtable, layout=layout, channels={"injury": links, "mood": moods})
 
-    def walk_figures(network, each, speeds, gait, seconds, runtime, others):
+    def walk_figures(network, cases, gait, seconds, runtime):
         out = []
-        for hurt, felt in zip(each, others["mood"], strict=True):
+        for injury, felt in ((case["injury"], case["mood"]) for case in cases):
             assert set(felt.values()) == {1.0}
-            amount = {hurt_side(holden31, link): 0.1 * s for link, s in hurt.items()}
-            speed = speeds * (0.5 if "sad" in felt else 1.0) * (0.6 if hurt else 1.0)
-            figure = walking({} if "old" in felt else amount, speed)
-            out.append(replace(figure, profile=None) if "tired" in felt else figure)
+            amount = {} if "old" in felt else {hurt_side(holden31, injury): 1.0} if injury else {}
+            figure = walking(amount, (0.5 if "sad" in felt else 1.0) * (0.6 if injury else 1.0), injury)
+            out.append(replace(figure, cycles=WalkCycles(60.0, (), ())) if "tired" in felt else figure)
         return out
 
     monkeypatch.setattr(module, "walk_figures", walk_figures)
     rows = module.limps_together(network, [LEFT_KNEE, RIGHT_KNEE, "Neck1-Head"], 8.0, Runtime())
     assert [r["column"] for r in rows] == [m for m in moods if m != "tired" for _ in range(2)]
     assert {r["speed_share"] for r in rows} == {0.6}
-    found = {r["column"]: r for r in module._recognition_by_column(rows)}
-    assert {name: r["named"] for name, r in found.items()} == {
-        "old": 0.0,
-        "happy": 1.0,
-        "sad": 1.0,
-        "angry": 1.0,
-    }
+    found = {r["column"]: r for r in module._recognition(rows, "column")}
+    named = {"old": 0.0, "happy": 1.0, "sad": 1.0, "angry": 1.0}
+    assert {name: r["named"] for name, r in found.items()} == named
     assert [r["wrong_side"] for r in found.values()] == [0.0] * 4
     assert module.limps_together(hurtable, [LEFT_KNEE], 8.0, Runtime()) == []
 
 
-def clip(name: str, hurt: dict[str, float], limp: dict[str, float]) -> CapturedWalk:
-    return CapturedWalk(name, hurt, walking(limp, 2.0).walk)
+def clip(name: str, hurt: dict[str, float], limp: dict[str, float]) -> Walk:
+    return replace(walking(limp, 2.0, hurt), clip=name)
 
 
 def test_a_held_out_limp_is_nearer_only_if_the_same_leg_is_hurt(measure) -> None:
-    every = (
-        clip("7_1", {}, {}),
-        clip("7_2", {RIGHT_KNEE: 8.0}, {"right": 0.8}),
-        clip("7_3", {RIGHT_KNEE: 8.0}, {"right": 0.8}),
-    )
-    splits = {"7_1": "train", "7_2": "held_out", "7_3": "train"}
+    hurt, limp = {RIGHT_KNEE: 8.0}, {"right": 0.8}
+    every, splits = (clip("7_1", {}, {}), *(clip(f"7_{n}", hurt, limp) for n in "23")), {"7_2": "held_out"}
     (row,) = measure(lambda s: 0.1 * s, every=every, splits=splits)["held_out_limps"]
-    assert row["clip"] == "7_2"
-    assert row["nearer"]
+    assert (row["clip"], row["compared_with"], row["nearer"]) == ("7_2", "performer", True)
     assert row["hurt"] < 0.3 * row["healthy"]
     assert not measure(lambda s: 0.1 * s, True, every, splits)["held_out_limps"][0]["nearer"]
     assert not measure(lambda s: 0.0, False, every, splits)["held_out_limps"][0]["nearer"]
@@ -188,30 +165,24 @@ def test_a_held_out_limp_is_nearer_only_if_the_same_leg_is_hurt(measure) -> None
 def test_a_captured_limp_is_compared_with_its_own_performer() -> None:
     own, other = clip("7_1", {}, {}), clip("8_1", {}, {"left": 0.3})
     hurt = clip("7_2", {RIGHT_KNEE: 8.0}, {"right": 0.8})
-    healthy, whose = healthy_reference(hurt, [other, own, hurt])
-    assert whose == "performer"
-    assert healthy == profile_of_walk(own.walk)
+    assert healthy_reference(hurt, [other, own, hurt]) == (own.profile, "performer")
+    assert healthy_reference(hurt, [other, hurt]) == (other.profile, "data set")
     assert healthy_reference(hurt, [hurt])[1] == "people"
-    assert limp_distance(healthy, healthy, healthy, healthy) == 0
 
 
-def test_captured_limps_stand_beside_the_character_with_their_injury(hurtable, holden31) -> None:
+def test_captured_limps_stand_beside_the_character_with_their_injury(measure, holden31) -> None:
     """Held-out clips first, no mirrors, at most six; without captured limps the page says how to get them."""
-    cycle = np.arange(24.0)[:, None, None] * np.ones((24, 31, 3))
     names = [*(f"8_{n}" for n in range(8)), "7_1", "7_1_mirror"]
-    every = [replace(clip(name, {RIGHT_KNEE: 8.0}, {}), cycle=cycle) for name in names]
-    rows = module.gallery(hurtable, [*every, clip("7_2", {}, {})], {"7_1": "held_out"}, 1.0, Runtime())
+    every = [clip(name, {RIGHT_KNEE: 8.0}, {}) for name in names]
+    rows = measure(lambda s: 0.0, every=every, splits={"7_1": "held_out"})["gallery"]
     assert [row["clip"] for row in rows] == ["7_1", "8_0", "8_1", "8_2", "8_3", "8_4"]
-    assert rows[0]["poses"]["captured"] == cycle[::3].tolist()
+    assert rows[0]["poses"]["captured"] == POSES[::3].tolist()
     assert {np.shape(poses) for poses in rows[0]["poses"].values()} == {(8, 31, 3)}
-    skeleton = holden31.to_dict()
-    chart = gallery_chart({"gallery": rows[:1]}, skeleton)
+    chart = gallery_chart({"gallery": rows[:1]}, holden31.to_dict())
     assert list(chart.options) == [f"7_1 ({RIGHT_KNEE} 8), from {view}" for view in ("the side", "behind")]
-    assert len(chart.options[next(iter(chart.options))]) == 4
-    assert "no captured limp" in gallery_chart({"gallery": []}, skeleton).text
+    assert "no captured limp" in gallery_chart({"gallery": []}, {}).text
 
 
 def test_generated_hurt_clips_are_recognised_by_their_names() -> None:
     names = ("walk_hurt1", "walk_hurt3_mirror", "walk", "hurt1", "walk_hurt", "walk_mirror")
-    hurt = [name for name in names if HURT_VERSION.search(name)]
-    assert hurt == ["walk_hurt1", "walk_hurt3_mirror"]
+    assert [name for name in names if HURT_VERSION.search(name)] == ["walk_hurt1", "walk_hurt3_mirror"]

@@ -9,12 +9,13 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from hobble.cli.__main__ import main
 from hobble.core.errors import InputError
 from hobble.core.untrusted import read_yaml
-from hobble.measures.films import CHANGE_OF_GAIT, FILMS, FPS, ONE_PART, SEVERAL_PARTS
+from hobble.measures.films import CHANGE_OF_GAIT, FILMS, FPS, ONE_PART, SEVERAL_PARTS, put_side_by_side
 from hobble.measures.study import (
     ASKED,
     MARKS,
@@ -96,6 +97,18 @@ def test_injuries_begin_one_after_the_other_and_rise_before_the_gait_changes(fil
         assert values[-1] == severity
     changes = [i for i, (_, gait) in enumerate(states) if gait != film.gaits[0]]
     assert all(states[i][0] == film.severities for i in changes)
+
+
+@pytest.mark.parametrize(("healthy", "hurt"), [(10, 10), (7, 10), (10, 7), (4, 12), (12, 4)])
+def test_two_loops_of_the_looping_picture_end_together(healthy: int, hurt: int) -> None:
+    """The first pixel of each picture is its number."""
+    loops = [[np.full((40, 40, 3), number, np.uint8) for number in range(n)] for n in (healthy, hurt)]
+    pictures = put_side_by_side(*loops)
+    assert [picture[-1, 40, 0] for picture in pictures] == list(range(hurt))
+    lefts = [int(picture[-1, 0, 0]) for picture in pictures]
+    steps = np.diff([*lefts, lefts[0]]) % healthy  # from the last picture on to the first again
+    assert steps.sum() % healthy == 0
+    assert steps.max() - steps.min() <= 1
 
 
 def test_the_published_answers_give_the_published_tables(tmp_path: Path) -> None:

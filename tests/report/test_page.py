@@ -17,7 +17,7 @@ import pytest
 from hobble.core.errors import HobbleError
 from hobble.measures.measure import all_measures
 from hobble.models.network import Network
-from hobble.report import data_section, templates
+from hobble.report import sections, templates
 from hobble.report.bundle import bundle_page_scripts, install_npm_packages
 from hobble.report.gather import ReportMaterial
 from hobble.report.page import render_report
@@ -114,8 +114,8 @@ def test_the_page_does_not_grow_with_the_clips(
     material: ReportMaterial, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """With smaller limits, so that a test need not make hundreds of clips."""
-    monkeypatch.setattr(data_section, "MOST_ROWS", 12)
-    monkeypatch.setattr(data_section, "MOST_REMARKS", 20)
+    monkeypatch.setattr(sections, "MOST_ROWS", 12)
+    monkeypatch.setattr(sections, "MOST_REMARKS", 20)
 
     def size(copies: int) -> int:
         many = {

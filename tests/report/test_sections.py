@@ -16,9 +16,8 @@ from hypothesis import strategies as st
 
 from hobble.core.errors import InputError
 from hobble.models.network import Network
-from hobble.report import data_section, sections
+from hobble.report import sections
 from hobble.report.character import opening_slider
-from hobble.report.data_section import TURN_EDGES
 from hobble.report.gather import ReportMaterial, describe_network
 from hobble.report.page import hints, key_figures
 from hobble.report.parts import (
@@ -34,6 +33,7 @@ from hobble.report.parts import (
     join_sections,
     json_data,
 )
+from hobble.report.sections import TURN_EDGES
 from hobble.report.templates import drawn_by_script, load_template
 from hobble.rows.clip_rows import load_clip_rows, save_clip_rows
 
@@ -56,11 +56,11 @@ def test_sections_are_joined_escaped_and_their_charts_and_long_tables_found() ->
     assert (first.name, first.title, first.nav) == ("laps", "Laps", "Laps")
     assert (second.title, second.nav, second.order, second.long) == ("<S>", "E", 10, True)
     assert [part.content.kind for part in second.parts if part.content] == ["words", "chart", "table"]
-    drawn = drawn_by_script([{"x": {"y": chart("e"), "z": None}}, [joined]])
-    assert set(drawn["charts"]) == set("abcde")
+    drawn = drawn_by_script(joined)
+    assert set(drawn["charts"]) == set("abcd")
     assert list(drawn["tables"]) == ["long"]
     assert drawn["tables"]["long"][1] == ["clip 1", ["0.3333333333333333", "0.333"]]
-    text = load_template("measurements.html.j2").render(measured_sections=joined)
+    text = load_template("sections.html.j2").render(sections=joined)
     assert "<p>&lt;b&gt;</p>" in text
     assert "<h2>&lt;S&gt;</h2>" in text
     assert text.count("<figure") == 3
@@ -101,12 +101,12 @@ def test_turns_speeds_and_severities_are_counted_in_seconds(
     knee = network.channels["injury"].index("LeftUpLeg-LeftLeg")
     severity[: len(rows) // 2, knee] = 7.2
     save_clip_rows(tmp_path / "walk.npz", replace(rows, y=y, channels={**rows.channels, "injury": severity}))
-    found = data_section.seconds_of_data([str(tmp_path / "walk.npz")], {rows.clip: "held_out"})
+    found = sections.seconds_of_data([str(tmp_path / "walk.npz")], {rows.clip: "held_out"})
     seconds, hurt = len(np.unique(rows.frame)) / 60, len(np.unique(rows.frame[: len(rows) // 2])) / 60
     of_split = found["both"]["held_out"]
     row, column = np.argwhere(of_split > 0)[0]
     assert of_split[row, column] == of_split.sum() == pytest.approx(seconds)
-    middles = data_section._middles(TURN_EDGES), data_section._middles(data_section.SPEED_EDGES)
+    middles = sections._middles(TURN_EDGES), sections._middles(sections.SPEED_EDGES)
     assert (middles[0][row], middles[1][column]) == (30.0, 1.3)
     assert not found["both"]["train"].any()
     of_knee = found["channels"]["injury"]["LeftUpLeg-LeftLeg"]
@@ -116,11 +116,11 @@ def test_turns_speeds_and_severities_are_counted_in_seconds(
     paths = [str(tmp_path / f"walk-{i}.npz") for i in range(8)]
     for path in paths:
         shutil.copy(tmp_path / "walk.npz", path)
-    monkeypatch.setattr(data_section, "MOST_COUNTED", 4)
-    few = data_section.seconds_of_data(paths, {})
+    monkeypatch.setattr(sections, "MOST_COUNTED", 4)
+    few = sections.seconds_of_data(paths, {})
     np.testing.assert_allclose(few["both"]["train"], 8 * of_split)
     assert few["estimate"] == " Estimated from 4 of 8 clips."
-    assert data_section.some_files(paths, 4) != paths[:4]
+    assert sections.some_files(paths, 4) != paths[:4]
 
 
 def test_fits_of_uneven_ground_are_listed_with_the_farthest_feet_first(tmp_path: Path) -> None:
@@ -129,7 +129,6 @@ def test_fits_of_uneven_ground_are_listed_with_the_farthest_feet_first(tmp_path:
         error = np.arange(2.0 * fits).reshape(2, fits)
         np.savez(tmp_path / f"{name}.npz", error=error, foot_error=feet)
     table = sections.fit_table(sorted(tmp_path.glob("*.npz")))
-    assert table is not None
     assert [row[0] for row in table.rows] == ["far", "near"]
     assert table.rows[0][1:] == pytest.approx([2, 0.4, 0.8, 5.0, 14.0])
     np.savez(tmp_path / "near.npz", frame=np.arange(3))
@@ -143,7 +142,7 @@ def test_retargeted_clips_that_differ_most_come_first(material: ReportMaterial) 
 
     differences = (None, figures(2.0, 1.0), figures(3.0, 9.5))
     reports = [{**report, "retarget": d} for report, d in zip(material.motion, differences, strict=False)]
-    table = data_section.clip_table(replace(material, motion=reports))
+    table = sections.clip_table(replace(material, motion=reports))
     assert [row[-2:] for row in table.rows] == [[9.5, "right thigh"], [2.0, "left knee"], [None, None]]
 
 

@@ -18,7 +18,7 @@ from hobble.figure.mesh import body_mesh
 from hobble.figure.pack import links_of_bones
 from hobble.models.network import Network
 from hobble.motion.read import read_bvh
-from hobble.report import stimuli
+from hobble.report import raster, stimuli
 from hobble.report.raster import BODY, BodyRenderer, Camera
 from hobble.runtime.loops import RepeatedWalk
 from hobble.runtime.options import Runtime
@@ -28,7 +28,7 @@ UPRIGHT = np.tile(quat.IDENTITY, (19, 1))
 
 @pytest.fixture(scope="module")
 def studio(holden31: Skeleton) -> BodyRenderer:
-    return BodyRenderer(body_mesh(holden31), links_of_bones(holden31, holden31.link_names))
+    return BodyRenderer(holden31, links_of_bones(holden31, holden31.link_names))
 
 
 @pytest.fixture(scope="module")
@@ -128,7 +128,7 @@ def test_a_loop_is_written_as_pictures_and_bvh(
     assert listed[0]["from_plain_cm"] == 0 != listed[1]["from_plain_cm"]
     with Image.open(tmp_path / "a/left-foot.webp") as image:
         frames = len(read_bvh(tmp_path / "a/left-foot.bvh"))
-        assert image.n_frames == frames // stimuli.FRAME_STEP
+        assert image.n_frames == frames // raster.FRAME_STEP
         assert image.info["loop"] == 0
         assert image.size == (64, 64)
         assert frames / 60 == pytest.approx(listed[1]["seconds"])

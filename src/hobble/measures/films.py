@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import base64
 import hashlib
-import io
 import json
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -20,30 +19,25 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
 from hobble.channels.injury.shown import link_of_part
 from hobble.core.errors import HobbleError
-from hobble.core.files import atomic_path, write_json, write_text
+from hobble.core.files import write_bytes, write_json, write_text
 from hobble.core.quat import Array
-from hobble.core.skeleton import Skeleton
 from hobble.core.smooth import gaussian
-from hobble.figure.mesh import body_mesh
 from hobble.figure.pack import links_of_bones
 from hobble.measures.study import PARTS, QUESTIONS
 from hobble.models.network import Network
 from hobble.report.parts import embedded
-from hobble.report.raster import BodyRenderer, Camera
-from hobble.report.stimuli import FRAME_STEP, VISIBLE, draw_frames
+from hobble.report.raster import FPS, BodyRenderer, Camera, Picture, webp
+from hobble.report.stimuli import VISIBLE, draw_loop
 from hobble.report.templates import load_template, page_style, questionnaire_script
 from hobble.runtime.animation import ProceduralAnimation
-from hobble.runtime.export import restore_bone_lengths
 from hobble.runtime.loops import make_loop
 from hobble.runtime.options import Runtime
 
 INJURY = "injury"  # the channel
-FPS = 60  # frames a second of the motion; every FRAME_STEP-th frame is shown
 SPEEDS = {"walk": 2.5, "jog": 6.0}  # gait -> target speed, cm a frame
 WARM_UP_SECONDS = 4.0  # of walking before a film begins
 HEALTHY_SECONDS, HURT_SECONDS = 3.0, 7.0  # of a film, before and after the injury begins
@@ -54,8 +48,8 @@ EXTRA_SECONDS_FOR_CHANGE = 5.0
 # The three kinds of films.
 ONE_PART, SEVERAL_PARTS, CHANGE_OF_GAIT = "one part", "several parts", "change of gait"
 SIZE = 360  # default width and height of the films, and of each half of the looping picture, pixels
-QUALITY = 45  # of the WebP images, 0 to 100
-EFFORT = 2  # of the WebP encoder, 0 to 6; with 3 it needs twice the time, and files are only 6 % smaller
+# Of the WebP images, see `webp`. With an effort of 3 it takes twice the time, and files are only 6 % smaller.
+QUALITY, EFFORT = 45, 2
 CAMERA_SMOOTHING = 25.0  # frames: sigma of the Gaussian that smooths the camera's path
 LOOK_AT = 82.0  # cm: height of the point that the camera looks at
 DISTANCE = 400.0  # cm: from the camera to this point
@@ -63,7 +57,6 @@ DISTANCE = 400.0  # cm: from the camera to this point
 HURT_PARTS = {"left thigh": 8.0, "left shank": 8.0}  # part of the hurt character's body -> severity
 CAPTIONS = ("healthy", "left knee hurts: 8 of 10")  # of the left and the right half
 PICTURE_QUALITY = 50  # of the looping picture
-Picture = NDArray[np.uint8]
 
 
 @dataclass(frozen=True)
@@ -120,20 +113,6 @@ FILMS = (
 )
 
 
-@dataclass(frozen=True)
-class FilmMotion:
-    """The motion of a film: F frames at 60 Hz of a character with J joints, in world coordinates.
-
-    positions: (F, J, 3) cm. rotations: (F, J, 4) quaternions. cm_from_healthy: distance between the joints
-    and the same joints of a character that stays healthy; the mean over all joints and over all frames after
-    the injury begins.
-    """
-
-    positions: Array
-    rotations: Array
-    cm_from_healthy: float
-
-
 def part_links(network: Network, parts: Sequence[str]) -> list[str]:
     """For each part, the name of the link whose severity is set to make the part hurt.
 
@@ -156,21 +135,13 @@ def part_links(network: Network, parts: Sequence[str]) -> list[str]:
     return chosen
 
 
-def film_motion(network: Network, film: Film, runtime: Runtime) -> FilmMotion:
-    """Generate the motion of a film. The character goes straight ahead."""
-    links = dict(zip(film.severities, part_links(network, list(film.severities)), strict=True))
-    positions, rotations = _walk(network, film, links, runtime)
-    healthy, _ = _walk(network, film, {}, runtime)
-    # Positions relative to the ground below the first joint, the root.
-    own, others = (p - p[:, :1] * [1.0, 0.0, 1.0] for p in (positions, healthy))
-    distances = np.linalg.norm(own - others, axis=-1)
-    return FilmMotion(positions, rotations, float(distances[round(HEALTHY_SECONDS * FPS) :].mean()))
+def film_motion(
+    network: Network, film: Film, links: Mapping[str, str], runtime: Runtime
+) -> tuple[Array, Array]:
+    """The motion of a character that goes straight ahead and does what a film shows.
 
-
-def _walk(network: Network, film: Film, links: Mapping[str, str], runtime: Runtime) -> tuple[Array, Array]:
-    """Positions and rotations, as in `FilmMotion`, of a character that does what a film shows.
-
-    links: part that hurts in it -> link; a part without a link stays healthy.
+    links: part that hurts in it -> link; a part without a link stays healthy. Returns positions (F, J, 3) in
+    the world, cm, and rotations (F, J, 4).
     """
     animation = ProceduralAnimation(network, **dict(runtime))
     poses = []
@@ -182,6 +153,16 @@ def _walk(network: Network, film: Film, links: Mapping[str, str], runtime: Runti
             poses.append((pose.positions, pose.rotations))
     positions, rotations = map(np.array, zip(*poses, strict=True))
     return positions, rotations
+
+
+def distance_from_healthy(positions: Array, healthy: Array) -> float:
+    """Mean distance, cm, of the joints from those of a healthy character, after the injury begins.
+
+    Both are measured from the ground below the first joint, the root.
+    """
+    own, others = (p - p[:, :1] * [1.0, 0.0, 1.0] for p in (positions, healthy))
+    distances = np.linalg.norm(own - others, axis=-1)
+    return float(distances[round(HEALTHY_SECONDS * FPS) :].mean())
 
 
 def write_questionnaire(
@@ -201,65 +182,58 @@ def write_questionnaire(
     are drawn at once; the files are the same for any number. Returns the content of films.json. Raises
     HobbleError if the network has no injury channel, or if the skeleton lacks a part that hurts in a film.
     """
-    folder = Path(folder)
-    for film in films:
-        part_links(network, list(film.severities))  # raises an error before anything is drawn or written
+    # Raises an error before anything is drawn or written.
+    links = [dict(zip(f.severities, part_links(network, list(f.severities)), strict=True)) for f in films]
     assert network.skeleton is not None
-    folder.mkdir(parents=True, exist_ok=True)
-    renderer, skeleton = BodyRenderer(body_mesh(network.skeleton)), network.skeleton
+    renderer = BodyRenderer(network.skeleton)
 
-    def draw_film(film: Film) -> tuple[dict[str, Any], dict[str, Any]]:
-        """The film's entry in films.json, and its entry in the data of the page."""
-        motion = film_motion(network, film, runtime)
-        data = encode_webp(draw_pictures(renderer, skeleton, motion, size))
-        on_page = {"film": film.number, "webp": base64.b64encode(data).decode("ascii")}
-        return _solution_of(network, film, motion), on_page
+    def draw_film(film: Film, links: Mapping[str, str]) -> tuple[dict[str, Any], dict[str, Any]]:
+        """The film's entry in films.json, and its entry in the data of the page.
+
+        The camera follows the character smoothly. The character has one colour, so that people have to judge
+        by its motion what hurts.
+        """
+        positions, rotations = film_motion(network, film, links, runtime)
+        healthy, _ = film_motion(network, film, {}, runtime)
+        path = gaussian(positions[:, 0], CAMERA_SMOOTHING)  # the points that the camera looks at
+        path[:, 1] = LOOK_AT
+        pictures = renderer.film(
+            positions, rotations, lambda f: Camera(path[f], distance=DISTANCE, size=size)
+        )
+        data = base64.b64encode(webp(pictures, 1, QUALITY, EFFORT)).decode("ascii")
+        trained = network.trained_labels(INJURY)
+        solution = {
+            "film": film.number,
+            "kind": film.kind,
+            "parts": list(film.severities),
+            "severities": list(film.severities.values()),
+            "gaits": list(dict.fromkeys(film.gaits)),
+            "links": list(links.values()),
+            "untrained": [link for link in links.values() if link not in trained],
+            "seconds": film.seconds,
+            "from_healthy_cm": round(distance_from_healthy(positions, healthy), 2),
+        }
+        return solution, {"film": film.number, "webp": data}
 
     with ThreadPoolExecutor(threads) as pool:
-        solutions, films_on_page = map(list, zip(*pool.map(draw_film, films), strict=True))
+        solutions, films_on_page = map(list, zip(*pool.map(draw_film, films, links), strict=True))
     # Answers are saved with this id, which shows to which version of the films they belong.
     study = hashlib.sha256(json.dumps([solutions, films_on_page]).encode()).hexdigest()[:12]
-    solution = {
-        "study": study,
-        "configuration": configuration,
-        "parts": PARTS[parts],
-        "films": solutions,
-    }
+    solution = {"study": study, "configuration": configuration, "parts": PARTS[parts], "films": solutions}
+    on_page = {"questions": QUESTIONS, "parts": PARTS[parts], "films": films_on_page, "size": size}
     page = load_template("questionnaire.html.j2").render(
         style=page_style(),
         script=questionnaire_script(),
-        embedded=embedded(
-            {
-                "study": study,
-                "questions": QUESTIONS,
-                "parts": PARTS[parts],
-                "films": films_on_page,
-                "size": size,
-            }
-        ),
+        embedded=embedded({"study": study, **on_page}),
         count=len(films),
         questions=len(QUESTIONS) + 1,
         sided=parts == "sided",
     )
+    folder = Path(folder)
+    folder.mkdir(parents=True, exist_ok=True)
     write_text(folder / "questionnaire.html", page)
     write_json(folder / "films.json", solution)
     return solution
-
-
-def _solution_of(network: Network, film: Film, motion: FilmMotion) -> dict[str, Any]:
-    """The entry of a film in films.json. untrained: links of the film never hurt in training."""
-    links = part_links(network, list(film.severities))
-    return {
-        "film": film.number,
-        "kind": film.kind,
-        "parts": list(film.severities),
-        "severities": list(film.severities.values()),
-        "gaits": list(dict.fromkeys(film.gaits)),
-        "links": links,
-        "untrained": [link for link in links if link not in network.trained_labels(INJURY)],
-        "seconds": film.seconds,
-        "from_healthy_cm": round(motion.cm_from_healthy, 2),
-    }
 
 
 def list_doubts(solution: Mapping[str, Any]) -> list[str]:
@@ -273,34 +247,6 @@ def list_doubts(solution: Mapping[str, Any]) -> list[str]:
     return out + ([f"Never hurt in training: {', '.join(never)}."] if never else [])
 
 
-def draw_pictures(renderer: BodyRenderer, skeleton: Skeleton, motion: FilmMotion, size: int) -> list[Picture]:
-    """The pictures of a film, each (size, size, 3). The camera follows the character smoothly.
-
-    The character has one colour, so that people have to judge by its motion what hurts.
-    """
-    bones = body_mesh(skeleton).bones  # indices of the joints that move the body's mesh
-    rotations, positions = restore_bone_lengths(skeleton, motion.positions, motion.rotations)
-    path = gaussian(motion.positions[:, 0], CAMERA_SMOOTHING)  # the points that the camera looks at
-    path[:, 1] = LOOK_AT
-    return [
-        renderer.draw(positions[f, bones], rotations[f, bones], Camera(path[f], distance=DISTANCE, size=size))
-        for f in range(0, len(positions), FRAME_STEP)
-    ]
-
-
-def encode_webp(pictures: Sequence[Picture]) -> bytes:
-    """The bytes of an animated WebP that plays the pictures once."""
-    out = io.BytesIO()
-    _save_webp(out, [Image.fromarray(picture) for picture in pictures], 1, QUALITY, EFFORT)
-    return out.getvalue()
-
-
-def _save_webp(file: Any, images: Sequence[Image.Image], loop: int, quality: int, method: int) -> None:
-    """Write an animated WebP. loop: how often it plays; 0: endlessly. method: effort of the encoder."""
-    more = {"loop": loop, "quality": quality, "method": method, "duration": round(1000 * FRAME_STEP / FPS)}
-    images[0].save(file, "WEBP", save_all=True, append_images=images[1:], **more)
-
-
 def write_limp_picture(network: Network, path: str | Path, runtime: Runtime) -> int:
     """Write the looping picture as a WebP. Returns its size in bytes.
 
@@ -309,20 +255,18 @@ def write_limp_picture(network: Network, path: str | Path, runtime: Runtime) -> 
     """
     hurt = dict(zip(part_links(network, list(HURT_PARTS)), HURT_PARTS.values(), strict=True))
     assert network.skeleton is not None
-    links = network.channels[INJURY]
-    renderer = BodyRenderer(body_mesh(network.skeleton), links_of_bones(network.skeleton, links))
-    halves = []
+    links, halves = network.channels[INJURY], []
+    renderer = BodyRenderer(network.skeleton, links_of_bones(network.skeleton, links))
     for injury in ({}, hurt):
         # A link is drawn in a colour from 0 (healthy) to 1 (severity 10).
         colours = np.array([injury.get(link, 0.0) for link in links]) / 10
-        loop = make_loop(network, {INJURY: injury}, runtime)
-        halves.append(draw_frames(renderer, network.skeleton, loop, colours, SIZE))
-    with atomic_path(Path(path)) as temporary:
-        _save_webp(temporary, put_side_by_side(*halves), 0, PICTURE_QUALITY, 4)
-    return Path(path).stat().st_size
+        halves.append(draw_loop(renderer, make_loop(network, {INJURY: injury}, runtime), colours, SIZE))
+    content = webp(put_side_by_side(*halves), 0, PICTURE_QUALITY, 4)
+    write_bytes(path, content)
+    return len(content)
 
 
-def put_side_by_side(healthy: Sequence[Picture], hurt: Sequence[Picture]) -> list[Image.Image]:
+def put_side_by_side(healthy: Sequence[Picture], hurt: Sequence[Picture]) -> list[Picture]:
     """One loop of pictures, each with a picture of `healthy` on the left and one of `hurt` on the right.
 
     The loop is as long as `hurt`. While `hurt` plays once, `healthy` plays a whole number of times, faster or
@@ -337,5 +281,5 @@ def put_side_by_side(healthy: Sequence[Picture], hurt: Sequence[Picture]) -> lis
         for half, text in enumerate(CAPTIONS):
             middle = (half + 0.5) * both.width / 2
             draw.text((middle, 18), text, fill=(90, 90, 90), font=font, anchor="mm")
-        out.append(both)
+        out.append(np.asarray(both))
     return out

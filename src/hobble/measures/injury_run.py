@@ -18,6 +18,7 @@ from itertools import product
 from typing import Any
 
 import numpy as np
+import pandas
 
 from hobble.channels.injury.shown import SLIDERS, link_of_part
 from hobble.core.quat import Array
@@ -31,7 +32,7 @@ from hobble.measures.walks import (
     cycle_frames,
     distance_to_cycle,
     generate_walks,
-    mean_of_known,
+    rounded,
     settling_seconds,
     spearman,
 )
@@ -60,6 +61,9 @@ JOG_SPEED_SHARE = 0.9  # a figure jogs once it has this share of its final speed
 LEAST_EFFECT_CM = 0.05  # no share of a smaller effect is computed
 # Keys of a response of which `summary` has the mean.
 SUMMARISED = (
+    "spearman_from_healthy",
+    "spearman_speed",
+    "spearman_falling_from_healthy",
     "from_healthy_cm",
     "after_healing_cm",
     "hysteresis_cm",
@@ -74,16 +78,17 @@ Stretch = tuple[float, Sequence[Injury]]  # length as a share of the time, and t
 
 
 def walk_crowd(
-    network: Network,
-    gaits: Sequence[str],
-    stretches: Iterable[Stretch],
-    seconds: float,
-    runtime: Runtime,
+    network: Network, gaits: Sequence[str], stretches: Iterable[Stretch], seconds: float, runtime: Runtime
 ) -> Walks:
-    """Let a crowd walk. gaits: of each figure. seconds: the time of a stretch of length 1."""
+    """Let a crowd walk. gaits: of each figure. seconds: the time of a stretch of length 1.
+
+    Before the given stretches, there is one (stretch 0) in which the figures reach their speed, with the
+    injuries of the first stretch.
+    """
+    stretches = list(stretches)
     script = [
-        CrowdTarget(_frames(share, seconds), gaits, channel_values(network, INJURY, injuries))
-        for share, injuries in stretches
+        CrowdTarget(max(4, round(share * seconds * FPS)), gaits, channel_values(network, INJURY, injuries))
+        for share, injuries in [(WALK_IN, stretches[0][1]), *stretches]
     ]
     return generate_walks(network, script, runtime)
 
@@ -102,8 +107,11 @@ def injury_response(
     """
     links = list(links or network.channels[INJURY])
     trained = [link for link in links if link in network.trained_labels(INJURY)]
-    rows, falling, responses, strips = _sweep(network, links, trained, seconds, runtime)
-    sweep, thresholds, second_strips = second_sweep(network, trained, seconds, runtime)
+    found = {
+        **sweep(network, links, trained, seconds, runtime),
+        **second_sweep(network, trained, seconds, runtime),
+    }
+    strips, responses = found.pop("strips") + found.pop("second_strips"), found["responses"]
     return {
         "configuration": configuration,
         "applies": True,
@@ -112,51 +120,41 @@ def injury_response(
         "severities": SEVERITIES.tolist(),
         "links": links,
         "trained": trained,
-        "rows": rows,
-        "falling": falling,
-        "responses": responses,
-        "second_sweep": sweep,
-        "second_thresholds": thresholds,
+        **found,
         "into_a_jog": into_a_jog(network, links, trained, seconds, runtime),
         "divided": divided_severities(network, trained, seconds, runtime),
-        "strips": strips + second_strips,
-        "summary": _summary([r for r in responses if r["trained"]]),
-        "summary_untrained": _summary([r for r in responses if not r["trained"]]),
+        "strips": strips,
+        "summary": summarise([r for r in responses if r["trained"]]),
+        "summary_untrained": summarise([r for r in responses if not r["trained"]]),
     }
 
 
-def _sweep(
-    network: Network,
-    links: Sequence[str],
-    trained: Sequence[str],
-    seconds: float,
-    runtime: Runtime,
-) -> tuple[Rows, Rows, Rows, Rows]:
+def sweep(
+    network: Network, links: Sequence[str], trained: Sequence[str], seconds: float, runtime: Runtime
+) -> dict[str, Rows]:
     """`rows` (rising severity), `falling`, `responses` and the first `strips` of `injury_response`."""
     figures = [(gait, link) for gait in GAITS for link in links]
 
-    def crowd(*severities: tuple[float, float]) -> Walks:
-        """The crowd of all figures. severities: share of the time and severity of each stretch."""
-        hurt = [(share, [{link: severity} for _, link in figures]) for share, severity in severities]
+    def crowd(*stretches: tuple[float, float]) -> Walks:
+        """The crowd of all figures. stretches: share of the time and severity of each."""
+        hurt = [(share, [{link: severity} for _, link in figures]) for share, severity in stretches]
         return walk_crowd(network, [gait for gait, _ in figures], hurt, seconds, runtime)
 
-    gradual = crowd((WALK_IN, 0), *((1, severity) for severity in STEPS))
-    at_once = crowd((WALK_IN, 0), (1, 0), (JUMP_STRETCHES, 10), (JUMP_STRETCHES, 0))
-    rising: Rows = []
-    falling: Rows = []
-    responses: Rows = []
-    strips: Rows = []
+    gradual = crowd(*((1, severity) for severity in STEPS))
+    at_once = crowd((1, 0), (JUMP_STRETCHES, 10), (JUMP_STRETCHES, 0))
+    found: dict[str, Rows] = {"rows": [], "falling": [], "responses": [], "strips": []}
     for figure, (gait, link) in enumerate(figures):
         rows = sweep_rows(gradual, figure, gait, link)
-        rising += rows[: WORST + 1]
-        falling += rows[WORST + 1 :]
-        largest = float(gradual.acceleration[int(gradual.starts[1]) :, figure].max())
-        response = respond(rows, largest, _settling_times(at_once, figure))
-        responses.append({"gait": gait, "link": link, "trained": link in trained, **response})
+        found["rows"] += rows[: WORST + 1]
+        found["falling"] += rows[WORST + 1 :]
+        labels = {"gait": gait, "link": link, "trained": link in trained}
+        response = respond(rows, gradual.roughness(figure, 1), _settling_times(at_once, figure))
+        found["responses"].append({**labels, **response})
         if gait == "walk" and link in trained:
             cycles = [gradual.cycle(1 + severity, figure) for severity in STRIP_SEVERITIES]
-            strips.append({"link": link, "first": None, **strip_of(cycles), "severities": STRIP_SEVERITIES})
-    return rising, falling, responses, strips
+            strip = {"link": link, "first": None, **strip_of(cycles), "severities": STRIP_SEVERITIES}
+            found["strips"].append(strip)
+    return found
 
 
 def strip_of(cycles: Sequence[Array]) -> dict[str, Any]:
@@ -174,17 +172,19 @@ def sweep_rows(crowd: Walks, figure: int, gait: str, link: str) -> Rows:
     cycles = [crowd.cycle(1 + step, figure) for step in range(len(STEPS))]
     rows = []
     for step, severity in enumerate(STEPS):
-        labels = {"gait": gait, "link": link, "direction": "rising" if step <= WORST else "falling"}
         references = {"healthy": 0, "worst": WORST, "rising": min(step, 2 * WORST - step)}
-        span = crowd.measured_frames(1 + step, figure)
         row = {
-            **labels,
+            "gait": gait,
+            "link": link,
+            "direction": "rising" if step <= WORST else "falling",
             "severity": float(severity),
             **crowd.measures(1 + step, figure),
             **{f"from_{n}": crowd.distance(1 + step, figure, cycles[i]) for n, i in references.items()},
-            "largest_acceleration": float(crowd.acceleration[span, figure].max()),
+            "largest_acceleration": float(
+                crowd.acceleration[crowd.measured_frames(1 + step, figure), figure].max()
+            ),
         }
-        rows.append(_rounded(row))
+        rows.append(rounded(row))
     return rows
 
 
@@ -215,7 +215,7 @@ def respond(rows: Rows, largest: float, times: Mapping[str, float | None]) -> di
         "largest_acceleration": largest,
         "acceleration_share": largest / max(healthy["largest_acceleration"], 1e-9),
     }
-    return _rounded(found)
+    return rounded(found)
 
 
 def _settling_times(walks: Walks, figure: int) -> dict[str, float | None]:
@@ -223,96 +223,88 @@ def _settling_times(walks: Walks, figure: int) -> dict[str, float | None]:
 
     None if the walk does not change.
     """
-    local, phase = walks.local[:, figure], walks.phase[:, figure]
-    distance = distance_to_cycle(local, phase, walks.cycle(1, figure))
-    healthy_cm = float(np.mean(distance[walks.measured_frames(1, figure)]))
+    phase = walks.phase[:, figure]
+    distance = distance_to_cycle(walks.local[:, figure], phase, walks.cycle(1, figure))
+    before, times = float(np.mean(distance[walks.measured_frames(1, figure)])), {}
     # Stretch 2 is hurt, stretch 3 is healthy again. The second half of each shows the settled walk.
-    hurt_start, heal_start, end = walks.starts[2:5]
-    late_hurt = slice((hurt_start + heal_start) // 2, heal_start)
-    late_healed = slice((heal_start + end) // 2, end)
-    hurt_cm = float(np.mean(distance[late_hurt]))
-    settle = settling_seconds(distance[hurt_start:heal_start], healthy_cm, cycle_frames(phase[late_hurt]))
-    heal = settling_seconds(distance[heal_start:end], hurt_cm, cycle_frames(phase[late_healed]))
-    return {"settle_seconds": settle, "heal_seconds": heal}
+    for name, stretch in (("settle_seconds", 2), ("heal_seconds", 3)):
+        start, end = walks.starts[stretch : stretch + 2]
+        late = slice((start + end) // 2, end)
+        times[name] = settling_seconds(distance[start:end], before, cycle_frames(phase[late]))
+        before = float(np.mean(distance[late]))
+    return times
 
 
-def second_sweep(
-    network: Network, links: Sequence[str], seconds: float, runtime: Runtime
-) -> tuple[Rows, Rows, Rows]:
-    """The experiment of Ferre et al. (2019) with two injuries: rows, thresholds and strips.
+def second_sweep(network: Network, links: Sequence[str], seconds: float, runtime: Runtime) -> dict[str, Rows]:
+    """The experiment of Ferre et al. (2019) with two injuries.
 
-    For each of PAIRS whose links are in `links`, and each of FIRST_SEVERITIES, a row for each severity of the
-    second injury. from_first_cm, from_second_cm: distance from the walk with only the first injury, and from
-    that with only the second at the same severity. speed, speed_of_first, speed_of_second: cm/s, with both
-    and with only one. thresholds: severity of the second injury at which the walk begins to change
-    (`begins`), has changed (`capped`, both by the shares CHANGE_BEGINS and CHANGE_ENDS) and is nearer to that
-    with only the second (`second_leads`); and how fast both injuries at the same severity are, from 0 (as the
-    slower of the walks with only one) to 1 (as the faster).
+    second_sweep: for each of PAIRS whose links are in `links`, and each of FIRST_SEVERITIES, a row for each
+    severity of the second injury. from_first_cm, from_second_cm: distance from the walk with only the first
+    injury, and from that with only the second at the same severity. speed, speed_of_first, speed_of_second:
+    cm/s, with both and with only one. second_thresholds: from `thresholds_of`. second_strips: poses without
+    and with a second injury.
     """
     assert network.skeleton is not None
     named = {label: link for label in SLIDERS if (link := link_of_part(network.skeleton, label, links))}
     pairs = [(named[a], named[b]) for a, b in PAIRS if a in named and b in named]
-    # (first link, its severity, second link) of each figure; those without a first link show the second
-    # alone.
-    figures: list[tuple[str | None, float, str]] = [(None, 0.0, k) for k in dict.fromkeys(sum(pairs, ()))]
-    figures += [(a, severity, b) for (a, b), severity in product(pairs, FIRST_SEVERITIES)]
+    found: dict[str, Rows] = {"second_sweep": [], "second_thresholds": [], "second_strips": []}
     if not pairs:
-        return [], [], []
+        return found
+    single = list(dict.fromkeys(sum(pairs, ())))  # the first figures have only one injury
+    cases = [(first, severity, second) for (first, second), severity in product(pairs, FIRST_SEVERITIES)]
 
     def injuries(second: float) -> list[Injury]:
-        return [{**({a: first} if a else {}), b: second} for a, first, b in figures]
+        return [*({link: second} for link in single), *({a: first, b: second} for a, first, b in cases)]
 
-    stretches: list[Stretch] = [(WALK_IN, injuries(0)), *((1, injuries(s)) for s in SEVERITIES)]
-    crowd = walk_crowd(network, ["walk"] * len(figures), stretches, seconds, runtime)
-    alone = {b: i for i, (a, _, b) in enumerate(figures) if a is None}
-    rows, thresholds, strips = [], [], []
-    for i, (first, first_severity, second) in enumerate(figures):
-        if first is None:
-            continue
+    stretches = [(1, injuries(severity)) for severity in SEVERITIES]
+    gaits = ["walk"] * (len(single) + len(cases))
+    crowd = walk_crowd(network, gaits, stretches, seconds, runtime)
+    for i, (first, first_severity, second) in enumerate(cases, len(single)):
         labels = {"first": first, "second": second, "first_severity": first_severity}
-        only_first, of_pair = crowd.cycle(1, i), []
-        speed_of_first = crowd.speed(1 + int(first_severity), alone[first])
-        for severity in SEVERITIES:
-            at = 1 + int(severity)
-            only_second = crowd.cycle(at, alone[second])
-            row = {
-                **labels,
-                "severity": float(severity),
-                "from_first_cm": crowd.distance(at, i, only_first) - crowd.distance(1, i, only_first),
-                "from_second_cm": crowd.distance(at, i, only_second)
-                - crowd.distance(at, alone[second], only_second),
-                "speed": crowd.speed(at, i),
-                "speed_of_first": speed_of_first,
-                "speed_of_second": crowd.speed(at, alone[second]),
-            }
-            of_pair.append(_rounded(row))
-        rows += of_pair
-        thresholds.append({**labels, **second_thresholds(of_pair, int(first_severity))})
+        alone = single.index(second)
+        rows = [
+            rounded(
+                {
+                    **labels,
+                    "severity": float(severity),
+                    "from_first_cm": crowd.change(at, i, 1),
+                    "from_second_cm": crowd.change(at, i, at, alone),
+                    "speed": crowd.speed(at, i),
+                    "speed_of_first": crowd.speed(1 + int(first_severity), single.index(first)),
+                    "speed_of_second": crowd.speed(at, alone),
+                }
+            )
+            for at, severity in enumerate(SEVERITIES, 1)
+        ]
+        found["second_sweep"] += rows
+        found["second_thresholds"].append({**labels, **thresholds_of(rows, int(first_severity))})
         if first_severity == FIRST_SEVERITIES[0]:
             strip = strip_of([crowd.cycle(1 + severity, i) for severity in SECOND_STRIP])
-            strips.append({"link": second, **labels, **strip, "severities": SECOND_STRIP})
-    return rows, thresholds, strips
+            found["second_strips"].append({"link": second, **labels, **strip, "severities": SECOND_STRIP})
+    return found
 
 
-def second_thresholds(rows: Rows, equal: int) -> dict[str, float | None]:
-    """The thresholds of `second_sweep`. rows: of one pair and severity of the first. equal: this severity.
+def thresholds_of(rows: Rows, equal: int) -> dict[str, float | None]:
+    """At which severity of the second injury a walk with two injuries changes.
 
-    A threshold is None if the walk does not change, or is never nearer to that with only the second.
+    begins, capped: it begins to change, and has changed, by the shares CHANGE_BEGINS and CHANGE_ENDS of its
+    whole change. second_leads: it is nearer to the walk with only the second injury. These are None if it
+    does not change, or is never nearer. equal_speed_share: how fast both injuries at the same severity are,
+    from 0 (as the slower of the walks with only one) to 1 (as the faster). rows: of one pair and severity of
+    the first. equal: this severity.
     """
-    change = [row["from_first_cm"] for row in rows]
-    reached = [
-        next((r["severity"] for r, c in zip(rows, change, strict=True) if c >= share * change[-1]), None)
-        for share in (CHANGE_BEGINS, CHANGE_ENDS)
-        if change[-1] > LEAST_EFFECT_CM
-    ] or [None, None]
-    leads = [r["severity"] for r in rows if r["from_second_cm"] < r["from_first_cm"]]
-    slow, fast = sorted((rows[equal]["speed_of_first"], rows[equal]["speed_of_second"]))
-    return {
-        "begins": reached[0],
-        "capped": reached[1],
-        "second_leads": leads[0] if leads else None,
-        "equal_speed_share": round((rows[equal]["speed"] - slow) / (fast - slow), 5) if fast > slow else None,
+    whole = rows[-1]["from_first_cm"]
+    reached = {
+        "begins": lambda row: row["from_first_cm"] >= CHANGE_BEGINS * whole > CHANGE_BEGINS * LEAST_EFFECT_CM,
+        "capped": lambda row: row["from_first_cm"] >= CHANGE_ENDS * whole > CHANGE_ENDS * LEAST_EFFECT_CM,
+        "second_leads": lambda row: row["from_second_cm"] < row["from_first_cm"],
     }
+    slow, fast = sorted((rows[equal]["speed_of_first"], rows[equal]["speed_of_second"]))
+    share = (rows[equal]["speed"] - slow) / (fast - slow) if fast > slow else None
+    return {
+        name: next((row["severity"] for row in rows if is_reached(row)), None)
+        for name, is_reached in reached.items()
+    } | rounded({"equal_speed_share": share})
 
 
 def into_a_jog(
@@ -328,21 +320,17 @@ def into_a_jog(
     kept: the latter divided by the former. It is 0 if the injury does not show in the jog.
     largest_acceleration: of any joint in the first `seconds` of the jog, cm per frame squared.
     """
-    assert network.skeleton is not None
     figures: list[tuple[str | None, float]] = [(None, 0.0)]
     figures += [(link, s) for link in links for s in (SEVERITIES[1:].tolist() if link in trained else [10.0])]
     hurt = channel_values(network, INJURY, [{link: s} if link else {} for link, s in figures])
-    frames = _frames(1, seconds)
+    frames = max(4, round(seconds * FPS))
     # In stretch 0 the figures reach their speed.
     lengths = ((frames, "walk"), (frames, "walk"), (2 * frames, "jog"))
     script = [CrowdTarget(length, [gait] * len(figures), hurt) for length, gait in lengths]
-    crowd = generate_walks(network, script, runtime)
-    healthy = {stretch: crowd.cycle(stretch, 0) for stretch in (1, 2)}
-    spread = {stretch: crowd.distance(stretch, 0, healthy[stretch]) for stretch in (1, 2)}
+    crowd, out = generate_walks(network, script, runtime), []
     start = int(crowd.starts[2])  # the first frame of the jog
-    out = []
     for i, (link, severity) in enumerate(figures):
-        walking, jogging = (crowd.distance(s, i, healthy[s]) - spread[s] for s in (1, 2))
+        walking, jogging = (crowd.change(stretch, i, stretch, 0) for stretch in (1, 2))
         jog_speed = crowd.speed(2, i)
         speeds = np.linalg.norm(np.diff(crowd.root[start:, i, ::2], axis=0), axis=1) * FPS
         fast = np.flatnonzero(speeds >= JOG_SPEED_SHARE * jog_speed)
@@ -357,7 +345,7 @@ def into_a_jog(
             "kept": jogging / walking if walking > LEAST_EFFECT_CM else None,
             "largest_acceleration": float(crowd.acceleration[start : start + frames, i].max()),
         }
-        out.append(_rounded(row))
+        out.append(rounded(row))
     return out
 
 
@@ -367,55 +355,31 @@ def divided_severities(network: Network, links: Sequence[str], seconds: float, r
     from_healthy_cm: distance from the healthy walk. speed_share: speed, divided by the healthy speed.
     largest_acceleration: of any joint from the change to this severity on, cm per frame squared.
     """
-    stretches: list[Stretch] = [
-        (WALK_IN, [{}] * len(links)),
-        *((1, [{link: severity} for link in links]) for severity in SEVERITIES_TO_DIVIDE),
-    ]
+    stretches = [(1, [{link: severity} for link in links]) for severity in SEVERITIES_TO_DIVIDE]
     out = []
     for divisor in DIVISORS:
         divided = runtime.model_copy(update={"scales": {**runtime.scales, INJURY: divisor}})
         crowd = walk_crowd(network, ["walk"] * len(links), stretches, seconds, divided)
-        for i, link in enumerate(links):
-            healthy = crowd.cycle(1, i)
-            spread, speed = crowd.distance(1, i, healthy), crowd.speed(1, i)
-            for stretch, severity in enumerate(SEVERITIES_TO_DIVIDE, 1):
-                frames = slice(*crowd.starts[stretch : stretch + 2])
-                row = {
-                    "scale": divisor,
-                    "link": link,
-                    "severity": severity,
-                    "from_healthy_cm": crowd.distance(stretch, i, healthy) - spread,
-                    "speed_share": crowd.speed(stretch, i) / max(speed, 1e-9),
-                    "largest_acceleration": float(crowd.acceleration[frames, i].max()),
-                }
-                out.append(_rounded(row))
-    return out
-
-
-def _frames(share: float, seconds: float) -> int:
-    """Length in frames of a stretch that lasts `share` times `seconds`; at least 4."""
-    return max(4, round(share * seconds * FPS))
-
-
-def _rounded(row: Mapping[str, Any]) -> dict[str, Any]:
-    """The row with its numbers rounded to five decimals."""
-    return {key: round(value, 5) if isinstance(value, float) else value for key, value in row.items()}
-
-
-def _summary(responses: Rows) -> dict[str, dict[str, float | None]]:
-    """Gait -> means over `responses`, which are of several links. Empty if there are no responses."""
-    out = {}
-    for gait in GAITS:
-        if group := [r for r in responses if r["gait"] == gait]:
-            out[gait] = {
-                "spearman_from_healthy": mean_of_known(r["spearman"]["from_healthy"] for r in group),
-                "spearman_speed": mean_of_known(r["spearman"]["speed"] for r in group),
-                "spearman_falling_from_healthy": mean_of_known(
-                    r["spearman_falling"]["from_healthy"] for r in group
-                ),
-                **{key: mean_of_known(r[key] for r in group) for key in SUMMARISED},
+        for (i, link), (at, severity) in product(enumerate(links), enumerate(SEVERITIES_TO_DIVIDE, 1)):
+            row = {
+                "scale": divisor,
+                "link": link,
+                "severity": severity,
+                "from_healthy_cm": crowd.change(at, i, 1),
+                "speed_share": crowd.speed(at, i) / max(crowd.speed(1, i), 1e-9),
+                "largest_acceleration": crowd.roughness(i, at, at + 1),
             }
+            out.append(rounded(row))
     return out
+
+
+def summarise(responses: Rows) -> dict[str, dict[str, float | None]]:
+    """Gait -> means over `responses`, which are of several links. Empty if there are no responses."""
+    if not responses:
+        return {}
+    frame = pandas.json_normalize(responses, sep="_").set_index("gait")[list(SUMMARISED)].astype(float)
+    means = frame.groupby("gait", sort=False).mean().to_dict("index")
+    return {str(gait): rounded(row) for gait, row in means.items()}
 
 
 def run(inputs: MeasureInputs, options: Any) -> Outcome:

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from itertools import groupby
 from typing import Any
 
@@ -39,18 +40,18 @@ from hobble.measures.sample import HURT_VERSION, ClipPart, clip_parts, sample_to
 from hobble.measures.walks import (
     FPS,
     PHASES,
-    CrowdTarget,
-    channel_values,
-    generate_walks,
+    in_world,
     mean_cycle,
     mean_of_known,
+    rounded,
     share_of_true,
     spearman,
+    walk_straight,
 )
 from hobble.models.load import load_network
 from hobble.models.network import Network
-from hobble.rows.clip_rows import ClipRows, captured_stretches, rotate_by_yaw
-from hobble.runtime.animation import ProceduralAnimation
+from hobble.rows.clip_rows import ClipRows, captured_stretches, headings
+from hobble.rows.layout import GAITS
 from hobble.runtime.options import Runtime
 
 INJURY = "injury"  # the channel
@@ -63,35 +64,29 @@ RECOGNISED = ("impaired", "named", "wrong_side")  # keys of a row: shares of its
 IN_GALLERY = 6  # captured limps that the report shows beside the character
 MIRROR = "_mirror"  # end of the name of a mirrored clip
 Rows = list[dict[str, Any]]
-Injury = Mapping[str, float]  # link -> severity
+Injury = Mapping[str, float]  # link -> severity, only of links that hurt
+Case = Mapping[str, Mapping[str, float]]  # channel -> column -> value of a figure
 
 
 @dataclass(frozen=True)
-class FigureWalk:
-    """The walk of one figure of the crowd.
+class Walk:
+    """The walk of a person in a captured clip, or of a figure of the crowd.
 
-    walk: its gait cycles. profile: None if there is no whole cycle. speed: mean speed, cm a frame. frames:
-    length of the walk in frames.
+    injury: the same in all frames. cycles: its gait cycles. poses: (PHASES, J, 3) their mean poses, cm. clip:
+    "" for a figure. speed, frames: mean speed, cm a frame, and length of a figure's walk.
     """
 
-    walk: WalkCycles = field(repr=False)
-    profile: Profile | None = field(repr=False)
-    speed: float
-    frames: int
+    injury: Injury
+    cycles: WalkCycles = field(repr=False)
+    poses: Array = field(repr=False)
+    clip: str = ""
+    speed: float = 0.0
+    frames: int = 0
 
-
-@dataclass(frozen=True)
-class CapturedWalk:
-    """The walk in one captured clip. The severities are the same in all its frames.
-
-    severity_by_link: those of the links that hurt. walk: the gait cycles. cycle: their mean poses, see
-    `hobble.measures.walks.mean_cycle`.
-    """
-
-    clip: str
-    severity_by_link: Injury
-    walk: WalkCycles = field(repr=False)
-    cycle: Array = field(default_factory=lambda: np.zeros((PHASES, 0, 3)), repr=False)
+    @cached_property
+    def profile(self) -> Profile | None:
+        """None if there is no whole cycle, which cannot happen in a captured walk."""
+        return profile_of_walk(self.cycles) if len(self.cycles) else None
 
     @property
     def performer(self) -> str:
@@ -103,123 +98,97 @@ class CapturedWalk:
 
 
 def walk_figures(
-    network: Network,
-    injuries: Sequence[Injury],
-    speed: float,
-    gait: str,
-    seconds: float,
-    runtime: Runtime,
-    other_channels: Mapping[str, Sequence[Mapping[str, float]]] | None = None,
-) -> list[FigureWalk]:
-    """Let a crowd of figures walk straight ahead for `seconds`, all in the gait `gait`.
-
-    injuries: of each figure. speed: target speed, cm a frame. other_channels: name of another channel -> for
-    each figure, column -> value.
-    """
+    network: Network, cases: Sequence[Case], gait: str, seconds: float, runtime: Runtime
+) -> list[Walk]:
+    """Let a figure for each of `cases` walk straight ahead for `seconds` at the speed of the gait."""
     assert network.skeleton is not None
-    count, frames = len(injuries), max(4, round(seconds * FPS))
-    animation = ProceduralAnimation(network, characters=count, **dict(runtime))
-    velocity = np.tile([0.0, speed], (count, 1))
-    channels: dict[str, Array] = {}
-    for name, values in {INJURY: injuries, **(other_channels or {})}.items():
-        channels |= channel_values(network, name, values)
-    shares = np.tile([float(name == gait) for name in network.gaits], (count, 1))
-    positions = np.zeros((frames, count, len(network.skeleton.joints), 3), np.float32)
-    for frame in range(-WARM_UP_FRAMES, frames):
-        pose = animation.next_pose(velocity, gait=shares.copy(), **channels)
-        if frame >= 0:
-            positions[frame] = pose.positions.reshape(count, -1, 3)
-    return [_figure_walk(network.skeleton, positions[:, i].astype(float)) for i in range(count)]
-
-
-def _figure_walk(skeleton: Skeleton, positions: Array) -> FigureWalk:
-    """The walk of one figure. positions: (F, J, 3) of its joints in the world, cm."""
-    hips = skeleton.role("hips")
-    # Distance on the ground between the first and the last position, divided by the frames between them.
-    speed = float(np.linalg.norm((positions[-1, hips] - positions[0, hips])[::2])) / (len(positions) - 1)
-    walk = measure_cycles(skeleton, positions, FPS)
-    return FigureWalk(walk, profile_of_walk(walk) if len(walk) else None, speed, len(positions))
+    frames = max(FPS, round(seconds * FPS))
+    walks = walk_straight(
+        network, cases, gait, [SPEEDS[gait]] * len(cases), (WARM_UP_FRAMES, frames), runtime
+    )
+    hips, out = network.skeleton.role("hips"), []
+    for i, case in enumerate(cases):
+        span = slice(WARM_UP_FRAMES, None)
+        world = in_world(*(values[span, i] for values in (walks.local, walks.root, walks.yaw)))
+        # Distance on the ground between the first and the last position, divided by the frames between them.
+        speed = float(np.linalg.norm((world[-1, hips] - world[0, hips])[::2])) / (frames - 1)
+        cycles = measure_cycles(network.skeleton, world, FPS)
+        out.append(Walk(case.get(INJURY, {}), cycles, walks.cycle(1, i), "", speed, frames))
+    return out
 
 
 def captured_walks(
     parts: Iterable[ClipPart], splits: Mapping[str, str], links: Sequence[str], skeleton: Skeleton
-) -> tuple[list[CapturedWalk], dict[str, dict[str, float]]]:
+) -> tuple[list[Walk], dict[str, dict[str, float]]]:
     """The walks of all captured clips, and for how many seconds each link hurts in the training clips.
 
     The seconds are "captured" or "made" (in hurt versions) -> link -> seconds. If the parts are only a sample
     of the clips, they are estimates. parts: the parts of the clips to read, sorted by clip. splits: clip ->
     "train" or "held_out".
     """
-    walks: list[CapturedWalk] = []
-    seconds: dict[str, dict[str, float]] = {"captured": {}, "made": {}}
+    walks: list[Walk] = []
+    seconds = {origin: np.zeros(len(links)) for origin in ("captured", "made")}
     for clip, parts_of_clip in groupby(parts, key=lambda part: part.clip):
         made = HURT_VERSION.search(clip) is not None
         rows_of_clip: list[ClipRows] = []
         for part in parts_of_clip:
             rows = part.load().rows
-            of_links = seconds["made" if made else "captured"]
-            if splits.get(clip) == "train" and INJURY in rows.channels:
-                for link, column in zip(links, rows.channels[INJURY].T, strict=False):
-                    if column.any():
-                        more = float(np.sum(column > 0)) * part.weight / FPS
-                        of_links[link] = round(of_links.get(link, 0.0) + more, 2)
+            if splits.get(clip) == "train":
+                hurts = np.sum(rows.channels[INJURY] > 0, axis=0)
+                seconds["made" if made else "captured"] += hurts * part.weight / FPS
             if not made and len(rows):
                 rows_of_clip.append(rows)
         if rows_of_clip and (found := _walk_of_clip(clip, rows_of_clip, links, skeleton)):
             walks.append(found)
-    return walks, seconds
+    return walks, {
+        origin: {link: round(float(s), 2) for link, s in zip(links, of_links, strict=True) if s}
+        for origin, of_links in seconds.items()
+    }
 
 
 def _walk_of_clip(
     clip: str, rows_of_clip: Sequence[ClipRows], links: Sequence[str], skeleton: Skeleton
-) -> CapturedWalk | None:
+) -> Walk | None:
     """The walk of a clip; None if the severities change in it, or if nobody walks a whole cycle.
 
     rows_of_clip: all rows of the clip as one item, or an item for each of the clip's excerpts.
     """
-    severity = np.concatenate(
-        [rows.channels.get(INJURY, np.zeros((len(rows), len(links)))) for rows in rows_of_clip]
-    )
+    severity = np.concatenate([rows.channels[INJURY] for rows in rows_of_clip])
     if np.ptp(severity, axis=0).any():
         return None
     walks, stretches = [], []
     for rows in rows_of_clip:
         turn = rows.y[:, rows.layout.y_turn][:, 0].astype(float)
         for stretch in captured_stretches(rows):
-            if stretch.gait.mean(axis=0).argmax() != 1:  # gait 1 is walking
-                continue
-            # `turn` is the change of yaw in each frame, negated.
-            yaw = np.concatenate([[0.0], -np.cumsum(turn[stretch.rows])[:-1]])
-            world = stretch.local.copy()
-            world[..., ::2] = rotate_by_yaw(world[..., ::2], yaw[:, None])
-            walks.append(measure_cycles(skeleton, world + stretch.root[:, None], FPS))
-            stretches.append(stretch)
-    walk = join_walks(walks) if walks else WalkCycles(FPS, (), ())
-    hurt = {link: float(value) for link, value in zip(links, severity[0], strict=True) if value > 0}
-    if not len(walk):
+            if stretch.gait.mean(axis=0).argmax() == GAITS.index("walk"):
+                world = in_world(stretch.local, stretch.root, headings(turn[stretch.rows]))
+                walks.append(measure_cycles(skeleton, world, FPS))
+                stretches.append(stretch)
+    if not walks or not len(cycles := join_walks(walks)):
         return None
+    hurt = {link: float(value) for link, value in zip(links, severity[0], strict=True) if value > 0}
     local, phase = (np.concatenate([getattr(s, name) for s in stretches]) for name in ("local", "phase"))
-    return CapturedWalk(clip, hurt, walk, mean_cycle(local, phase))
+    return Walk(hurt, cycles, mean_cycle(local, phase), clip)
 
 
-def healthy_reference(captured_walk: CapturedWalk, walks: Sequence[CapturedWalk]) -> tuple[Profile, str]:
+def healthy_reference(walk: Walk, walks: Sequence[Walk]) -> tuple[Profile, str]:
     """The healthy walk to compare a captured walk with, and whose walk it is.
 
     "performer": it is measured over the performer's healthy clips. "data set": if the performer has no
     healthy clip, it is measured over all healthy clips. "people": if there is no healthy clip at all, it is
     the mean normal walk of people in `hobble.gait.profile`. walks: all captured walks.
     """
-    healthy = [other for other in walks if not other.severity_by_link and len(other.walk)]
-    of_performer = [other for other in healthy if other.performer == captured_walk.performer]
+    healthy = [other for other in walks if not other.injury]
+    of_performer = [other for other in healthy if other.performer == walk.performer]
     for chosen, whose in ((of_performer, "performer"), (healthy, "data set")):
         if chosen:
-            return profile_of_walk(join_walks(other.walk for other in chosen)), whose
+            return profile_of_walk(join_walks(other.cycles for other in chosen)), whose
     return healthy_profile([]), "people"
 
 
 def measure_limps(
     network: Network,
-    captured: Sequence[CapturedWalk],
+    captured: Sequence[Walk],
     hurt_seconds: Mapping[str, Mapping[str, float]],
     splits: Mapping[str, str],
     *,
@@ -234,11 +203,25 @@ def measure_limps(
     from `captured_walks`. seconds: length of each generated walk. links: names of the links to hurt, by
     default all.
     """
-    assert network.skeleton is not None
+    skeleton = network.skeleton
+    assert skeleton is not None
     links = list(links or network.channels[INJURY])
-    rows = _size_rows(network, links, seconds, runtime)
-    if rows is None:
+    limps = [walk for walk in captured if walk.injury]
+    held_out, shown = [walk for walk in limps if _is_held_out(walk, splits)], in_gallery(limps, splits)
+    cases: list[Case] = [{}, *({INJURY: {link: severity}} for link in links for severity in SEVERITIES)]
+    as_captured: list[Case] = [{INJURY: walk.injury} for walk in (*held_out, *shown)]
+    walking = walk_figures(network, [*cases, *as_captured], "walk", seconds, runtime)
+    healthy, figures = walking[0], iter(walking[len(cases) :])
+    if healthy.profile is None:
         return {"configuration": configuration, "applies": False, "reason": NO_CYCLE}
+    crowds = {"walk": walking[: len(cases)], "jog": walk_figures(network, cases, "jog", seconds, runtime)}
+    sizes = [
+        {"gait": gait, **row_of_walk(skeleton, figure, crowd[0])}
+        for gait, crowd in crowds.items()
+        if crowd[0].profile is not None
+        for figure in crowd[1:]
+    ]
+    legs = [row for row in sizes if row["gait"] == "walk" and row["part"] in LEG]
     together = limps_together(network, links, seconds, runtime)
     return {
         "configuration": configuration,
@@ -248,42 +231,33 @@ def measure_limps(
         "effects": EFFECTS,
         "trained": [link for link in links if link in network.trained_labels(INJURY)],
         "hurt_seconds": hurt_seconds,
-        "sizes": rows,
-        "trends": _trend_rows(rows),
-        "named": _recognition_by_severity(rows),
+        "sizes": sizes,
+        "trends": _trends(sizes),
+        "named": _recognition(legs, "severity"),
         "people": {
             gait: {name: [round(v, 5) for v in mean_and_sd] for name, mean_and_sd in of_gait.items()}
             for gait, of_gait in effects_of_people().items()
         },
-        "captured": [
-            _row_of_clip(network.skeleton, clip, captured) for clip in captured if clip.severity_by_link
+        "captured": [_row_of_clip(skeleton, walk, captured) for walk in limps],
+        "held_out_limps": [
+            compare_held_out(walk, next(figures), healthy, healthy_reference(walk, captured))
+            for walk in held_out
         ],
-        "held_out_limps": compare_held_out(network, captured, splits, seconds, runtime),
-        "gallery": gallery(network, captured, splits, seconds, runtime),
+        "gallery": [
+            {
+                "clip": walk.clip,
+                "hurt": dict(walk.injury),
+                "phases": [round(b / PHASES, 5) for b in range(0, PHASES, PHASES // 8)],
+                "poses": {
+                    name: np.round(one.poses[:: PHASES // 8], 1).tolist()
+                    for name, one in (("captured", walk), ("character", next(figures)), ("healthy", healthy))
+                },
+            }
+            for walk in shown
+        ],
         "together": together,
-        "named_together": _recognition_by_column(together),
+        "named_together": _recognition(together, "channel", "column"),
     }
-
-
-def _size_rows(network: Network, links: Sequence[str], seconds: float, runtime: Runtime) -> Rows | None:
-    """A row of `_row_of_walk` for each gait, link and severity.
-
-    None if the healthy character does not walk a whole cycle in the gait "walk". If it does not in another
-    gait, the rows of this gait are left out.
-    """
-    rows: Rows = []
-    cases = [(link, severity) for link in links for severity in SEVERITIES]
-    injuries = [{}, *({link: severity} for link, severity in cases)]
-    for gait, speed in SPEEDS.items():
-        healthy, *hurt = walk_figures(network, injuries, speed, gait, seconds, runtime)
-        if healthy.profile is not None:
-            rows += [
-                _row_of_walk(network, gait, *case, figure, healthy)
-                for case, figure in zip(cases, hurt, strict=True)
-            ]
-        elif gait == "walk":
-            return None
-    return rows
 
 
 def _part_and_side(skeleton: Skeleton, link: str) -> tuple[str, str | None]:
@@ -292,15 +266,16 @@ def _part_and_side(skeleton: Skeleton, link: str) -> tuple[str, str | None]:
     return part.name, None if part.side is None else ("left", "right")[part.side]
 
 
-def hurt_side(skeleton: Skeleton, link: str) -> str:
-    """The side of a link. Links on the midline count as right, because the effects need a hurt side."""
-    return _part_and_side(skeleton, link)[1] or RIGHT
+def hurt_side(skeleton: Skeleton, injury: Injury) -> str:
+    """The side of the link that hurts most.
+
+    Links on the midline count as right, because the effects need a hurt side.
+    """
+    return _part_and_side(skeleton, max(injury, key=lambda link: injury[link]))[1] or RIGHT
 
 
-def _row_of_walk(
-    network: Network, gait: str, link: str, severity: float, figure: FigureWalk, healthy: FigureWalk
-) -> dict[str, Any]:
-    """The row of one walk: gait, link and severity, the effects, and how the walk is recognised.
+def row_of_walk(skeleton: Skeleton, figure: Walk, healthy: Walk) -> dict[str, Any]:
+    """The row of a walk in which one link hurts: its severity, the effects, and how the walk is recognised.
 
     called: label and side that the linear recogniser gives to the whole walk. graded: label and side that the
     graded recogniser gives to it. impaired: share of windows in which the linear recogniser finds a limp. The
@@ -309,18 +284,19 @@ def _row_of_walk(
     side; None for a link on the midline. speed_share: speed, divided by the speed of the healthy walk.
     If the figure does not walk a whole cycle, all but `speed_share` is None.
     """
-    assert network.skeleton is not None
     assert healthy.profile is not None
-    part, side = _part_and_side(network.skeleton, link)
-    row: dict[str, Any] = {"gait": gait, "link": link, "part": part, "severity": severity, "side": side}
+    ((link, severity),) = figure.injury.items()
+    part, side = _part_and_side(skeleton, link)
+    row: dict[str, Any] = {"link": link, "part": part, "severity": severity, "side": side}
     row["speed_share"] = round(figure.speed / max(healthy.speed, 1e-9), 5)
     if figure.profile is None:
         return row | dict.fromkeys((*EFFECTS, "called", "graded", *RECOGNISED))
-    row |= _rounded_values(measure_effects(figure.profile, healthy.profile, side or RIGHT))
-    found = compare_walk(figure.walk, figure.frames, healthy.profile)
+    found = compare_walk(figure.cycles, figure.frames, healthy.profile)
     wrong_side = SIDES[1 - SIDES.index(side or RIGHT)]
     answers = [(grade.is_impaired, grade.side == wrong_side) for grade in found.window_grades]
-    return row | {
+    return {
+        **row,
+        **rounded(found.effects[side or RIGHT]),
         "called": found.answer.name,
         "graded": found.grade.name,
         "impaired": share_of_true([answer.is_impaired for answer in found.window_answers]),
@@ -329,12 +305,7 @@ def _row_of_walk(
     }
 
 
-def _rounded_values(values: Mapping[str, float]) -> dict[str, float | None]:
-    """The values, rounded to 5 decimals. None in place of a value that is not finite."""
-    return {name: round(float(v), 5) if np.isfinite(v) else None for name, v in values.items()}
-
-
-def _trend_rows(rows: Rows) -> Rows:
+def _trends(rows: Rows) -> Rows:
     """A row for each gait, link and effect: Spearman's rho with severity, and the size at severity 10."""
     out = []
     for (gait, link), group in groupby(rows, key=lambda row: (row["gait"], row["link"])):
@@ -347,14 +318,22 @@ def _trend_rows(rows: Rows) -> Rows:
     return out
 
 
-def _recognition_by_severity(rows: Rows) -> Rows:
-    """A row for each severity: how well walks with a hurt leg are recognised, as means over these walks."""
-    out = []
-    for severity in SEVERITIES:
-        legs = [r for r in rows if r["gait"] == "walk" and r["severity"] == severity and r["part"] in LEG]
-        means = {key: mean_of_known(row[key] for row in legs) for key in RECOGNISED}
-        out.append({"severity": severity, "walks": len(legs), **means})
-    return out
+def _recognition(rows: Iterable[Mapping[str, Any]], *by: str) -> Rows:
+    """A row for each group of walks that have the same values of the keys `by`, with means over the walks.
+
+    walks: number of walks that are judged. A very slow walk is not judged if no window has enough cycles.
+    """
+    groups: dict[tuple[Any, ...], Rows] = {}
+    for row in rows:
+        groups.setdefault(tuple(row[key] for key in by), []).append(dict(row))
+    return [
+        {
+            **dict(zip(by, labels, strict=True)),
+            "walks": sum(row["named"] is not None for row in group),
+            **{key: mean_of_known(row[key] for row in group) for key in (*RECOGNISED, "speed_share")},
+        }
+        for labels, group in groups.items()
+    ]
 
 
 def limps_together(network: Network, links: Sequence[str], seconds: float, runtime: Runtime) -> Rows:
@@ -367,56 +346,32 @@ def limps_together(network: Network, links: Sequence[str], seconds: float, runti
     """
     assert network.skeleton is not None
     legs = [link for link in links if _part_and_side(network.skeleton, link)[0] in LEG]
-    names = [name for name in network.channels if name != INJURY]
-    columns = [(name, column) for name in names for column in network.trained_labels(name)]
-    if not columns:
-        return []
-    # A figure walks for each case. Its link is None if it has no injury.
-    cases = [(other, column, link) for other, column in columns for link in (None, *legs)]
-    other_channels = {
-        name: [{column: channel(name).highest} if other == name else {} for other, column, _ in cases]
-        for name in names
-    }
-    injuries = [{} if link is None else {link: SEVERITIES[-1]} for *_, link in cases]
-    walks = walk_figures(network, injuries, SPEEDS["walk"], "walk", seconds, runtime, other_channels)
-    figures = dict(zip(cases, walks, strict=True))
-    return [
-        {"channel": other, "column": column}
-        | _row_of_walk(network, "walk", link, SEVERITIES[-1], figures[other, column, link], healthy)
-        for other, column in columns
-        if (healthy := figures[other, column, None]).profile is not None
-        for link in legs
+    columns = [(n, column) for n in network.channels if n != INJURY for column in network.trained_labels(n)]
+    injuries: list[Injury] = [{}, *({link: SEVERITIES[-1]} for link in legs)]
+    cases = [
+        {name: {column: channel(name).highest}, INJURY: injury}
+        for name, column in columns
+        for injury in injuries
     ]
+    figures = iter(walk_figures(network, cases, "walk", seconds, runtime) if cases else ())
+    rows: Rows = []
+    for name, column in columns:
+        healthy, *hurt = (next(figures) for _ in injuries)
+        if healthy.profile is not None:
+            labels = {"channel": name, "column": column, "gait": "walk"}
+            rows += [{**labels, **row_of_walk(network.skeleton, figure, healthy)} for figure in hurt]
+    return rows
 
 
-def _recognition_by_column(rows: Rows) -> Rows:
-    """A row for each column of another channel, with means over the rows of `limps_together`.
-
-    walks: number of walks that are judged. A very slow walk is not judged if no window has enough cycles.
-    """
-    out = []
-    for (other, column), group in groupby(rows, key=lambda row: (row["channel"], row["column"])):
-        of_column = list(group)
-        means = {
-            key: mean_of_known(row[key] for row in of_column)
-            for key in ("impaired", "named", "wrong_side", "speed_share")
-        }
-        judged = sum(row["named"] is not None for row in of_column)
-        known = {key: mean for key, mean in means.items() if mean is not None}
-        out.append({"channel": other, "column": column, "walks": judged, **known})
-    return out
-
-
-def _row_of_clip(skeleton: Skeleton, clip: CapturedWalk, captured: Sequence[CapturedWalk]) -> dict[str, Any]:
+def _row_of_clip(skeleton: Skeleton, walk: Walk, captured: Sequence[Walk]) -> dict[str, Any]:
     """The effects of the injury in a captured clip, relative to a healthy walk.
 
-    Its key `healthy` says whose healthy walk this is (see `healthy_reference`). If several links hurt, the
-    side of the one with the highest severity counts as hurt.
+    Its key `healthy` says whose healthy walk this is (see `healthy_reference`).
     """
-    healthy, whose = healthy_reference(clip, captured)
-    side = hurt_side(skeleton, max(clip.severity_by_link, key=lambda link: clip.severity_by_link[link]))
-    sizes = _rounded_values(measure_effects(profile_of_walk(clip.walk), healthy, side))
-    return {"clip": clip.clip, "hurt": dict(clip.severity_by_link), "side": side, "healthy": whose, **sizes}
+    healthy, whose = healthy_reference(walk, captured)
+    side = hurt_side(skeleton, walk.injury)
+    sizes = rounded(measure_effects(profile_of_walk(walk.cycles), healthy, side))
+    return {"clip": walk.clip, "hurt": dict(walk.injury), "side": side, "healthy": whose, **sizes}
 
 
 def limp_distance(walk: Profile, healthy: Profile, other: Profile, other_healthy: Profile) -> float:
@@ -432,81 +387,37 @@ def limp_distance(walk: Profile, healthy: Profile, other: Profile, other_healthy
 
 
 def compare_held_out(
-    network: Network,
-    captured: Sequence[CapturedWalk],
-    splits: Mapping[str, str],
-    seconds: float,
-    runtime: Runtime,
-) -> Rows:
-    """Whether limps in held-out clips are nearer to the hurt character than to the healthy one.
+    walk: Walk, figure: Walk, healthy: Walk, reference: tuple[Profile, str]
+) -> dict[str, Any]:
+    """Whether the limp of a held-out clip is nearer to the hurt character than to the healthy one.
 
-    Each clip is compared with the hurt character, which has the clip's severities, and with the healthy
-    character. Both have a target speed of 1.2 m/s, a likely speed of the performer's healthy walk. Returns a
-    row for each clip. `hurt`, `healthy`: the `limp_distance` of the clip from the hurt and from the healthy
-    character; None if either of them does not walk a whole cycle. `nearer`: whether the hurt character is
-    nearer, as it should be; False without distances.
+    figure: the character with the clip's severities. healthy: the healthy character. Both have a target speed
+    of 1.2 m/s, a likely speed of the performer's healthy walk. reference: from `healthy_reference`. `hurt`,
+    `healthy`: the `limp_distance` of the clip from the hurt and from the healthy character; None if the hurt
+    one does not walk a whole cycle. `nearer`: whether the hurt character is nearer, as it should be.
     """
-    limps = [clip for clip in captured if clip.severity_by_link and splits.get(clip.clip) == "held_out"]
-    if not limps:
-        return []
-    injuries = [{}, *(clip.severity_by_link for clip in limps)]
-    healthy_figure, *hurt = walk_figures(network, injuries, SPEEDS["walk"], "walk", seconds, runtime)
-    out = []
-    for clip, figure in zip(limps, hurt, strict=True):
-        healthy, whose = healthy_reference(clip, captured)
-        row: dict[str, Any] = {
-            "clip": clip.clip,
-            "hurt_links": dict(clip.severity_by_link),
-            "compared_with": whose,
-        }
-        if healthy_figure.profile is None or figure.profile is None:
-            out.append({**row, "healthy": None, "hurt": None, "nearer": False})
-            continue
-        of_clip = profile_of_walk(clip.walk)
-        from_healthy, from_hurt = (
-            limp_distance(of_clip, healthy, walk, healthy_figure.profile)
-            for walk in (healthy_figure.profile, figure.profile)
-        )
-        distances = {"healthy": round(from_healthy, 5), "hurt": round(from_hurt, 5)}
-        out.append({**row, **distances, "nearer": from_hurt < from_healthy})
-    return out
+    own, whose = reference
+    row = {"clip": walk.clip, "hurt_links": dict(walk.injury), "compared_with": whose}
+    if figure.profile is None:
+        return {**row, "healthy": None, "hurt": None, "nearer": False}
+    assert healthy.profile is not None
+    from_healthy, from_hurt = (
+        limp_distance(profile_of_walk(walk.cycles), own, other, healthy.profile)
+        for other in (healthy.profile, figure.profile)
+    )
+    distances = rounded({"healthy": from_healthy, "hurt": from_hurt})
+    return {**row, **distances, "nearer": from_hurt < from_healthy}
 
 
-def gallery(
-    network: Network,
-    captured: Sequence[CapturedWalk],
-    splits: Mapping[str, str],
-    seconds: float,
-    runtime: Runtime,
-) -> Rows:
-    """Poses of captured limps over a gait cycle, and of the character with the same injuries and healthy.
+def _is_held_out(walk: Walk, splits: Mapping[str, str]) -> bool:
+    return splits.get(walk.clip) == "held_out"
 
-    There are at most IN_GALLERY, held-out clips and strong limps first. `poses`: "captured", "character" or
-    "healthy" -> (8, J, 3) places of the joints relative to the root at 8 phases, cm; `phases`.
-    """
-    limps = [clip for clip in captured if clip.severity_by_link and not clip.clip.endswith(MIRROR)]
-    limps.sort(key=lambda c: (splits.get(c.clip) != "held_out", -max(c.severity_by_link.values()), c.clip))
-    limps = limps[:IN_GALLERY]
-    if not limps:
-        return []
-    injuries = [{}, *(clip.severity_by_link for clip in limps)]
-    gait, speed = ["walk"] * len(injuries), [SPEEDS["walk"]] * len(injuries)
-    hurt_channel = channel_values(network, INJURY, injuries)
-    lengths = (WARM_UP_FRAMES, max(FPS, round(seconds * FPS)))
-    walks = generate_walks(network, [CrowdTarget(n, gait, hurt_channel, speed) for n in lengths], runtime)
-    healthy, *hurt = (walks.cycle(1, i) for i in range(len(injuries)))
-    return [
-        {
-            "clip": clip.clip,
-            "hurt": dict(clip.severity_by_link),
-            "phases": [round(b / PHASES, 5) for b in range(0, PHASES, PHASES // 8)],
-            "poses": {
-                name: np.round(cycle[:: PHASES // 8], 1).tolist()
-                for name, cycle in (("captured", clip.cycle), ("character", own), ("healthy", healthy))
-            },
-        }
-        for clip, own in zip(limps, hurt, strict=True)
-    ]
+
+def in_gallery(limps: Iterable[Walk], splits: Mapping[str, str]) -> list[Walk]:
+    """The captured limps that are shown: at most IN_GALLERY, held-out clips and strong limps first."""
+    shown = [walk for walk in limps if not walk.clip.endswith(MIRROR)]
+    shown.sort(key=lambda w: (not _is_held_out(w, splits), -max(w.injury.values()), w.clip))
+    return shown[:IN_GALLERY]
 
 
 def run(inputs: MeasureInputs, options: Any) -> Outcome:

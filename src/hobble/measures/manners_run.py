@@ -6,11 +6,12 @@ generated walks.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from itertools import combinations
 from typing import Any
 
 import numpy as np
+import pandas
 
 from hobble.channels import channel
 from hobble.core.quat import Array
@@ -35,9 +36,9 @@ from hobble.rows.clip_rows import Captured
 from hobble.runtime.options import Runtime
 
 NONE = "none"  # the manner of a clip whose values are all 0
-# Quantities that are compared between walks with and without a manner: m/s, cm, degrees forward, standard
-# deviation of the arms' swing in degrees, degrees forward.
-EFFECTS = {
+# Quantities that are compared between walks with and without a manner, from mean features: m/s, cm, degrees
+# forward, standard deviation of the arms' swing in degrees, degrees forward.
+EFFECTS: Mapping[str, Callable[[Values], float]] = {
     "speed": lambda values: values["speed"] / 100,
     "stride": lambda values: values["step_left"] + values["step_right"],
     "trunk": lambda values: -values["trunk_forward_mean"],  # the feature has the direction down the trunk
@@ -73,11 +74,6 @@ def captured_windows(stretch: Captured, network: Network, name: str) -> list[Win
     return out
 
 
-def mean_effect(windows: Iterable[Values], effect: str) -> float:
-    """The mean over windows of the quantity `effect`, one of EFFECTS."""
-    return float(np.mean([EFFECTS[effect](values) for values in windows]))
-
-
 # The recogniser shrinks the covariance of the features towards its diagonal by one of these shares (0 to 1).
 # All are tried. A large share is better if there are few clips: .6 recognises 69 % of moods (few clips) and
 # 51 % of diagnoses (many clips); .02 recognises 54 % of moods and 63 % of diagnoses.
@@ -94,29 +90,26 @@ def recognise_left_out(
     manner that only one person has is never recognised, because it cannot be learnt while this person is left
     out.
     """
-    results = [_recognise_with_shrinkage(windows, people, shrinkage) for shrinkage in shrinkages]
-    return max(results, key=lambda result: (result["right"] or 0.0, result["shrinkage"]))
+    frame = pandas.DataFrame(
+        {"manner": [w.label for w in windows], "person": [people[w.clip] for w in windows]}
+    )
+    named = {each: named_left_out(windows, frame["person"].tolist(), each) for each in shrinkages}
 
+    def right(each: float) -> float:
+        return share_of_true((named[each] == frame.manner)[named[each] != ""]) or 0.0
 
-def _recognise_with_shrinkage(
-    windows: Sequence[Window], people: Mapping[str, str], shrinkage: float
-) -> dict[str, Any]:
-    """The result for one shrinkage."""
-    manner, person = np.array([w.label for w in windows]), np.array([people[w.clip] for w in windows])
-    named = named_left_out(windows, person.tolist(), shrinkage)
-    tried = named != ""
-    right, presence_right = named == manner, (named == NONE) == (manner == NONE)
-    pairs = sorted(set(zip(manner.tolist(), person.tolist(), strict=True)))
+    best = max(shrinkages, key=lambda each: (right(each), each))
+    frame["right"] = named[best] == frame.manner
+    frame["presence_right"] = (named[best] == NONE) == (frame.manner == NONE)
+    tried = frame[named[best] != ""]
     return {
-        "shrinkage": shrinkage,
-        "people": len(set(person)),
-        "people_of": {str(m): sum(m == other for other, _ in pairs) for m in sorted(set(manner))},
-        "windows": int(tried.sum()),
-        "right": share_of_true(right[tried]),
-        "by_manner": {
-            str(m): share_of_true(right[tried & (manner == m)]) for m in sorted(set(manner[tried]))
-        },
-        "presence_right": share_of_true(presence_right[tried]),
+        "shrinkage": best,
+        "people": frame.person.nunique(),
+        "people_of": frame.groupby("manner").person.nunique().to_dict(),
+        "windows": len(tried),
+        "right": share_of_true(tried.right),
+        "by_manner": {manner: share_of_true(right) for manner, right in tried.groupby("manner").right},
+        "presence_right": share_of_true(tried.presence_right),
     }
 
 
@@ -180,22 +173,30 @@ def measure_channel(
     cases += [((manner,), value) for value in (HALF, FULL) for manner in learnt]
     cases += [(pair, FULL) for pair in combinations(learnt, 2)]
     asked = [({name: dict.fromkeys(some, value)}, speed * pace) for some, value in cases for pace in PACES]
-    walks = generated_values(network, asked, runtime, manner_features)
+    # Then each manner (or none) at FULL, while a column of another channel is at its highest value.
+    others = [(n, column) for n in network.channels if n != name for column in network.trained_labels(n)]
+    mixed = [(manner, other, column) for manner in (NONE, *learnt) for other, column in others]
+    asked += [
+        ({name: {m: FULL} if m != NONE else {}, other: {column: channel(other).highest}}, speed)
+        for m, other, column in mixed
+    ]
+    walks = iter(generated_values(network, asked, runtime, manner_features))
     # The windows of each of the `cases`, at all PACES.
-    by_case = {
-        case: [w for walk in walks[len(PACES) * i : len(PACES) * (i + 1)] for w in walk]
-        for i, case in enumerate(cases)
-    }
+    by_case = {case: [w for _ in PACES for w in next(walks)] for case in cases}
+    together = [
+        {"channel": name, "manner": manner, "other": other, "column": column}
+        | _name_windows(recogniser, next(walks), {manner})
+        for manner, other, column in mixed
+    ]
+    means = {case: pandas.DataFrame(values).mean() for case, values in by_case.items()}
+    captured_means = {m: pandas.DataFrame(values).mean() for m, values in of_manner.items() if values}
     rows = []
     for (some, value), of_case in by_case.items():
         named = _name_windows(recogniser, of_case, set(some) or {NONE})
         rows.append({"manners": list(some), "value": value if len(some) < 2 else None, **named})
         if len(some) == 2:
-            alone = (_mean_features(by_case[(manner,), FULL]) for manner in some)
-            rows[-1]["between"] = _position_between(_mean_features(of_case), *alone)
-    at_full = [row for row in rows if row["value"] == FULL]
-    total = sum(row["windows"] for row in at_full)
-    right = sum((row["share"] or 0.0) * row["windows"] for row in at_full)
+            rows[-1]["between"] = _position_between(*(means[m, FULL] for m in (some, some[:1], some[1:])))
+    at_full = pandas.DataFrame([row for row in rows if row["value"] == FULL])
     return {
         "channel": name,
         "title": channel(name).title,
@@ -203,54 +204,21 @@ def measure_channel(
         "speed_asked": round(speed * FPS / 100, 5),
         "captured": captured,
         "generated": rows,
-        "right_at_1": round(right / total, 5) if total else None,
-        "together": recognise_together(network, name, recogniser, learnt, speed, runtime),
+        "right_at_1": round(float(np.average(at_full.share, weights=at_full.windows)), 5),
+        "together": together,
         "effects": [
-            {"channel": name, "manner": manner, "effect": effect}
-            | _measure_effect(
-                effect,
-                [of_manner[NONE], of_manner[manner]],
-                [by_case[case] for case in (((), 0.0), ((manner,), HALF), ((manner,), FULL))],
-            )
+            {
+                "channel": name,
+                "manner": manner,
+                "effect": effect,
+                "captured": _change(size, captured_means[manner], captured_means.get(NONE)),
+                "generated": _change(size, means[(manner,), FULL], means[(), 0.0]),
+                "generated_at_half": _change(size, means[(manner,), HALF], means[(), 0.0]),
+            }
             for manner in learnt
-            for effect in EFFECTS
+            for effect, size in EFFECTS.items()
         ],
     }
-
-
-def recognise_together(
-    network: Network,
-    name: str,
-    recogniser: Discriminant,
-    learnt: Sequence[str],
-    speed: float,
-    runtime: Runtime,
-) -> list[dict[str, Any]]:
-    """How often each manner at 1 is recognised while a column of another channel is at its highest value.
-
-    The result has a row for each pair of a manner (or NONE) and a column of another channel that was above 0
-    in training. name: the channel of the manners. learnt: the manners that the recogniser knows. speed:
-    target speed, cm a frame.
-    """
-    others = [
-        (other, column)
-        for other in network.channels
-        if other != name
-        for column in network.trained_labels(other)
-    ]
-    cases = [(manner, other, column) for manner in (NONE, *learnt) for other, column in others]
-    if not cases:
-        return []
-    asked = [
-        ({name: {} if m == NONE else {m: FULL}, other: {column: channel(other).highest}}, speed)
-        for m, other, column in cases
-    ]
-    walks = generated_values(network, asked, runtime, manner_features)
-    return [
-        {"channel": name, "manner": manner, "other": other, "column": column}
-        | _name_windows(recogniser, windows, {manner})
-        for (manner, other, column), windows in zip(cases, walks, strict=True)
-    ]
 
 
 def run(inputs: MeasureInputs, options: SampleOptions) -> Outcome:
@@ -261,10 +229,9 @@ def run(inputs: MeasureInputs, options: SampleOptions) -> Outcome:
         load_network(inputs.weights), motion, inputs.splits, inputs.people, inputs.runtime
     )
     channels = result.get("channels", [])
-    effects, together = ([row for one in channels for row in one[key]] for key in ("effects", "together"))
     tables: dict[str, list[Row]] = {
-        "effects": effects,
-        "together": [{k: v for k, v in row.items() if k != "named"} for row in together],
+        key: [{k: v for k, v in row.items() if k != "named"} for one in channels for row in one[key]]
+        for key in ("effects", "together")
     }
     log_line = "; ".join(f"{one['channel']}, share named right: {one['right_at_1']}" for one in channels)
     return Outcome(with_sample(result, sample), tables, log_line or result.get("reason", ""))
@@ -280,33 +247,17 @@ def _name_windows(recogniser: Discriminant, windows: Sequence[Values], right: se
     }
 
 
-def _measure_effect(
-    effect: str, captured: Sequence[Sequence[Values]], generated: Sequence[Sequence[Values]]
-) -> dict[str, float | None]:
-    """How much a manner changes the quantity `effect`.
-
-    captured: windows of training clips without a manner, and with this manner. generated: windows without a
-    manner, with this manner at .5, and with it at 1.
-    """
-    neutral, manner = captured
-    plain, half, full = (mean_effect(windows, effect) for windows in generated)
-    change = mean_effect(manner, effect) - mean_effect(neutral, effect) if neutral else None
-    return {
-        "captured": None if change is None else round(change, 4),
-        "generated": round(full - plain, 4),
-        "generated_at_half": round(half - plain, 4),
-    }
+def _change(
+    size: Callable[[Values], float], manner: pandas.Series, plain: pandas.Series | None
+) -> float | None:
+    """How much larger an effect is in walks with a manner than in plain walks. Both are mean features."""
+    return None if plain is None else round(float(size(manner) - size(plain)), 4)
 
 
-def _position_between(pair: Array, first: Array, second: Array) -> float:
+def _position_between(pair: pandas.Series, first: pandas.Series, second: pandas.Series) -> float:
     """Where `pair` lies between `first` (0) and `second` (1), projected onto the line through these two.
 
-    All are (D,) mean features of walks.
+    All are mean features of walks.
     """
     line = second - first
     return round(float((pair - first) @ line / max(float(line @ line), 1e-9)), 4)
-
-
-def _mean_features(windows: Sequence[Values]) -> Array:
-    """(D,) mean of each feature over the windows."""
-    return np.asarray(feature_table(windows).mean(axis=0))

@@ -14,6 +14,7 @@ from itertools import product
 from typing import Any
 
 import numpy as np
+import pandas
 
 from hobble.core.skeleton import Skeleton
 from hobble.gait.recognise import Discriminant
@@ -86,8 +87,17 @@ def measure_recognition(
         "classes": classes,
         "features": list(training[0].values),
         "chance": round(1 / len(classes), 5),
-        "captured": {"cross_validated": _cross_validate(training, parts), "held_out": judge(held_out)},
-        "generated": {**judge(generated), "by_walk": _judge_walks(classifier, generated, parts)},
+        # The classifier for each quarter learns from the other three quarters.
+        "captured": {
+            "cross_validated": count_answers(
+                classes, training, named_left_out(training, [w.part for w in training]), parts
+            ),
+            "held_out": judge(held_out),
+        },
+        "generated": {
+            **judge(generated),
+            "by_walk": count_answers(classes, *_whole_walks(classifier, generated), parts, "walks"),
+        },
     }
 
 
@@ -142,54 +152,41 @@ def parts_of_classes(skeleton: Skeleton) -> PartsOfClass:
     return parts
 
 
-def _cross_validate(windows: Sequence[Window], parts: PartsOfClass) -> dict[str, Any]:
-    """How windows are recognised if the classifier for each quarter learns from the other three quarters."""
-    named = named_left_out(windows, [w.part for w in windows])
-    judged = [(w, name) for w, name in zip(windows, named, strict=True) if name]
-    return count_answers(
-        sorted({w.label for w in windows}), [w for w, _ in judged], [n for _, n in judged], parts
-    )
-
-
-def _judge_walks(classifier: Discriminant, windows: Sequence[Window], parts: PartsOfClass) -> dict[str, Any]:
-    """How whole walks are recognised: as the class with the highest sum of scores of the windows."""
-    scores = classifier.scores(feature_table([w.values for w in windows]))  # (windows, classes)
-    of_walk: dict[str, list[int]] = {}  # name of a walk -> its windows
-    for i, window in enumerate(windows):
-        of_walk.setdefault(window.clip, []).append(i)
-    named = [classifier.classes[int(np.argmax(scores[which].sum(axis=0)))] for which in of_walk.values()]
-    first = [windows[which[0]] for which in of_walk.values()]
-    return count_answers(classifier.classes, first, named, parts, "walks")
+def _whole_walks(classifier: Discriminant, windows: Sequence[Window]) -> tuple[list[Window], list[str]]:
+    """The first window of each walk, and the class with the highest sum of scores of the walk's windows."""
+    scores = pandas.DataFrame(classifier.scores(feature_table([w.values for w in windows])))
+    of_walks = scores.groupby([w.clip for w in windows], sort=False).sum()
+    first = {w.clip: w for w in windows[::-1]}
+    return [first[walk] for walk in of_walks.index], [classifier.classes[i] for i in of_walks.idxmax(axis=1)]
 
 
 def count_answers(
     classes: Sequence[str],
     windows: Sequence[Window],
-    named: Sequence[str],
+    named: Sequence[str] | np.ndarray,
     parts: PartsOfClass,
     counted: str = "windows",
 ) -> dict[str, Any]:
     """How windows were recognised.
 
-    classes: all possible answers. named: the recognised class of each window. counted: "windows", or "walks"
-    if each window stands for a whole walk.
+    classes: all possible answers. named: the recognised class of each window; "" if it has no answer.
+    counted: "windows", or "walks" if each window stands for a whole walk.
     """
-    confusion = {h: dict.fromkeys(classes, 0) for h in sorted({w.label for w in windows})}
-    right: dict[float, list[bool]] = {}  # severity -> whether each answer is right
-    for w, name in zip(windows, named, strict=True):
-        confusion[w.label][name] += 1
-        right.setdefault(w.severity, []).append(w.label == name)
+    answers = pandas.DataFrame(
+        {"hurt": [w.label for w in windows], "severity": [w.severity for w in windows], "named": list(named)}
+    )
+    answers = answers[answers.named != ""]
+    answers["right"] = answers.hurt == answers.named
+    confusion = pandas.crosstab(answers.hurt, answers.named).reindex(columns=list(classes), fill_value=0)
     return {
-        counted: len(windows),
-        "right": share_of_true([is_right for of_severity in right.values() for is_right in of_severity]),
-        "right_without_side": share_of_true(
-            [parts(w.label) == parts(name) for w, name in zip(windows, named, strict=True)]
-        ),
+        counted: len(answers),
+        "right": share_of_true(answers.right),
+        "right_without_side": share_of_true(answers.hurt.map(parts) == answers.named.map(parts)),
         "by_severity": [
-            {"severity": severity, counted: len(of_severity), "right": share_of_true(of_severity)}
-            for severity, of_severity in sorted(right.items())
+            {"severity": severity, counted: len(right), "right": share_of_true(right)}
+            for severity, right in answers.groupby("severity").right
         ],
-        "confusion": confusion,
+        "confusion": confusion.to_dict("index"),
     }
 
 

@@ -15,6 +15,7 @@ import numpy as np
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 from hobble.models.network import Network
+from hobble.rows.clip_rows import rotate_by_yaw
 from hobble.runtime.animation import ProceduralAnimation
 from hobble.runtime.options import Runtime
 
@@ -93,6 +94,13 @@ def in_root_coordinates(positions: Array, root: Array, yaw: Array) -> Array:
     sin, cos = np.sin(yaw)[..., None], np.cos(yaw)[..., None]
     x, z = p[..., 0] * cos - p[..., 2] * sin, p[..., 0] * sin + p[..., 2] * cos
     return np.stack([x, p[..., 1], z], axis=-1)
+
+
+def in_world(local: Array, root: Array, yaw: Array) -> Array:
+    """The inverse of `in_root_coordinates`, in float64."""
+    world = local.astype(float)
+    world[..., ::2] = rotate_by_yaw(world[..., ::2], np.asarray(yaw)[..., None])
+    return world + root[..., None, :]
 
 
 def asymmetry(left: float | None, right: float | None) -> float | None:
@@ -181,8 +189,9 @@ class Walks:
 
     skeleton: of all figures. local: (F, C, J, 3) joint positions in root coordinates, cm, float32. contacts:
     (F, C, 4) predicted contacts of left heel, left toe, right heel, right toe. phase: (F, C) from 0 to 1.
-    root: (F, C, 3) positions of the root in the world, cm. acceleration: (F, C) the largest of any joint, cm
-    per frame squared, 0 in the first and last frame. starts: (S + 1,) first frame of each stretch, then F.
+    root, yaw: (F, C, 3) positions of the root in the world, cm, and (F, C) its direction, radians.
+    acceleration: (F, C) the largest of any joint, cm per frame squared, 0 in the first and last frame.
+    starts: (S + 1,) first frame of each stretch, then F.
     """
 
     skeleton: Skeleton
@@ -190,6 +199,7 @@ class Walks:
     contacts: Array = field(repr=False)
     phase: Array = field(repr=False)
     root: Array = field(repr=False)
+    yaw: Array = field(repr=False)
     acceleration: Array = field(repr=False)
     starts: np.ndarray
 
@@ -218,6 +228,20 @@ class Walks:
         span = self.measured_frames(stretch, figure)
         return float(np.mean(distance_to_cycle(self.local[span, figure], self.phase[span, figure], cycle)))
 
+    def change(self, stretch: int, figure: int, reference: int, of_figure: int | None = None) -> float:
+        """How far a figure's walk in a stretch is from a reference walk, cm: 0 for the reference walk itself.
+
+        It is the distance from the mean cycle of the reference walk, less the reference walk's own distance.
+        reference, of_figure: stretch and figure of the reference walk, by default the same figure.
+        """
+        other = figure if of_figure is None else of_figure
+        cycle = self.cycle(reference, other)
+        return self.distance(stretch, figure, cycle) - self.distance(reference, other, cycle)
+
+    def roughness(self, figure: int, stretch: int, end: int = -1) -> float:
+        """A figure's largest acceleration from a stretch up to the stretch `end`, or up to the last frame."""
+        return float(self.acceleration[self.starts[stretch] : self.starts[end], figure].max())
+
     def measures(self, stretch: int, figure: int) -> dict[str, float | None]:
         """The `gait_measures` of a figure in a stretch."""
         span = self.measured_frames(stretch, figure)
@@ -241,7 +265,7 @@ def generate_walks(network: Network, script: Sequence[CrowdTarget], runtime: Run
     animation = ProceduralAnimation(network, characters=count, **dict(runtime))
     local = np.zeros((frames, count, len(network.skeleton.joints), 3), np.float32)
     contacts, root = np.zeros((frames, count, 4)), np.zeros((frames, count, 3))
-    phase, largest = np.zeros((frames, count)), np.zeros((frames, count))
+    phase, yaw, largest = (np.zeros((frames, count)) for _ in range(3))
     recent: list[Array] = []  # joint positions in the world, of the last three frames or fewer
     frame = 0
     for stretch in script:
@@ -252,13 +276,34 @@ def generate_walks(network: Network, script: Sequence[CrowdTarget], runtime: Run
             pose = animation.next_pose(velocity, gait=shares, **stretch.channels)
             positions = pose.positions.reshape(count, -1, 3)  # a single figure has no axis for figures
             root[frame], phase[frame], contacts[frame] = pose.root, pose.phase, pose.contacts
-            local[frame] = in_root_coordinates(positions, root[frame], np.atleast_1d(pose.yaw))
+            yaw[frame] = pose.yaw
+            local[frame] = in_root_coordinates(positions, root[frame], yaw[frame])
             recent = [*recent[-2:], positions]
             if len(recent) == 3:
                 largest[frame - 1] = acceleration(np.array(recent))[0].max(axis=1)
             frame += 1
     starts = np.cumsum([0, *(s.frames for s in script)])
-    return Walks(network.skeleton, local, contacts, phase, root, largest, starts)
+    return Walks(network.skeleton, local, contacts, phase, root, yaw, largest, starts)
+
+
+def walk_straight(
+    network: Network,
+    cases: Sequence[Mapping[str, Mapping[str, float]]],
+    gait: str,
+    speed: Sequence[float],
+    lengths: Sequence[int],
+    runtime: Runtime,
+) -> Walks:
+    """Let a figure for each of `cases` walk ahead, in stretches of `lengths` frames.
+
+    cases: channel -> column -> value, the channel's other columns are 0. A channel of which no case says
+    anything has its default. gait: of all figures. speed: of each, cm a frame.
+    """
+    channels: dict[str, Array] = {}
+    for name in dict.fromkeys(name for case in cases for name in case):
+        channels |= channel_values(network, name, [case.get(name, {}) for case in cases])
+    script = [CrowdTarget(frames, [gait] * len(cases), channels, speed) for frames in lengths]
+    return generate_walks(network, script, runtime)
 
 
 def channel_values(network: Network, name: str, figures: Sequence[Mapping[str, float]]) -> dict[str, Array]:
@@ -395,6 +440,14 @@ def mean_of_known(values: Iterable[float | None], digits: int = 5) -> float | No
     """The mean of the values that are not None, rounded to `digits` decimals; None if there are none."""
     known = [v for v in values if v is not None]
     return round(float(np.mean(known)), digits) if known else None
+
+
+def rounded(row: Mapping[str, Any]) -> dict[str, Any]:
+    """The row with its numbers rounded to five decimals; None in place of numbers that are not finite."""
+    return {
+        key: (round(float(v), 5) if np.isfinite(v) else None) if isinstance(v, float) else v
+        for key, v in row.items()
+    }
 
 
 def share_of_true(values: Sequence[bool] | np.ndarray) -> float | None:

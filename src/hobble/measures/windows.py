@@ -10,7 +10,7 @@ import numpy as np
 
 from hobble.core.quat import Array
 from hobble.gait.recognise import SHRINKAGE, Discriminant, learn
-from hobble.measures.walks import FPS, CrowdTarget, channel_values, gait_features, generate_walks
+from hobble.measures.walks import FPS, gait_features, walk_straight
 from hobble.models.network import Network
 from hobble.rows.clip_rows import Captured
 from hobble.rows.layout import GAITS
@@ -64,11 +64,9 @@ def generated_values(
     network: Network, walks: Sequence[Asked], runtime: Runtime, features: Features = gait_features
 ) -> list[list[Values]]:
     """For each walk, the features of the windows of the network's straight walk."""
-    channels: dict[str, Array] = {}
-    for name in network.channels:
-        channels |= channel_values(network, name, [values.get(name, {}) for values, _ in walks])
-    target = CrowdTarget(WARM_UP + USED, ["walk"] * len(walks), channels, [speed for _, speed in walks])
-    found = generate_walks(network, [target], runtime)
+    cases = [{name: values.get(name, {}) for name in network.channels} for values, _ in walks]
+    speeds = [speed for _, speed in walks]
+    found = walk_straight(network, cases, "walk", speeds, [WARM_UP + USED], runtime)
     motion = (found.local, found.contacts, found.root)
     spans = [slice(first, first + WINDOW) for first in range(WARM_UP, WARM_UP + USED - WINDOW + 1, STEP)]
     return [

@@ -9,12 +9,18 @@ from hobble.figure.pack import packed_body
 from hobble.report.character import body_channel, skeleton_of
 from hobble.report.parts import (
     Chart,
+    ChartPair,
     Column,
     Compared,
     ComparedValue,
+    PageSection,
+    Paragraph,
+    SectionPart,
     Table,
+    TemplatePart,
     Trace,
     axis,
+    chart,
     citation,
     configuration_colours,
     configuration_names,
@@ -24,8 +30,9 @@ from hobble.report.parts import (
     join_sections,
     line_trace,
     log_axis,
+    words,
 )
-from hobble.report.sections import passes_axis, published_curve, stage_charts
+from hobble.report.sections import own_section, passes_axis, published_curve, stage_charts
 from hobble.report.templates import compared_by, compressed, drawn_by_script, render_page
 
 LARGEST_PAGE = 19_850_000  # bytes; the page must stay under 20 MB
@@ -47,24 +54,26 @@ def render_comparison(
     they show.
     """
     values = [value for each in compared_by(measures, "compared_values", compared) for value in each]
-    once = "The stages that prepare a data set run only once for all configurations that use it."
     stages = {
         name: [stage for stage in compared["stages"] if stage["configuration"] == name]
         for name in configuration_names(compared)
     }
-    sections: dict[str, dict[str, Any]] = {
-        "overview": {
-            "verdicts": sorted((v for v in values if v.verdict), key=lambda value: value.order),
-            "table": configuration_table(compared, values),
-            "published": published_table(compared),
-        },
-        "training": {"curves": training_curves(compared)},
-        "stages": {"charts": stage_charts(stages, "compare", once, configuration_colours(compared))},
-    }
+    costs = stage_charts(stages, "compare", words("stages.once"), configuration_colours(compared))
+    overview = PageSection("summary", [SectionPart(0, configuration_table(compared, values))])
+    sections = join_sections(
+        [
+            *compared_by(measures, "compared_section", compared),
+            own_section("training", training_curves(compared)),
+            own_section("costs", ChartPair(costs)),
+            own_section(
+                "published", Paragraph(words("published.read")), published_table(compared), long=True
+            ),
+            own_section("origin", TemplatePart("origin.html.j2")),
+        ]
+    )
     playables = {name: spec for name, spec in (playables or {}).items() if spec}
-    measurements = join_sections(compared_by(measures, "compared_section", compared))
     names = configuration_names(compared)
-    drawn = drawn_by_script([sections, measurements])
+    drawn = drawn_by_script([overview, *sections])
     # Configurations with the same skeleton share a body. Its key is in the entry `body` of a character.
     bodies = {spec["body"]: packed_body(skeleton_of(spec)) for spec in playables.values()}
     used = sum(map(len, (bundle.encode(), compressed(bodies), *map(compressed, drawn.values()))))
@@ -75,14 +84,15 @@ def render_comparison(
         {"name": NAME, **drawn, "playable": on_page, "bodies": bodies},
         bundle,
         name=NAME,
-        measured_sections=measurements,
+        sections=sections,
+        overview=overview,
+        verdicts=sorted((v for v in values if v.verdict), key=lambda value: value.order),
         title=" and ".join(names) if len(names) < 3 else f"{len(names)} configurations",
         eyebrow="Hobble report · comparison of configurations",
         lead="The same measurements of " + ", ".join(names) + ", compared with published results.",
         playable=list(on_page),
         left_out=left_out,
         hurts=any(body_channel(spec) for spec in on_page.values()),
-        **sections,
     )
 
 
@@ -134,12 +144,8 @@ def training_curves(compared: Compared) -> Chart | None:
                 values += published
     if not options:
         return None
-    return Chart(
+    return chart(
         "compare-training",
-        "Error during training",
-        "Mean squared error of the standardised output. Solid lines: held-out clips. Dotted lines: training "
-        "clips, measured with dropout. Dash-dotted lines: the training errors of Segerstedt (2021; Figure "
-        "5.11), on the clips of Holden et al.",
         layout={"yaxis": log_axis("mean squared error", values)},
         height=420,
         choose="Horizontal axis",

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
 import yaml
 
-from hobble.channels.shown import shown_names
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 from hobble.figure.mesh import mesh_key
 from hobble.figure.pack import packed_body
-from hobble.report import data_section as data
 from hobble.report import sections as own
 from hobble.report.character import body_channel, opening_channel, opening_slider
 from hobble.report.gather import ReportMaterial
@@ -23,9 +21,9 @@ from hobble.report.parts import (
     format_bytes,
     format_duration,
     format_number,
+    hint,
     join_sections,
     json_data,
-    with_order,
 )
 from hobble.report.recorded_motion import ground_pictures
 from hobble.report.templates import drawn_by_script, measured_by, render_page
@@ -52,16 +50,17 @@ def render_report(
     `character.opening_slider`. A section without data is left out. Without `hero`, the characters at the top
     begin in the network's start frame.
     """
-    terrain = data.some_files(material.terrain_files, data.MOST_SHOWN)
+    terrain = own.some_files(material.terrain_files, own.MOST_SHOWN)
     # Seconds of data at each speed, turning speed and channel value.
-    counted = data.seconds_of_data(material.row_files, material.splits)
-    sections = _sections(material, counted, terrain)
-    measured_sections = join_sections(measured_by(material, "section"))
+    counted = own.seconds_of_data(material.row_files, material.splits)
+    sections = join_sections(
+        [*measured_by(material, "section"), *own.own_sections(material, counted, terrain)]
+    )
     playable, compared = playable or {}, captured_and_predicted or {}
     grounds = ground_pictures(terrain, material.network["skeleton"])
     opening = hero or opening_slider(playable, material.measurements.values())
     for_scripts = {
-        **drawn_by_script([sections, measured_sections]),
+        **drawn_by_script(sections),
         "bodies": _bodies(material),
         "hero": opening,
         "grounds": grounds,
@@ -69,7 +68,6 @@ def render_report(
         "playable": {material.name: playable} if playable else {},
         "compare": compared,
     }
-    resolved = json_data(dict(material.resolved))
     return render_page(
         "page.html.j2",
         for_scripts,
@@ -83,14 +81,13 @@ def render_report(
         shown_part=opening["part"],
         hurts=body_channel(playable) is not None,  # whether the reader can hurt parts of the body
         shown_channel=opening_channel(playable),
-        measured_sections=measured_sections,
+        sections=sections,
         figures=key_figures(material),
         hints=hints(material, counted["both"]),
         playable=for_scripts["playable"],
         captured_and_predicted=[clip["name"] for clip in compared.get("clips", ())],
         grounds=[picture["name"] for picture in grounds["pictures"]],
-        configuration=yaml.safe_dump(resolved, sort_keys=False, allow_unicode=True),
-        **sections,
+        configuration=yaml.safe_dump(json_data(dict(material.resolved)), sort_keys=False, allow_unicode=True),
     )
 
 
@@ -100,33 +97,6 @@ def _bodies(material: ReportMaterial) -> dict[str, Any]:
         return {}
     figure = Skeleton.from_dict({"name": "", **material.network["skeleton"]})
     return {mesh_key(figure): packed_body(figure)}
-
-
-def _sections(
-    material: ReportMaterial, counted: Mapping[str, Any], terrain: list[str]
-) -> dict[str, dict[str, Any]]:
-    """Section -> name in the template -> chart, table or list of charts; None if there is nothing to show.
-
-    counted: from `seconds_of_data`. terrain: files of the terrain fits that are shown.
-    """
-    parallel = "The sum over all jobs of a stage. Jobs run in parallel, so the run itself takes less time."
-    stages = {material.name: material.pipeline.get("stages") or ()}
-    seconds, sizes = own.stage_charts(stages, "stage", parallel, {material.name: "@accent"})
-    return {
-        "training": {
-            "curve": own.learning_curve(material),
-            "table": own.history_table(material),
-        },
-        "terrain": {"table": own.fit_table(terrain)},
-        "stages": {"seconds": seconds, "bytes": sizes, "table": own.stage_table(material)},
-        "data": {
-            "gaits": data.gait_chart(material),
-            "speeds": data.speed_and_turn_chart(counted),
-            "channels": data.channel_charts(counted, shown_names(material.network["skeleton"])),
-            "clips": data.clip_table(material),
-            "remarks": data.remarks_table(material),
-        },
-    }
 
 
 def _training_options(material: ReportMaterial) -> Mapping[str, Any]:
@@ -187,16 +157,15 @@ def _network_figure(network: Mapping[str, Any]) -> KeyFigure:
 def hints(material: ReportMaterial, both: Mapping[str, Array] | None = None) -> list[Hint]:
     """Warnings and advice in the order in which to follow them, then what is good, then plain facts.
 
-    both: of `data_section.seconds_of_data`, if the seconds were counted.
+    both: of `sections.seconds_of_data`, if the seconds were counted.
     """
-    # The first argument of `with_order` is the place among hints of the same kind, see `parts.Hint`.
     found = [
         *(hint for shown in measured_by(material, "hints") for hint in shown),
-        *with_order(10, _gait_hints(material)),  # before training, which cannot make up for missing data
-        *with_order(10, _turning_hints(both or {})),
-        *with_order(11, _repair_hints(material)),
-        *with_order(20, _training_hints(material)),
-        *with_order(90, _cost_hints(material)),
+        *_training_hints(material),
+        *_gait_hints(material),
+        *_turning_hints(both or {}),
+        *_repair_hints(material),
+        *_cost_hints(material),
     ]
     return sorted(found, key=lambda hint: (KIND_ORDER.index(hint.kind), hint.order))
 
@@ -212,82 +181,45 @@ def _training_hints(material: ReportMaterial) -> Iterator[Hint]:
     means = {p: errors[passes == p].mean() for p in dict.fromkeys(passes)}
     best = min(means, key=lambda p: means[p])
     if means[passes[-1]] > 1.05 * means[best]:
-        yield Hint(
-            "warn",
-            f"The held-out error was lowest in pass {best:.0f} and has risen since.",
-            "The network overfits: train for fewer passes, with more dropout, or on more data.",
-        )
-        return
-    if _training_options(material).get("schedule", "constant") != "constant":
-        # The error fell because the learning rate fell, so it does not show whether more passes would help.
-        return
-    quarter = max(1, len(errors) // 4)
-    fall = 1 - errors[-quarter:].mean() / errors[-2 * quarter : -quarter].mean()
-    if fall > 0.03:
-        yield Hint(
-            "note",
-            f"The held-out error still fell by {100 * fall:.0f} % in the last quarter of training.",
-            "More passes will help. Another configuration can continue from the last checkpoint of this one.",
-        )
-    else:
-        yield Hint("good", "The held-out error has stopped falling.", "More passes will change little.")
+        yield hint("hints.lowest", best=f"{best:.0f}")
+    # With another schedule, the error fell because the learning rate fell. That does not show whether more
+    # passes would help.
+    elif _training_options(material).get("schedule", "constant") == "constant":
+        quarter = max(1, len(errors) // 4)
+        fall = 1 - errors[-quarter:].mean() / errors[-2 * quarter : -quarter].mean()
+        yield hint("hints.falling", percent=f"{100 * fall:.0f}") if fall > 0.03 else hint("hints.flat")
 
 
 def _gait_hints(material: ReportMaterial) -> Iterator[Hint]:
     """Gaits of which there is little data or none."""
-    totals: dict[str, float] = {}
-    for report in material.labels:
-        for gait, seconds in (report.get("seconds") or {}).items():
-            totals[gait] = totals.get(gait, 0.0) + seconds
+    train, held_out = own.gait_seconds(material).values()
+    totals = {gait: train[gait] + held_out[gait] for gait in train}
     little = LITTLE_OF_A_GAIT * sum(totals.values())
-    if little and not totals.get("stand"):
-        yield Hint(
-            "warn",
-            "Nobody stands, starts or stops in these clips.",
-            "So the character steps on the spot when it should stand, and more training will not change "
-            "that. Add clips in which somebody stands, starts and stops.",
-        )
+    if little and not totals["stand"]:
+        yield hint("hints.standing")
     scarce = sorted(g for g, seconds in totals.items() if 0 < seconds < little and g not in ("jump", "bump"))
     if scarce:
-        yield Hint(
-            "note",
-            f"There is little data of {' and '.join(scarce)}:",
-            f"less than three per cent of the time{' each' if len(scarce) > 1 else ''}. Add clips, or expect "
-            "the character to be unsteady there.",
-        )
+        yield hint("hints.scarce", gaits=" and ".join(scarce), each=" each" if len(scarce) > 1 else "")
 
 
 def _turning_hints(both: Mapping[str, Array]) -> Iterator[Hint]:
-    """A warning if hardly anybody turns. both: of `data_section.seconds_of_data`."""
+    """A warning if hardly anybody turns. both: of `sections.seconds_of_data`."""
     seconds = np.sum([of_split.sum(axis=1) for of_split in both.values()], axis=0)
     if not np.any(seconds):
         return
-    middles = (data.TURN_EDGES[:-1] + data.TURN_EDGES[1:]) / 2  # of the bins, degrees a second
+    middles = (own.TURN_EDGES[:-1] + own.TURN_EDGES[1:]) / 2  # of the bins, degrees a second
     share = float(np.sum(seconds[np.abs(middles) > TURNING]) / np.sum(seconds))
     if share < LITTLE_TURNING:
-        yield Hint(
-            "warn",
-            f"Hardly anybody turns in these clips: only {100 * share:.1f} % of the time has turns of "
-            f"{TURNING:.0f} degrees per second or more.",
-            "So the character turns badly, and more training will not change that. Add clips in which "
-            "somebody turns to both sides.",
-        )
+        yield hint("hints.turning", percent=f"{100 * share:.1f}", turning=f"{TURNING:.0f}")
 
 
 def _repair_hints(material: ReportMaterial) -> Iterator[Hint]:
     """How many clips were repaired or have warnings."""
-
-    def clips_with(key: str, reports: Sequence[Mapping[str, Any]]) -> int:
-        return len({report["clip"] for report in reports if report.get(key)})
-
-    repaired = clips_with("repairs", material.motion)
-    warned = clips_with("warnings", [*material.labels, *material.channels])
+    reports = [*material.labels, *material.channels]
+    repaired = {report["clip"] for report in material.motion if report.get("repairs")}
+    warned = {report["clip"] for report in reports if report.get("warnings")}
     if repaired or warned:
-        yield Hint(
-            "note",
-            f"Some clips were repaired ({repaired}) or have warnings ({warned}).",
-            "They are listed under Data. Look at them, because the network also learns the errors in a clip.",
-        )
+        yield hint("hints.repaired", repaired=len(repaired), warned=len(warned))
 
 
 def _cost_hints(material: ReportMaterial) -> Iterator[Hint]:
@@ -295,10 +227,6 @@ def _cost_hints(material: ReportMaterial) -> Iterator[Hint]:
     total = material.pipeline.get("total_seconds") or 0
     for stage in material.pipeline.get("stages") or ():
         if stage["seconds"] > 0.5 * total > 0:
-            share = 100 * stage["seconds"] / total
-            faster = (
-                "`--config training=fast` shortens it (docs/training.md)"
-                if stage["stage"] == "training"
-                else "More cores shorten it (`snakemake -c8`), or a cluster (docs/cluster.md)"
-            )
-            yield Hint("fact", f"The {stage['stage']} stage took {share:.0f} % of the time.", f"{faster}.")
+            name = "training-time" if stage["stage"] == "training" else "stage-time"
+            percent = f"{100 * stage['seconds'] / total:.0f}"
+            yield hint(f"hints.{name}", stage=stage["stage"], percent=percent)

@@ -6,13 +6,16 @@ Measurements import from here what their sections need. A colour such as "@accen
 
 from __future__ import annotations
 
+import functools
 import json
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
+import yaml
 from markupsafe import Markup
 
 
@@ -525,3 +528,118 @@ class ComparedValue:
         low, other = (self.values[name] for name in self.ranked[:2])
         text = f"{first}; {'almost equal: ' if other <= low * (1 + EQUAL) else ''}{second}.{self.more}"
         return text[0].upper() + text[1:]
+
+
+Records = Sequence[Mapping[str, Any]]  # rows of a table: key -> value
+LONG = 80  # a text of more characters is broken into lines
+CAPTIONS = Path(__file__).with_name("captions.yaml")
+
+
+@functools.cache
+def _captions() -> dict[str, Any]:
+    return yaml.safe_load(CAPTIONS.read_text(encoding="utf-8"))
+
+
+def told(name: str) -> Any:
+    """An entry of captions.yaml, with a dot before the name of a text in an entry that has several."""
+    found: Any = _captions()
+    for key in name.split("."):
+        found = found[key]
+    return found
+
+
+def words(*names: str, **values: Any) -> str:
+    """Texts of captions.yaml (see `told`), with `values` in place of the names in braces."""
+    return " ".join(told(name).format(**values) for name in names)
+
+
+def hint(name: str, **values: Any) -> Hint:
+    """A hint of captions.yaml: an entry with its kind, order, head and text, see `words` and `Hint`."""
+    found = told(name)
+    head, text = (found[part].format(**values) for part in ("head", "text"))
+    return Hint(found["kind"], head, text, found["order"])
+
+
+def chart(
+    name: str,
+    traces: Sequence[Trace] = (),
+    layout: Mapping[str, Any] | None = None,
+    height: int = 340,
+    *,
+    choose: str | None = None,
+    options: Mapping[str, Sequence[Any]] | None = None,
+    option_layouts: Mapping[str, Mapping[str, Any]] | None = None,
+    more: Sequence[str] = (),
+    entry: str = "",
+    **values: Any,
+) -> Chart:
+    """A chart with the title and the caption that captions.yaml has under its name. The rest: see `Chart`.
+
+    entry: of captions.yaml, if it is not the chart's name. more: keys of further sentences that the entry
+    has. values: see `words`.
+    """
+    entry = entry or name
+    title = words(f"{entry}.title", **values)
+    caption = words(*(f"{entry}.{key}" for key in ("caption", *more)), **values)
+    menu = choose, options or {}, option_layouts or {}
+    return Chart(name, title, caption, list(traces), layout or {}, height, *menu)
+
+
+def table(
+    name: str,
+    records: Records,
+    heads: Mapping[str, str] | None = None,
+    title: str = "",
+    show: Mapping[str, Callable[[Any], str]] | None = None,
+    long: Collection[str] = (),
+) -> Table:
+    """A table with a row for each record. Whole numbers are shown in full, others with three digits.
+
+    heads: key of a record -> heading of its column; by default all keys of the first record, in words.
+    show: key -> function from a value to its text. long: keys of long texts.
+    """
+    heads = heads or {key: in_words(key) for key in (records[0] if records else ())}
+    columns = {}
+    for key, head in heads.items():
+        value = next((r[key] for r in records if r.get(key) is not None), 0.0)
+        if show and key in show:
+            columns[key] = Column(head, show[key], "text" if isinstance(value, str) else "n")
+        elif isinstance(value, bool):
+            columns[key] = Column(head, lambda is_so: "yes" if is_so else "no")
+        elif isinstance(value, str):
+            is_long = key in long or any(len(r.get(key) or "") > LONG for r in records)
+            columns[key] = Column(head, kind="long" if is_long else "text")
+        else:
+            columns[key] = Column.count(head) if isinstance(value, int) else Column.number(head)
+    return Table.of(name, columns, records, title or "Table of the values")
+
+
+def in_words(key: str) -> str:
+    """A key of a measurement's JSON as the heading of a column.
+
+    >>> in_words("largest_turn_degrees")
+    'largest turn, °'
+    """
+    return key.replace("_cm", ", cm").replace("_degrees", ", °").replace("_", " ")
+
+
+def told_table(
+    name: str,
+    records: Records,
+    text: str,
+    show: Mapping[str, Callable[[Any], str]] | None = None,
+    **values: Any,
+) -> Table:
+    """A table with the title that captions.yaml has under the name `text`: "<entry>.<table>".
+
+    There it may have headings, too: then it has `title` and `heads`. Columns of which no record has a value
+    are left out. show: see `table`. values: see `words`.
+    """
+    found = told(text)
+    found = {"title": found, "heads": None} if isinstance(found, str) else found
+    heads = {
+        key: head.format(**values)
+        for key, head in (found["heads"] or {}).items()
+        if any(record.get(key) is not None for record in records)
+    }
+    return table(name, records, heads, found["title"].format(**values), show)

@@ -7,17 +7,25 @@ can be drawn at once.
 from __future__ import annotations
 
 import functools
-from collections.abc import Sequence
+import io
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from PIL import Image
 from scipy.ndimage import gaussian_filter
 
 from hobble.core.compiled import njit
 from hobble.core.quat import Array
-from hobble.figure.mesh import Mesh
+from hobble.core.skeleton import Skeleton
+from hobble.figure.mesh import body_mesh
+from hobble.runtime.export import restore_bone_lengths
+
+Picture = NDArray[np.uint8]  # (height, width, 3) RGB
+FPS = 60  # frames a second of the motion
+FRAME_STEP = 2  # every second frame of the motion becomes a picture of a film
 
 
 def corner_normals(corners: Array, faces: Any) -> Array:
@@ -173,19 +181,34 @@ class Camera:
 
 
 class BodyRenderer:
-    """Draws a body in any pose.
+    """Draws the body of a skeleton in any pose.
 
     regions: for each bone of the body, the indices of the values that colour it, in the argument `values` of
     `draw`. Without regions the body is grey.
     """
 
-    def __init__(self, body: Mesh, regions: Sequence[Sequence[int]] = ()) -> None:
-        self._body, self._faces = body, body.faces
-        self._regions = [list(columns) for columns in regions] or [[] for _ in body.bones]
+    def __init__(self, skeleton: Skeleton, regions: Sequence[Sequence[int]] = ()) -> None:
+        self._skeleton, self._body = skeleton, body_mesh(skeleton)
+        self._regions = [list(columns) for columns in regions] or [[] for _ in self._body.bones]
 
-    def draw(
-        self, places: Array, turns: Array, camera: Camera, values: Array | None = None
-    ) -> NDArray[np.uint8]:
+    def film(
+        self,
+        positions: Array,
+        rotations: Array,
+        camera: Callable[[int], Camera],
+        values: Array | None = None,
+    ) -> list[Picture]:
+        """A picture of every FRAME_STEP-th frame of a motion, as many as fit a whole number of times.
+
+        positions, rotations: (F, J, 3), cm, and (F, J, 4) of the joints in the world. camera: of each frame.
+        values: see `draw`.
+        """
+        bones = self._body.bones  # indices of the joints that move the body
+        turns, places = restore_bone_lengths(self._skeleton, positions, rotations)
+        frames = range(0, len(places) - len(places) % FRAME_STEP, FRAME_STEP)
+        return [self.draw(places[f, bones], turns[f, bones], camera(f), values) for f in frames]
+
+    def draw(self, places: Array, turns: Array, camera: Camera, values: Array | None = None) -> Picture:
         """An RGB picture (size, size, 3).
 
         places, turns: positions (B, 3), cm, and rotations (B, 4) of the bones. values: 1D, from 0 to 1; the
@@ -200,12 +223,12 @@ class BodyRenderer:
         on_ground = corners - key_light * (corners[:, 1:2] / key_light[1])
         on_ground, size = camera.project(on_ground), camera.size
         dark, shadow = np.zeros((size, size, 3), np.float32), np.full((size, size), np.inf, np.float32)
-        draw_triangles(on_ground, np.zeros_like(corners), self._faces, dark, shadow)
+        draw_triangles(on_ground, np.zeros_like(corners), self._body.faces, dark, shadow)
         background = _ground(camera)
         background *= (
             1 - 0.42 * gaussian_filter(np.isfinite(shadow).astype(np.float32), size / 130)[..., None]
         )
-        normal = corner_normals(corners, self._faces)
+        normal = corner_normals(corners, self._body.faces)
         # Light from the sky, weaker where the body covers itself; then the key light and the rim light.
         brightness = (
             (0.50 + 0.10 * normal[:, 1]) * (0.55 + 0.45 * self._body.shade)
@@ -215,7 +238,7 @@ class BodyRenderer:
         colours = self._colours(values) * brightness[:, None]
         fine = camera.size * SUPERSAMPLING
         picture, depth = np.zeros((fine, fine, 3), np.float32), np.full((fine, fine), np.inf, np.float32)
-        draw_triangles(camera.project(corners, SUPERSAMPLING), colours, self._faces, picture, depth)
+        draw_triangles(camera.project(corners, SUPERSAMPLING), colours, self._body.faces, picture, depth)
         return finish_picture(picture, depth, background, SUPERSAMPLING)
 
     def _colours(self, values: Array | None) -> Array:
@@ -262,3 +285,16 @@ def _ground(camera: Camera) -> Array:
     x, height, z = (float(v) for v in camera.target)
     pixels = _ground_in_pixels(camera.yaw, camera.pitch, camera.distance, camera.size, height)
     return draw_ground(*pixels, x, z, GRID, np.array([BACKGROUND, GROUND, LINE]))
+
+
+def webp(pictures: Sequence[Picture], loop: int, quality: int, effort: int) -> bytes:
+    """A film as an animated WebP.
+
+    loop: how often it plays, 0: endlessly. quality: 0 to 100. effort: of the encoder, 0 to 6.
+    """
+    # Whole milliseconds, rounded so that they add up to the true duration.
+    ends = np.round(1000 * FRAME_STEP / FPS * np.arange(len(pictures) + 1)).astype(int)
+    out, (first, *others) = io.BytesIO(), map(Image.fromarray, pictures)
+    options = {"duration": np.diff(ends).tolist(), "loop": loop, "quality": quality, "method": effort}
+    first.save(out, "WEBP", save_all=True, append_images=others, **options)
+    return out.getvalue()

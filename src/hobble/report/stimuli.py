@@ -10,24 +10,19 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
-from PIL import Image
 
 from hobble.channels import channel
 from hobble.channels.shown import SampleWalk, channel_display
 from hobble.core.errors import HobbleError
-from hobble.core.files import write_json
+from hobble.core.files import write_bytes, write_json
 from hobble.core.quat import Array
-from hobble.core.skeleton import Skeleton
-from hobble.figure.mesh import body_mesh
 from hobble.models.network import Network
-from hobble.report.raster import GRID, BodyRenderer, Camera
-from hobble.runtime.export import export_bvh, fitted_skeleton, restore_bone_lengths
+from hobble.report.raster import GRID, BodyRenderer, Camera, Picture, webp
+from hobble.runtime.export import export_bvh, fitted_skeleton
 from hobble.runtime.loops import RepeatedWalk, make_loop
 from hobble.runtime.options import Runtime
 
-FRAME_STEP = 2  # every second frame of the motion becomes an image
-QUALITY = 80  # of the WebP images, 0 to 100
+QUALITY, EFFORT = 80, 3  # of the WebP images, see `webp`
 # cm: a loop that is nearer than this to the loop of the neutral walk (`loop_distance`) looks the same. In the
 # neutral walk all values of channels are 0.
 VISIBLE = 0.1
@@ -55,10 +50,8 @@ def write_stimuli(
     skeleton = network.skeleton
     neutral, entries = make_loop(network, {}, runtime), []
     for name, channel_name, sample in all_loops(network):
-        columns, trained = network.channels[channel_name], trained_columns(network, channel_name)
-        renderer = BodyRenderer(
-            body_mesh(skeleton), channel_display(channel_name, skeleton, columns, trained).regions
-        )
+        columns, trained = network.channels[channel_name], network.trained_labels(channel_name)
+        regions = channel_display(channel_name, skeleton, columns, trained).regions
         loop = neutral
         if sample.values:
             loop = make_loop(network, {channel_name: dict(sample.values)}, runtime)
@@ -70,7 +63,8 @@ def write_stimuli(
         if sample.coloured:
             values = np.array([sample.values.get(column, 0.0) for column in columns])
             colours = values / channel(channel_name).highest
-        save_loop(folder / f"{name}.webp", draw_frames(renderer, skeleton, loop, colours, size))
+        pictures = draw_loop(BodyRenderer(skeleton, regions), loop, colours, size)
+        write_bytes(folder / f"{name}.webp", webp(pictures, 0, QUALITY, EFFORT))
         seconds = len(loop.positions) / 60
         entries.append(
             {
@@ -106,12 +100,6 @@ def all_loops(network: Network) -> list[tuple[str, str, SampleWalk]]:
     return out
 
 
-def trained_columns(network: Network, name: str) -> set[str]:
-    """Columns of a channel that were above 0 somewhere in training: those whose mean is above 0."""
-    means = network.x_mean[network.layout.x_channel(name)]
-    return {column for column, mean in zip(network.channels[name], means, strict=True) if mean > 0}
-
-
 def loop_distance(loop: RepeatedWalk, other: RepeatedWalk) -> float:
     """Mean distance (cm, over joints and poses) from each pose of `loop` to the nearest pose of `other`.
 
@@ -144,38 +132,20 @@ def loop_warnings(entries: Sequence[Mapping[str, Any]]) -> list[str]:
     return out
 
 
-def draw_frames(
-    renderer: BodyRenderer, skeleton: Skeleton, loop: RepeatedWalk, values: Array | None, size: int
-) -> list[NDArray[np.uint8]]:
-    """The pictures of a loop, of every FRAME_STEP-th frame. The character walks along z.
-
-    values: from 0 to 1, drawn as colours, see `BodyRenderer.draw`. size: pixels on each side.
+def draw_loop(renderer: BodyRenderer, loop: RepeatedWalk, values: Array | None, size: int) -> list[Picture]:
+    """The pictures of a loop. The character walks along z. values, size: see `BodyRenderer.draw`, `Camera`.
 
     The camera moves at constant speed. In each repetition it crosses a whole number of cells of the ground's
     grid, so that the ground repeats, too.
     """
-    walk, bones = loop.ahead(), body_mesh(skeleton).bones
-    turns, places = restore_bone_lengths(skeleton, walk.positions, walk.rotations)
-    count, length = len(places), float(np.linalg.norm(walk.travel))
-    # The length of the camera's way in a loop, divided by that of the character's.
-    camera_factor = max(1, round(length / GRID)) * GRID / max(length, 1e-9)
-    out = []
-    for f in range(0, count - count % FRAME_STEP, FRAME_STEP):
-        moved = np.array([0.0, 0.0, length * f / count * camera_factor])
-        camera = Camera(np.array([0.0, 82.0, 0.0]) + moved, size=size)  # about half the body's height
-        at = places[f, bones] - walk.travel * f / count + moved
-        out.append(renderer.draw(at, turns[f, bones], camera, values))
-    return out
-
-
-def save_loop(path: Path, pictures: list[NDArray[np.uint8]]) -> None:
-    """Write an animated WebP that repeats forever."""
-    images = [Image.fromarray(picture) for picture in pictures]
-    # Whole milliseconds, rounded so that they add up to the true duration.
-    durations = [
-        round(1000 * FRAME_STEP * (k + 1) / 60) - round(1000 * FRAME_STEP * k / 60)
-        for k in range(len(images))
-    ]
-    images[0].save(
-        path, save_all=True, append_images=images[1:], duration=durations, loop=0, quality=QUALITY, method=3
+    walk = loop.ahead()
+    count, length = len(walk.positions), float(np.linalg.norm(walk.travel))
+    # The camera's way in a frame, and how far it falls behind the character.
+    step = np.array([0.0, 0.0, max(1, round(length / GRID)) * GRID / count])
+    behind = np.arange(count)[:, None, None] * (step - walk.travel / count)
+    return renderer.film(
+        walk.positions + behind,
+        walk.rotations,
+        lambda f: Camera(np.array([0.0, 82.0, 0.0]) + f * step, size=size),  # about half the body's height
+        values,
     )

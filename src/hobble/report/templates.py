@@ -64,33 +64,19 @@ def render_page(template: str, for_scripts: Mapping[str, Any], bundle: str, **va
     )
 
 
-def drawn_by_script(shown: Any) -> dict[str, dict[str, Any]]:
+def drawn_by_script(sections: Iterable[PageSection]) -> dict[str, dict[str, Any]]:
     """The data of charts and long tables for the page's script: {"charts": name -> data, "tables": ...}.
 
-    shown: sections and other parts of a page, in any nesting of lists and mappings. The page itself has the
-    first rows of a table.
+    The page itself has the first rows of a table.
     """
-    found = list(_contents(shown))
+    contents = [part.content for section in sections for part in section.parts]
+    found = [one for content in contents for one in getattr(content, "charts", [content])]
     return {
         "charts": {one.name: one.spec() for one in found if isinstance(one, Chart)},
         "tables": {
             one.name: one.spec() for one in found if isinstance(one, Table) and len(one.rows) > one.first
         },
     }
-
-
-def _contents(shown: Any) -> Iterator[Chart | Table]:
-    """The charts and tables in any nesting of sections, lists and mappings."""
-    if isinstance(shown, PageSection):
-        shown = [part.content for part in shown.parts]
-    if isinstance(shown, Mapping):
-        shown = list(shown.values())
-    shown = getattr(shown, "charts", shown)  # of a group or a pair of charts
-    if isinstance(shown, Chart | Table):
-        yield shown
-    elif isinstance(shown, list | tuple):
-        for item in shown:
-            yield from _contents(item)
 
 
 def compressed(value: Any) -> str:
