@@ -71,8 +71,8 @@ def with_measured_use(jobs: Iterator[JobResources], run: Path) -> Iterator[JobRe
     """
     for job in jobs:
         benchmark = run / job.log.replace("/logs/", "/benchmarks/", 1).replace(".log", ".tsv")
-        if rows := read_benchmark(benchmark) if benchmark.is_file() else []:
-            used = rows[-1]
+        if benchmark.is_file():
+            used = read_benchmark(benchmark).iloc[-1].dropna()
             yield JobResources(
                 job.rule, job.log, job.requested_mb, job.requested_s, used.get("max_rss"), used["s"]
             )

@@ -1,41 +1,54 @@
+"""The summary of a run's costs: times of jobs, sizes of files, and what was left from earlier starts."""
+
 from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import pytest
 
+from hobble.core.errors import InputError
 from hobble.report.provenance import summarise_pipeline
 
-HEADER = "s\th:m:s\tmax_rss\tmax_vms\tmax_uss\tmax_pss\tio_in\tio_out\tmean_load\tcpu_time\n"
 
-
-def benchmark(path: Path, seconds: float, memory: str = "120.5") -> Path:
+def benchmark(path: Path, seconds: float, memory: str = "100.0") -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(f"{HEADER}{seconds}\t0:00:01\t{memory}\t1\t1\t1\t0\t0\t90.0\t{seconds / 2}\n")
-    return path
+    path.write_text(f"s\th:m:s\tmax_rss\tcpu_time\n{seconds}\t0:00:01\t{memory}\t{seconds / 2}\n")
 
 
-def test_jobs_times_and_bytes_are_added_up(tmp_path: Path) -> None:
-    folder = tmp_path / "benchmarks" / "motion"
+def stage(name: str, **places: Any) -> dict[str, Any]:
+    """The summary of one stage."""
+    paths = {key: [str(each) for each in value] for key, value in places.items()}
+    return summarise_pipeline("c", {name: paths})["stages"][0]
+
+
+def test_jobs_and_files_are_added_up_and_missing_ones_listed(tmp_path: Path) -> None:
+    folder, motion, one = tmp_path / "benchmarks", tmp_path / "motion", tmp_path / "one.json"
     benchmark(folder / "motion_clips" / "a.tsv", 2.0)
     benchmark(folder / "motion_clips" / "b.tsv", 3.0, memory="300.25")
     benchmark(folder / "motion_mirror.tsv", 0.5, memory="-")
-    (tmp_path / "motion").mkdir()
-    (tmp_path / "motion" / "a.npz").write_bytes(b"x" * 100)
-    (tmp_path / "motion" / ".a.npz.1.part").write_bytes(b"x" * 999)
-    one = tmp_path / "one.json"
+    motion.mkdir()
+    (motion / "a.npz").write_bytes(b"x" * 100)
+    (motion / ".a.npz.1.part").write_bytes(b"x" * 999)  # half-written
     one.write_bytes(b"12345")
-    stages = {"motion": {"benchmarks": [str(folder)], "files": [str(tmp_path / "motion"), str(one)]}}
-
+    nowhere = str(tmp_path / "nowhere")
+    stages = {
+        "motion": {"benchmarks": [str(folder)], "files": [str(motion), str(one)]},
+        "training": {"benchmarks": [nowhere], "files": [f"{nowhere}.npz"]},
+    }
     found = summarise_pipeline("c", stages)
-
-    (motion,) = found["stages"]
-    assert (motion["jobs"], motion["seconds"], motion["longest"]) == (3, 5.5, 3.0)
-    assert (motion["max_rss_mb"], motion["cpu_seconds"]) == (300.2, 2.75)
-    assert (motion["files"], motion["bytes"]) == (2, 105)
-    assert {r["rule"]: r["jobs"] for r in motion["rules"]} == {"motion_clips": 2, "motion_mirror": 1}
-    assert (found["total_seconds"], found["total_bytes"], found["missing"]) == (5.5, 105, [])
+    made, training = found["stages"]
+    assert (made["jobs"], made["seconds"], made["longest"]) == (3, 5.5, 3.0)
+    assert (made["max_rss_mb"], made["cpu_seconds"]) == (300.2, 2.75)
+    assert (made["files"], made["bytes"]) == (2, 105)
+    assert {r["rule"]: r["jobs"] for r in made["rules"]} == {"motion_clips": 2, "motion_mirror": 1}
+    assert (found["total_seconds"], found["total_bytes"]) == (5.5, 105)
+    assert found["missing"] == [nowhere, f"{nowhere}.npz"]
+    assert (training["jobs"], training["max_rss_mb"], training["longest"]) == (0, None, 0)
+    one.write_text("text\nof another kind\n")
+    with pytest.raises(InputError, match="not a Snakemake benchmark"):
+        stage("motion", benchmarks=[one.rename(tmp_path / "one.tsv")])
 
 
 @pytest.mark.parametrize(("seen", "took"), [(3.3, 733.6), (750.0, 750.0)])
@@ -44,22 +57,13 @@ def test_the_time_of_a_resumed_training_covers_all_its_calls(
 ) -> None:
     """Snakemake's benchmark has only the last call, which may have had nothing left to train."""
     benchmark(tmp_path / "benchmarks" / "training.tsv", seen)
-    benchmark(tmp_path / "other" / "accuracy.tsv", 10.0)
+    benchmark(tmp_path / "benchmarks" / "other.tsv", 10.0)
     (tmp_path / "network").mkdir()
-    (tmp_path / "network" / "history.csv").write_text(
-        "pass,section,samples,seconds,train_mse,held_out_mse\n1,1,9,12.5,.1,\n2,1,18,733.6,.1,\n"
-    )
-    stages = {
-        "training": {"benchmarks": [str(tmp_path / "benchmarks")], "files": [str(tmp_path / "network")]},
-        "evaluation": {"benchmarks": [str(tmp_path / "other")], "files": []},
-    }
-    found = summarise_pipeline("c", stages)
-    training, evaluation = found["stages"]
-    assert (training["seconds"], training["longest"], training["jobs"]) == (took, took, 1)
-    assert training["rules"][0]["seconds"] == took
-    assert training["cpu_seconds"] == seen / 2
-    assert evaluation["seconds"] == 10.0
-    assert found["total_seconds"] == took + 10.0
+    rows = "1,1,9,12.5,.1,\n2,1,18,733.6,.1,\n"
+    (tmp_path / "network" / "history.csv").write_text(f"pass,section,samples,seconds,train,held_out\n{rows}")
+    training = stage("training", benchmarks=[tmp_path / "benchmarks"], files=[tmp_path / "network"])
+    assert (training["seconds"], training["cpu_seconds"]) == (took + 10, (seen + 10) / 2)
+    assert {rule["rule"]: rule["seconds"] for rule in training["rules"]} == {"other": 10, "training": took}
 
 
 def test_times_of_clips_from_earlier_calls_are_counted(tmp_path: Path) -> None:
@@ -72,15 +76,6 @@ def test_times_of_clips_from_earlier_calls_are_counted(tmp_path: Path) -> None:
     for clip, seconds in (("a", 3.0), ("b", 1.5)):
         record = {"key": "x", "files": [1], "seconds": seconds}
         (made / f"motion/{clip}.npz.json").write_text(json.dumps(record))
-    places = {"benchmarks": [str(folder)], "files": [], "batches": ["00"], "made": [str(made)]}
-    (motion,) = summarise_pipeline("c", {"motion": places})["stages"]
+    motion = stage("motion", benchmarks=[folder], files=[], batches=["00"], made=[made])
     assert {rule["rule"]: rule["seconds"] for rule in motion["rules"]} == {"motion_clips": 4.5, "other": 1.0}
     assert (motion["jobs"], motion["seconds"]) == (2, 5.5)
-
-
-def test_missing_files_are_listed(tmp_path: Path) -> None:
-    nowhere = str(tmp_path / "nowhere")
-    found = summarise_pipeline("c", {"training": {"benchmarks": [nowhere], "files": [f"{nowhere}.npz"]}})
-    assert found["missing"] == [nowhere, f"{nowhere}.npz"]
-    assert found["stages"][0]["jobs"] == 0
-    assert found["stages"][0]["max_rss_mb"] is None

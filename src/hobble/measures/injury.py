@@ -19,31 +19,7 @@ from hobble.core.section import PositiveFloat, Section
 from hobble.measures.compare import ComparisonAddition, ConfigurationResults
 from hobble.measures.measure import Cost, Measure
 from hobble.measures.shown import STRIP_HEIGHT, STRIP_WIDTH, grouped, line, strip, strips, with_spoken_names
-from hobble.report.parts import (
-    Chart,
-    ChartGroup,
-    ChartPair,
-    Compared,
-    Hint,
-    PageSection,
-    Paragraph,
-    Records,
-    SectionPart,
-    Table,
-    Trace,
-    axis,
-    chart,
-    format_number,
-    hint,
-    line_trace,
-    marker_trace,
-    ordered_axis,
-    reference_line,
-    table,
-    told,
-    told_table,
-    words,
-)
+from hobble.report import parts
 from hobble.runtime.options import Runtime
 
 if TYPE_CHECKING:
@@ -92,20 +68,20 @@ PANELS: Mapping[str, tuple[str, str, Mapping[str, str]]] = {
 }
 
 
-def section(found: Json, material: ReportMaterial) -> PageSection:
+def section(found: Json, material: ReportMaterial) -> parts.PageSection:
     """The charts and tables of the response to injury. Empty for a network without severities."""
-    parts = _parts(found, material) if found.get("applies") else []
-    return PageSection("injury", parts, title="Injury response", order=20)
+    content = _parts(found, material) if found.get("applies") else []
+    return parts.PageSection("injury", content, title="Injury response", order=20)
 
 
-def _parts(found: Json, material: ReportMaterial) -> list[SectionPart]:
+def _parts(found: Json, material: ReportMaterial) -> list[parts.SectionPart]:
     skeleton, published = material.network["skeleton"], material.published["severities"]
     found = with_spoken_names(found, skeleton)
     rows, responses, jogs, sweep = (found[k] for k in ("rows", "responses", "into_a_jog", "second_sweep"))
     untrained = {r["link"] for r in responses if not r["trained"]}
 
-    def say(key: str, records: Records) -> Table:
-        return told_table(f"{material.name}-{key}", records, f"injury.{key.removeprefix('injury-')}")
+    def say(key: str, records: parts.Records) -> parts.Table:
+        return parts.told_table(f"{material.name}-{key}", records, f"injury.{key.removeprefix('injury-')}")
 
     flat = [
         r | {f"{way}_{key}": rho for way in ("spearman", "spearman_falling") for key, rho in r[way].items()}
@@ -113,17 +89,17 @@ def _parts(found: Json, material: ReportMaterial) -> list[SectionPart]:
     ]
     ranges = range_records([row for row in rows if row["link"] not in untrained], published["one_link"])
     return [
-        SectionPart(0, ChartPair([effect_chart(responses, *each) for each in EFFECTS])),
-        SectionPart(10, say("injury-responses", flat)),
-        SectionPart(15, strip_chart(found["strips"], skeleton)),
-        SectionPart(20, sweep_charts(rows, found["falling"], untrained) if rows else None),
-        SectionPart(25, say("injury-ranges", ranges), open=True, short=True),
-        SectionPart(42, second_sweep_chart(sweep, published)),
-        SectionPart(45, say("second-thresholds", found["second_thresholds"]), open=True, short=True),
-        SectionPart(51, say("second-sweep", sweep)),
-        SectionPart(60, ChartPair([divided_chart(found["divided"]), jog_chart(jogs, untrained)])),
-        SectionPart(65, say("into-a-jog", jogs)),
-        SectionPart(70, say("injury", rows)),
+        parts.SectionPart(0, parts.ChartPair([effect_chart(responses, *each) for each in EFFECTS])),
+        parts.SectionPart(10, say("injury-responses", flat)),
+        parts.SectionPart(15, strip_chart(found["strips"], skeleton)),
+        parts.SectionPart(20, sweep_charts(rows, found["falling"], untrained) if rows else None),
+        parts.SectionPart(25, say("injury-ranges", ranges), open=True, short=True),
+        parts.SectionPart(42, second_sweep_chart(sweep, published)),
+        parts.SectionPart(45, say("second-thresholds", found["second_thresholds"]), open=True, short=True),
+        parts.SectionPart(51, say("second-sweep", sweep)),
+        parts.SectionPart(60, parts.ChartPair([divided_chart(found["divided"]), jog_chart(jogs, untrained)])),
+        parts.SectionPart(65, say("into-a-jog", jogs)),
+        parts.SectionPart(70, say("injury", rows)),
     ]
 
 
@@ -137,7 +113,7 @@ def compared(all_measured: Sequence[ConfigurationResults], published: Json) -> C
     return ComparisonAddition(entries=entries)
 
 
-def compared_section(compared: Compared) -> PageSection:
+def compared_section(compared: parts.Compared) -> parts.PageSection:
     """A table with a row for each measure, and a column for each gait of each configuration with injuries.
 
     Empty if no configuration has a character that can be hurt.
@@ -149,7 +125,7 @@ def compared_section(compared: Compared) -> PageSection:
     }
     rows = [
         {"measure": label} | {column: summary.get(key) for column, summary in summaries.items()}
-        for key, label in told("injury.means")["rows"].items()
+        for key, label in parts.told("injury.means")["rows"].items()
     ]
     # The measurement `recognition` gives one share for each configuration. It is from walks, not from jogs.
     shares = {
@@ -158,18 +134,18 @@ def compared_section(compared: Compared) -> PageSection:
         if e.get("applies")
     }
     if shares:
-        rows.append({"measure": words("injury.recognised")} | {c: shares.get(c) for c in summaries})
-    means = table("compare-injury", rows, title=told("injury.means")["title"])
-    parts = [
-        SectionPart(0, Paragraph(words("injury.introduction"))),
-        SectionPart(10, means, open=True, short=True),
+        rows.append({"measure": parts.words("injury.recognised")} | {c: shares.get(c) for c in summaries})
+    means = parts.table("compare-injury", rows, title=parts.told("injury.means")["title"])
+    content = [
+        parts.SectionPart(0, parts.Paragraph(parts.words("injury.introduction"))),
+        parts.SectionPart(10, means, open=True, short=True),
     ]
-    return PageSection("injury", parts if summaries else [], title="Injury response", order=20)
+    return parts.PageSection("injury", content if summaries else [], title="Injury response", order=20)
 
 
-def strip_chart(found: Records, skeleton: Json) -> Chart:
+def strip_chart(found: parts.Records, skeleton: Json) -> parts.Chart:
     """Poses at rising severity, from the side and from the front: Figures 3 and 4 of Ferre et al. (2019)."""
-    options: dict[str, list[Trace]] = {}
+    options: dict[str, list[parts.Trace]] = {}
     for one in found:
         first = f"{one['first']} at {one['first_severity']:g}, and " if one["first"] else ""
         poses, severities = np.array(one["poses"]), one["severities"]
@@ -181,7 +157,7 @@ def strip_chart(found: Records, skeleton: Json) -> Chart:
     return strips("strips", options, 520, "Injury", below="severity")
 
 
-def range_records(rows: Records, ranges: Json) -> list[dict[str, object]]:
+def range_records(rows: parts.Records, ranges: Json) -> list[dict[str, object]]:
     """Shares of the whole change of pose and speed that walks have at the ends of the published ranges.
 
     rows: of injury.json. ranges: `severities.one_link` of published.yaml.
@@ -202,12 +178,12 @@ def range_records(rows: Records, ranges: Json) -> list[dict[str, object]]:
 
 def _thresholds(severities: Collection[float]) -> list[dict]:
     """Dotted vertical lines."""
-    return [shape for at in severities for shape in reference_line(at, "")["shapes"]]
+    return [shape for at in severities for shape in parts.reference_line(at, "")["shapes"]]
 
 
-def second_sweep_chart(rows: Records, published: Json) -> Chart:
+def second_sweep_chart(rows: parts.Records, published: Json) -> parts.Chart:
     """A second injury swept over a first one at 5 and at 10, with lines at the published thresholds."""
-    options: dict[str, list[Trace]] = {}
+    options: dict[str, list[parts.Trace]] = {}
     layouts: dict[str, dict] = {}
     # Option -> unit, and key of a row -> label of its line.
     shows = {
@@ -222,16 +198,20 @@ def second_sweep_chart(rows: Records, published: Json) -> Chart:
                 line(label, of_pair, key, colour, mode="lines+markers")
                 for (key, label), colour in zip(lines.items(), COLOURS, strict=False)
             ]
-            layouts[option] = {"shapes": thresholds, "yaxis": axis(unit)}
+            layouts[option] = {"shapes": thresholds, "yaxis": parts.axis(unit)}
         for one, colour in (("first", "@muted"), ("second", "@faint")):
             options[option].append(
                 line(f"only the {one}", of_pair, f"speed_of_{one}", colour, dash="dot", width=1.4)
             )
-    layout = {"xaxis": axis("severity of the second injury", dtick=1), "yaxis": axis("cm")}
-    return chart("second-sweep", layout=layout, choose="Injuries", options=options, option_layouts=layouts)
+    layout = {"xaxis": parts.axis("severity of the second injury", dtick=1), "yaxis": parts.axis("cm")}
+    return parts.chart(
+        "second-sweep", layout=layout, choose="Injuries", options=options, option_layouts=layouts
+    )
 
 
-def sweep_charts(rows: Records, falling: Records = (), untrained: Collection[str] = ()) -> ChartGroup:
+def sweep_charts(
+    rows: parts.Records, falling: parts.Records = (), untrained: Collection[str] = ()
+) -> parts.ChartGroup:
     """A small chart of each measure over severity, for a chosen gait and link.
 
     rows, falling: the rows of injury.json with rising and with falling severity. Lines of falling severity
@@ -240,7 +220,7 @@ def sweep_charts(rows: Records, falling: Records = (), untrained: Collection[str
     rising = grouped(sorted(rows, key=lambda row: row["link"] in untrained), "link", "gait")
     healing, charts = grouped(falling, "link", "gait"), []
     for name, (title, unit, lines) in PANELS.items():
-        options: dict[str, list[Trace]] = {}
+        options: dict[str, list[parts.Trace]] = {}
         for (link, gait), of_link in rising.items():
             remark = f" ({UNTRAINED})" if link in untrained else ""
             traces = options.setdefault(f"{link}, {gait}{remark}", [])
@@ -251,17 +231,19 @@ def sweep_charts(rows: Records, falling: Records = (), untrained: Collection[str
                     dotted: dict[str, Any] = {"width": 1.3, "dash": "dot", "showlegend": False}
                     traces.append(line(f"{label}, healing", back, key, colour, **dotted))
         layout = {
-            "xaxis": axis("severity", dtick=2, range=[-0.3, 10.3]),
-            "yaxis": axis(unit, rangemode="normal" if name == "lean" else "tozero"),
+            "xaxis": parts.axis("severity", dtick=2, range=[-0.3, 10.3]),
+            "yaxis": parts.axis(unit, rangemode="normal" if name == "lean" else "tozero"),
             "showlegend": len(lines) > 1,
             "shapes": _thresholds((3.5, 6.5)) if name in ("pose", "speed") else [],
         }
-        charts.append(Chart(f"sweep-{name}", title, "", layout=layout, height=230, options=options))
-    caption = words("sweeps.caption", "sweeps.falling", *(["sweeps.untrained"] if untrained else []))
-    return ChartGroup("sweeps", words("sweeps.title"), caption, charts, "Link and gait")
+        charts.append(parts.Chart(f"sweep-{name}", title, "", layout=layout, height=230, options=options))
+    caption = parts.words("sweeps.caption", "sweeps.falling", *(["sweeps.untrained"] if untrained else []))
+    return parts.ChartGroup("sweeps", parts.words("sweeps.title"), caption, charts, "Link and gait")
 
 
-def effect_chart(responses: Records, name: str, key: str, label: str, least_range: float) -> Chart:
+def effect_chart(
+    responses: parts.Records, name: str, key: str, label: str, least_range: float
+) -> parts.Chart:
     """A chart of each link at severity 10, with a dot for each gait: one of EFFECTS.
 
     Links that were hurt in training are at the top.
@@ -276,22 +258,22 @@ def effect_chart(responses: Records, name: str, key: str, label: str, least_rang
             hover = {"hovertemplate": "%{y}: %{x:.2f}<extra>%{fullData.name}</extra>"}
             title = gait if hurt else f"{gait}, {UNTRAINED}"
             x, y = [r[key] for r in rows], [r["link"] for r in rows]
-            traces.append(marker_trace(title, x, y, marker, **hover))
+            traces.append(parts.marker_trace(title, x, y, marker, **hover))
     furthest = max((r[key] for r in known), default=0.0)
     layout = {
-        "xaxis": axis(label, range=[0, 1.08 * max(least_range, furthest)]),
-        "yaxis": ordered_axis(links, type="category"),
+        "xaxis": parts.axis(label, range=[0, 1.08 * max(least_range, furthest)]),
+        "yaxis": parts.ordered_axis(links, type="category"),
     }
     more = ["hollow"] if any(not r["trained"] for r in responses) else []
-    return chart(name, traces, layout, 150 + 21 * len(links), more=more)
+    return parts.chart(name, traces, layout, 150 + 21 * len(links), more=more)
 
 
-def divided_chart(rows: Records) -> Chart:
+def divided_chart(rows: parts.Records) -> parts.Chart:
     """How far the walk with one link hurt is from the healthy walk, with a line for each divisor.
 
     A menu selects the link, or a dot for each link. rows: `divided` of injury.json.
     """
-    options: dict[str, list[Trace]] = {}
+    options: dict[str, list[parts.Trace]] = {}
     smooth, dots = "smoothness against range", []
     for (scale, of_scale), colour in zip(grouped(rows, "scale").items(), COLOURS, strict=False):
         label, links = f"divided by {scale:g}", grouped(of_scale, "link")
@@ -303,21 +285,29 @@ def divided_chart(rows: Records) -> Chart:
             for key in ("from_healthy_cm", "largest_acceleration")
         )
         hover = {"text": [*links], "hovertemplate": "%{text}: %{x:.1f} cm, %{y:.2f}<extra></extra>"}
-        dots.append(marker_trace(label, x, y, {"size": 9, "color": colour}, **hover))
+        dots.append(parts.marker_trace(label, x, y, {"size": 9, "color": colour}, **hover))
     options |= {smooth: dots} if dots else {}
-    axes = {"xaxis": axis("largest change of the pose, cm"), "yaxis": axis("largest acceleration, cm/frame²")}
-    layout = {"xaxis": axis("severity", dtick=2), "yaxis": axis("cm per joint", rangemode="tozero")}
-    return chart("divided", layout=layout, choose="Link", options=options, option_layouts={smooth: axes})
+    axes = {
+        "xaxis": parts.axis("largest change of the pose, cm"),
+        "yaxis": parts.axis("largest acceleration, cm/frame²"),
+    }
+    layout = {
+        "xaxis": parts.axis("severity", dtick=2),
+        "yaxis": parts.axis("cm per joint", rangemode="tozero"),
+    }
+    return parts.chart(
+        "divided", layout=layout, choose="Link", options=options, option_layouts={smooth: axes}
+    )
 
 
-def jog_chart(rows: Records, untrained: Collection[str] = ()) -> Chart:
+def jog_chart(rows: parts.Records, untrained: Collection[str] = ()) -> parts.Chart:
     """A jog after a hurt walk: how much of the injury shows, and the speed, with a line for each link.
 
     rows: `into_a_jog` of injury.json. untrained: links that were never hurt in training. They share one line.
     """
     of_links = grouped([row for row in rows if row["link"]], "link")
     hurt = [link for link in of_links if link not in untrained]
-    options: dict[str, list[Trace]] = {}
+    options: dict[str, list[parts.Trace]] = {}
     for option, key in (("pose, cm per joint", "jog_from_healthy_cm"), ("speed, cm/s", "jog_speed")):
         traces = []
         for i, link in enumerate(hurt):
@@ -326,19 +316,19 @@ def jog_chart(rows: Records, untrained: Collection[str] = ()) -> Chart:
         without = [row[key] for row in rows if row["link"] in untrained and row.get(key) is not None]
         if without:
             mean = [float(np.mean(without))] * 2
-            traces.append(line_trace(UNTRAINED, [1, 10], mean, "@muted", dash="dot", width=1.4))
+            traces.append(parts.line_trace(UNTRAINED, [1, 10], mean, "@muted", dash="dot", width=1.4))
         options |= {option: traces} if traces else {}
     layout = {
-        "xaxis": axis("severity", dtick=1),
+        "xaxis": parts.axis("severity", dtick=1),
         "yaxis": {"rangemode": "tozero"},
         "showlegend": True,
         "shapes": _thresholds((3.5, 7.5)),
     }
     more = ["untrained"] if untrained else []
-    return chart("into-a-jog", layout=layout, height=420, choose="Shown", options=options, more=more)
+    return parts.chart("into-a-jog", layout=layout, height=420, choose="Shown", options=options, more=more)
 
 
-def hints(found: Json, material: ReportMaterial) -> Iterator[Hint]:
+def hints(found: Json, material: ReportMaterial) -> Iterator[parts.Hint]:
     """Whether and how much each hurt link changes the walk, and whether the walk recovers.
 
     Only links that were hurt in training are judged. Their changes are compared with the drift of a healthy
@@ -358,15 +348,15 @@ def hints(found: Json, material: ReportMaterial) -> Iterator[Hint]:
 
     limit = drift("from_healthy_cm")
     if limit > 2:
-        yield hint("injury.drifts", cm=format_number(limit))
+        yield parts.hint("injury.drifts", cm=parts.format_number(limit))
     unchanged = [r["link"] for r in trained if r["from_healthy_cm"] < max(0.5, 2 * limit)]
     if unchanged:
-        yield hint("injury.unchanged", count=len(unchanged), of=len(trained), links=named(unchanged))
+        yield parts.hint("injury.unchanged", count=len(unchanged), of=len(trained), links=named(unchanged))
     at_end = max(2, 2 * drift("after_healing_cm"))
     sick = [r["link"] for r in trained if r["link"] not in unchanged and r["after_healing_cm"] > at_end]
     if sick:
-        yield hint("injury.lasting", links=named(sick))
+        yield parts.hint("injury.lasting", links=named(sick))
     if not unchanged:
-        low, high = (format_number(f(r["from_healthy_cm"] for r in trained)) for f in (min, max))
+        low, high = (parts.format_number(f(r["from_healthy_cm"] for r in trained)) for f in (min, max))
         cm = low if low == high else f"{low} to {high}"
-        yield hint("injury.changed", trained=len(trained), of=len(responses), cm=cm)
+        yield parts.hint("injury.changed", trained=len(trained), of=len(responses), cm=cm)

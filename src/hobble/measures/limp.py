@@ -16,21 +16,7 @@ from hobble.core.files import Json
 from hobble.core.section import PositiveFloat
 from hobble.measures.measure import Cost, Measure, SampleOptions, sample_sentence
 from hobble.measures.shown import STRIP_HEIGHT, STRIP_WIDTH, grouped, line, strip, strips, with_spoken_names
-from hobble.report.parts import (
-    Chart,
-    PageSection,
-    Paragraph,
-    Records,
-    SectionPart,
-    Table,
-    Trace,
-    axis,
-    chart,
-    format_number,
-    marker_trace,
-    told_table,
-    words,
-)
+from hobble.report import parts
 from hobble.runtime.options import Runtime
 
 if TYPE_CHECKING:
@@ -59,34 +45,34 @@ MOST_NAMED = 8  # a sentence lists the hurt links if there are at most this many
 COLOURS = {"hip": "@g1", "pelvis": "@g1", "thigh": "@g2", "shank": "@g3", "foot": "@g4", "back": "@g5"}
 
 
-def section(found: Json, material: ReportMaterial) -> PageSection:
+def section(found: Json, material: ReportMaterial) -> parts.PageSection:
     """The part of the section on injuries that shows limp.json.
 
     It says where the limps of the training data come from. It has the chart of sizes, and all tables.
     """
     if not found.get("applies"):
-        return PageSection("injury", [])
+        return parts.PageSection("injury", [])
     skeleton = material.network["skeleton"]
     found = with_spoken_names(found, skeleton)
 
-    def say(key: str, records: Records) -> Table:
-        return told_table(f"{material.name}-limp-{key}", records, f"limp.{key}")
+    def say(key: str, records: parts.Records) -> parts.Table:
+        return parts.told_table(f"{material.name}-limp-{key}", records, f"limp.{key}")
 
     exam = [{**row, "injury": _injury(row["hurt_links"])} for row in found["held_out_limps"]]
     captured = [{**row, "injury": _injury(row["hurt"])} for row in found["captured"]]
     sources = hurt_motion_in_words(found["hurt_seconds"]) + sample_sentence(found)
-    parts = [
-        SectionPart(1, Paragraph(sources)),
-        SectionPart(2, size_chart(found)),
-        SectionPart(2, gallery_chart(found, skeleton)),
-        SectionPart(3, Paragraph(words("limp.recognisers"))),
-        SectionPart(3, say("named", found["named"])),
-        SectionPart(4, say("exam", exam)),
-        SectionPart(5, say("together", found["named_together"])),
-        SectionPart(80, say("sizes", found["sizes"])),
-        SectionPart(81, say("captured", captured)),
+    content = [
+        parts.SectionPart(1, parts.Paragraph(sources)),
+        parts.SectionPart(2, size_chart(found)),
+        parts.SectionPart(2, gallery_chart(found, skeleton)),
+        parts.SectionPart(3, parts.Paragraph(parts.words("limp.recognisers"))),
+        parts.SectionPart(3, say("named", found["named"])),
+        parts.SectionPart(4, say("exam", exam)),
+        parts.SectionPart(5, say("together", found["named_together"])),
+        parts.SectionPart(80, say("sizes", found["sizes"])),
+        parts.SectionPart(81, say("captured", captured)),
     ]
-    return PageSection("injury", parts)
+    return parts.PageSection("injury", content)
 
 
 def _injury(hurt: Mapping[str, float]) -> str:
@@ -104,21 +90,21 @@ def hurt_motion_in_words(hurt_seconds: Mapping[str, Mapping[str, float]]) -> str
         if by_link := hurt_seconds[key]:
             names = f" ({', '.join(by_link)})" if len(by_link) <= MOST_NAMED else ""
             links = f"summed over {len(by_link)} links" if len(by_link) != 1 else "of one link"
-            seconds = format_number(sum(by_link.values()), 3)
+            seconds = parts.format_number(sum(by_link.values()), 3)
             sentences.append(f"Hurt motion in training, {origin}: {seconds} s, {links}{names}.")
     if any(len(by_link) > 1 for by_link in hurt_seconds.values()):
         sentences.append("A second in which two links hurt counts twice.")
     return " ".join(sentences) or "No link was hurt in training."
 
 
-def gallery_chart(found: Json, skeleton: Json) -> Chart | Paragraph:
+def gallery_chart(found: Json, skeleton: Json) -> parts.Chart | parts.Paragraph:
     """Captured limps above the character with the same injury and the healthy character, over a gait cycle.
 
     A menu chooses the limp, and whether it is seen from the side or from behind.
     """
     if not found["gallery"]:
-        return Paragraph(words("limp.no-gallery"))
-    options: dict[str, list[Trace]] = {}
+        return parts.Paragraph(parts.words("limp.no-gallery"))
+    options: dict[str, list[parts.Trace]] = {}
     for limp in found["gallery"]:
         hurt = _injury(limp["hurt"])
         rows = (  # from below
@@ -142,7 +128,7 @@ def gallery_chart(found: Json, skeleton: Json) -> Chart | Paragraph:
     return strips("limp-gallery", options, 560, "Captured limp")
 
 
-def size_chart(found: Json) -> Chart:
+def size_chart(found: Json) -> parts.Chart:
     """A chart of one effect over severity, with a line for each link, and the means over people.
 
     The effect is chosen in a menu.
@@ -156,11 +142,11 @@ def size_chart(found: Json) -> Chart:
         *("link", "part", "side"),
     )
 
-    def people(i: int, gait: str, mean: float, spread: float) -> Trace:
+    def people(i: int, gait: str, mean: float, spread: float) -> parts.Trace:
         x = [10.3 + 0.1 * i]  # side by side, to the right of severity 10
         bars = {"type": "data", "array": [spread], "visible": True}
         name = f"people, {gait.replace('_', ' ')}"
-        return marker_trace(name, x, [mean], {"color": "@muted", "size": 8}, error_y=bars)
+        return parts.marker_trace(name, x, [mean], {"color": "@muted", "size": 8}, error_y=bars)
 
     options = {
         found["effects"][effect]: [
@@ -178,5 +164,5 @@ def size_chart(found: Json) -> Chart:
         ]
         for effect in SHOWN_EFFECTS
     }
-    layout = {"xaxis": axis("severity", range=[2.5, 11]), "yaxis": axis("size")}
-    return chart("limp-sizes", layout=layout, height=560, choose="Effect", options=options)
+    layout = {"xaxis": parts.axis("severity", range=[2.5, 11]), "yaxis": parts.axis("size")}
+    return parts.chart("limp-sizes", layout=layout, height=560, choose="Effect", options=options)

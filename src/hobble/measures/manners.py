@@ -19,7 +19,7 @@ from hobble.channels.shown import shown_names
 from hobble.core.files import Json
 from hobble.measures.measure import Cost, Measure, SampleOptions, sample_sentence
 from hobble.measures.shown import chart
-from hobble.report.parts import Chart, PageSection, Paragraph, SectionPart, bar_trace, heatmap
+from hobble.report import parts
 from hobble.runtime.options import Runtime
 
 MEASURE = Measure(
@@ -50,23 +50,23 @@ BARS: tuple[tuple[Literal["captured", "generated", "generated_at_half"], str, st
 )
 
 
-def section(found: Json, material: ReportMaterial) -> PageSection:
+def section(found: Json, material: ReportMaterial) -> parts.PageSection:
     """For each channel, how often its manners are recognised, and how much they change the walk.
 
     Empty for a network without manners. found: the content of manners.json.
     """
     if not found.get("applies"):
-        return PageSection("manners", [])
-    parts, shown_name = [], shown_names(material.network["skeleton"])
+        return parts.PageSection("manners", [])
+    content, shown_name = [], shown_names(material.network["skeleton"])
     for i, result in enumerate(found["channels"]):
         charts = [together_chart(result, shown_name), *(effect_chart(result, effect) for effect in UNITS)]
         # The first argument of each part is its place in the section.
-        parts += [
-            SectionPart(10 * i, Paragraph(summarise_channel(result) + sample_sentence(found))),
-            *(SectionPart(10 * i + 1 + k, chart) for k, chart in enumerate(charts)),
+        content += [
+            parts.SectionPart(10 * i, parts.Paragraph(summarise_channel(result) + sample_sentence(found))),
+            *(parts.SectionPart(10 * i + 1 + k, chart) for k, chart in enumerate(charts)),
         ]
     title = " and ".join(result["title"] for result in found["channels"])
-    return PageSection("manners", parts, title=title, order=21)
+    return parts.PageSection("manners", content, title=title, order=21)
 
 
 def summarise_channel(result: Json) -> str:
@@ -85,7 +85,7 @@ def summarise_channel(result: Json) -> str:
     return text
 
 
-def together_chart(result: Json, shown_name: Callable[[str], str] = str) -> Chart | None:
+def together_chart(result: Json, shown_name: Callable[[str], str] = str) -> parts.Chart | None:
     """How often each manner is recognised while a column of another channel is at its highest value.
 
     shown_name: gives the text that the page shows for a column. None if the network has no other channel.
@@ -99,7 +99,7 @@ def together_chart(result: Json, shown_name: Callable[[str], str] = str) -> Char
     shares = {(row["manner"], row["column"]): row["share"] for row in rows}
     # Plotly puts the first row at the bottom.
     cells = [[shares[m, c] for m in manners] for c in columns[::-1]]
-    trace = heatmap(manners, labels[::-1], cells, "%{x} with %{y}: %{z:.0%}<extra></extra>", zmax=1)
+    trace = parts.heatmap(manners, labels[::-1], cells, "%{x} with %{y}: %{z:.0%}<extra></extra>", zmax=1)
     # Numbers of windows with a manner: those that are named right, and all.
     right = sum((row["share"] or 0.0) * row["windows"] for row in rows if row["manner"] != NONE)
     total = sum(row["windows"] for row in rows if row["manner"] != NONE)
@@ -112,16 +112,17 @@ def together_chart(result: Json, shown_name: Callable[[str], str] = str) -> Char
     return chart(name, [trace], layout, height, entry="manners-together", title=title, right=right)
 
 
-def effect_chart(result: Json, effect: str) -> Chart:
+def effect_chart(result: Json, effect: str) -> parts.Chart:
     """How much each manner changes one of the quantities in UNITS, in captured and in generated walks."""
     rows = [row for row in result["effects"] if row["effect"] == effect]
     manners, hover = [row["manner"] for row in rows], "%{x}: %{y:.2f}<extra>%{fullData.name}</extra>"
     traces = [
-        bar_trace(label, manners, [row[key] for row in rows], colour, hover) for key, label, colour in BARS
+        parts.bar_trace(label, manners, [row[key] for row in rows], colour, hover)
+        for key, label, colour in BARS
     ]
     words = f"Change of {effect} ({UNITS[effect]}) from the neutral walk."
     title = effect.capitalize()
-    return Chart(
+    return parts.Chart(
         f"{result['channel']}-{effect}", title, words, traces, {"yaxis": {"title": UNITS[effect]}}, 260
     )
 

@@ -9,7 +9,7 @@ from hobble.core.files import Json
 from hobble.measures.compare import ComparisonAddition, ConfigurationResults, published_row
 from hobble.measures.measure import Cost, Measure, Row, SampleOptions, sample_sentence
 from hobble.measures.shown import chart
-from hobble.report.parts import Chart, PageSection, SectionPart, heatmap
+from hobble.report import parts
 from hobble.runtime.options import Runtime
 
 if TYPE_CHECKING:
@@ -31,12 +31,12 @@ NAMED_AXES = {
 }
 
 
-def section(found: Json, material: ReportMaterial) -> PageSection:
+def section(found: Json, material: ReportMaterial) -> parts.PageSection:
     """The part of the section on injuries that shows recognition.json, which is `found`."""
-    return PageSection("injury", [SectionPart(30, recognition_chart(found))])
+    return parts.PageSection("injury", [parts.SectionPart(30, recognition_chart(found))])
 
 
-def recognition_chart(found: Json) -> Chart | None:
+def recognition_chart(found: Json) -> parts.Chart | None:
     """A chart of one confusion table of the classifier, chosen in a menu. None if nothing was measured.
 
     found: the content of recognition.json. In a confusion table, a row is what hurts, a column is what was
@@ -84,7 +84,7 @@ def _confusion(table: Json) -> Any:
     totals = [max(1, sum(row.values())) for row in confusion.values()]
     shares = [[n / total or None for n in row] for row, total in zip(counts, totals, strict=True)]
     hover = "%{y} hurts, %{x} recognised: %{customdata} (%{z:.0%})<extra></extra>"
-    return heatmap(answers, list(confusion), shares, hover, customdata=counts, zmax=1)
+    return parts.heatmap(answers, list(confusion), shares, hover, customdata=counts, zmax=1)
 
 
 def compared(all_measured: Sequence[ConfigurationResults], published: Json) -> ComparisonAddition:

@@ -6,32 +6,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from hobble.figure.pack import packed_body
+from hobble.report import parts
 from hobble.report.character import body_channel, skeleton_of
-from hobble.report.parts import (
-    Chart,
-    ChartPair,
-    Column,
-    Compared,
-    ComparedValue,
-    PageSection,
-    Paragraph,
-    SectionPart,
-    Table,
-    TemplatePart,
-    Trace,
-    axis,
-    chart,
-    citation,
-    configuration_colours,
-    configuration_names,
-    format_bytes,
-    format_duration,
-    format_number,
-    join_sections,
-    line_trace,
-    log_axis,
-    words,
-)
 from hobble.report.sections import own_section, passes_axis, published_curve, stage_charts
 from hobble.report.templates import compared_by, compressed, drawn_by_script, render_page
 
@@ -56,23 +32,26 @@ def render_comparison(
     values = [value for each in compared_by(measures, "compared_values", compared) for value in each]
     stages = {
         name: [stage for stage in compared["stages"] if stage["configuration"] == name]
-        for name in configuration_names(compared)
+        for name in parts.configuration_names(compared)
     }
-    costs = stage_charts(stages, "compare", words("stages.once"), configuration_colours(compared))
-    overview = PageSection("summary", [SectionPart(0, configuration_table(compared, values))])
-    sections = join_sections(
+    costs = stage_charts(stages, "compare", parts.words("stages.once"), parts.configuration_colours(compared))
+    overview = parts.PageSection("summary", [parts.SectionPart(0, configuration_table(compared, values))])
+    sections = parts.join_sections(
         [
             *compared_by(measures, "compared_section", compared),
             own_section("training", training_curves(compared)),
-            own_section("costs", ChartPair(costs)),
+            own_section("costs", parts.ChartPair(costs)),
             own_section(
-                "published", Paragraph(words("published.read")), published_table(compared), long=True
+                "published",
+                parts.Paragraph(parts.words("published.read")),
+                published_table(compared),
+                long=True,
             ),
-            own_section("origin", TemplatePart("origin.html.j2")),
+            own_section("origin", parts.TemplatePart("origin.html.j2")),
         ]
     )
     playables = {name: spec for name, spec in (playables or {}).items() if spec}
-    names = configuration_names(compared)
+    names = parts.configuration_names(compared)
     drawn = drawn_by_script([overview, *sections])
     # Configurations with the same skeleton share a body. Its key is in the entry `body` of a character.
     bodies = {spec["body"]: packed_body(skeleton_of(spec)) for spec in playables.values()}
@@ -122,35 +101,39 @@ def select_fitting(
 X_AXES = {"pass": "passes", "seconds": "seconds of training", "samples": "samples seen"}
 
 
-def training_curves(compared: Compared) -> Chart | None:
+def training_curves(compared: parts.Compared) -> parts.Chart | None:
     """Training and held-out error of all configurations. A menu selects the horizontal axis, see X_AXES."""
-    options: dict[str, list[Trace]] = {}
+    options: dict[str, list[parts.Trace]] = {}
     values: list[float | None] = []
-    colours = configuration_colours(compared)
+    colours = parts.configuration_colours(compared)
     for key, label in X_AXES.items():
         for entry in compared["training"]:
             name, traces = entry["configuration"], options.setdefault(label, [])
             x = passes_axis(entry) if key == "pass" else entry.get(key, [])
             train, held_out = entry.get("train_mse", []), entry.get("held_out_mse", [])
             if any(v is not None for v in held_out):
-                traces.append(line_trace(f"{name}, held out", x, held_out, colours[name]))
+                traces.append(parts.line_trace(f"{name}, held out", x, held_out, colours[name]))
                 values += held_out
-            traces.append(line_trace(f"{name}, training", x, train, colours[name], width=1.2, dash="dot"))
+            traces.append(
+                parts.line_trace(f"{name}, training", x, train, colours[name], width=1.2, dash="dot")
+            )
             values += train
             passes, published = published_curve(compared["published"], name)
             if key == "pass" and passes:
                 whose = f"{name}, published"
-                traces.append(line_trace(whose, passes, published, colours[name], width=1.2, dash="dashdot"))
+                traces.append(
+                    parts.line_trace(whose, passes, published, colours[name], width=1.2, dash="dashdot")
+                )
                 values += published
     if not options:
         return None
-    return chart(
+    return parts.chart(
         "compare-training",
-        layout={"yaxis": log_axis("mean squared error", values)},
+        layout={"yaxis": parts.log_axis("mean squared error", values)},
         height=420,
         choose="Horizontal axis",
         options=options,
-        option_layouts={label: {"xaxis": {**axis(label), "rangemode": "tozero"}} for label in options},
+        option_layouts={label: {"xaxis": {**parts.axis(label), "rangemode": "tozero"}} for label in options},
     )
 
 
@@ -163,7 +146,7 @@ LONGER_NAMES = {
 }
 
 
-def configuration_table(compared: Compared, measured: Sequence[ComparedValue]) -> Table:
+def configuration_table(compared: parts.Compared, measured: Sequence[parts.ComparedValue]) -> parts.Table:
     """A row for each configuration: its settings, and the columns `measured` of its measurements."""
     entries = {entry["configuration"]: entry for entry in compared["configurations"]}
 
@@ -174,32 +157,32 @@ def configuration_table(compared: Compared, measured: Sequence[ComparedValue]) -
     channel_names = {name: ", ".join(channels) or "none" for name, channels in by_name("channels").items()}
     columns = [
         *measured,
-        ComparedValue(50, Column("channels"), channel_names),
-        ComparedValue(60, Column("data set"), by_name("dataset")),
-        ComparedValue(80, Column.count("layers"), by_name("hidden_layers")),
-        ComparedValue(90, Column.count("units"), by_name("units")),
-        ComparedValue(100, Column.number("passes"), by_name("passes")),
+        parts.ComparedValue(50, parts.Column("channels"), channel_names),
+        parts.ComparedValue(60, parts.Column("data set"), by_name("dataset")),
+        parts.ComparedValue(80, parts.Column.count("layers"), by_name("hidden_layers")),
+        parts.ComparedValue(90, parts.Column.count("units"), by_name("units")),
+        parts.ComparedValue(100, parts.Column.number("passes"), by_name("passes")),
     ]
     columns.sort(key=lambda column: column.order)
     rows = [[name, *(column.values.get(name) for column in columns)] for name in entries]
-    heads = [Column("configuration"), *(column.column for column in columns)]
-    return Table("compare-configurations", heads, rows, "The configurations")
+    heads = [parts.Column("configuration"), *(column.column for column in columns)]
+    return parts.Table("compare-configurations", heads, rows, "The configurations")
 
 
-def published_table(compared: Compared) -> Table:
+def published_table(compared: parts.Compared) -> parts.Table:
     """The published results next to ours. Results that we did not measure come last."""
     sources = compared["published"]["sources"]
-    formats = {"bytes": format_bytes, "s": format_duration}
+    formats = {"bytes": parts.format_bytes, "s": parts.format_duration}
     rows = []
     published = (*compared["against_published"], *compared["milliseconds"]["against_published"])
     for row in sorted(published, key=lambda row: row["ours"] is None):
-        as_text = formats.get(row["unit"], lambda value: format_number(value, 3))
+        as_text = formats.get(row["unit"], lambda value: parts.format_number(value, 3))
         unit = f" {row['unit']}" if row["unit"] and row["unit"] not in formats else ""
         texts = [
             "" if row[key] is None else f"{as_text(float(row[key]))}{unit}" for key in ("published", "ours")
         ]
         measure = LONGER_NAMES.get(row["measure"], row["measure"])
         measure += ", mean" if row["unit"] == "ms" and not measure.startswith("standard") else ""
-        rows.append([measure, row["configuration"], *texts, citation(row, sources)])
-    heads = [Column(label) for label in ("measure", "configuration", "published", "ours", "source")]
-    return Table("compare-published", heads, rows, "Comparison with published results")
+        rows.append([measure, row["configuration"], *texts, parts.citation(row, sources)])
+    heads = [parts.Column(label) for label in ("measure", "configuration", "published", "ours", "source")]
+    return parts.Table("compare-published", heads, rows, "Comparison with published results")

@@ -12,19 +12,10 @@ from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 from hobble.figure.mesh import mesh_key
 from hobble.figure.pack import packed_body
+from hobble.report import parts
 from hobble.report import sections as own
 from hobble.report.character import body_channel, opening_channel, opening_slider
 from hobble.report.gather import ReportMaterial
-from hobble.report.parts import (
-    Hint,
-    KeyFigure,
-    format_bytes,
-    format_duration,
-    format_number,
-    hint,
-    join_sections,
-    json_data,
-)
 from hobble.report.recorded_motion import ground_pictures
 from hobble.report.templates import drawn_by_script, measured_by, render_page
 
@@ -53,7 +44,7 @@ def render_report(
     terrain = own.some_files(material.terrain_files, own.MOST_SHOWN)
     # Seconds of data at each speed, turning speed and channel value.
     counted = own.seconds_of_data(material.row_files, material.splits)
-    sections = join_sections(
+    sections = parts.join_sections(
         [*measured_by(material, "section"), *own.own_sections(material, counted, terrain)]
     )
     playable, compared = playable or {}, captured_and_predicted or {}
@@ -87,7 +78,9 @@ def render_report(
         playable=for_scripts["playable"],
         captured_and_predicted=[clip["name"] for clip in compared.get("clips", ())],
         grounds=[picture["name"] for picture in grounds["pictures"]],
-        configuration=yaml.safe_dump(json_data(dict(material.resolved)), sort_keys=False, allow_unicode=True),
+        configuration=yaml.safe_dump(
+            parts.json_data(dict(material.resolved)), sort_keys=False, allow_unicode=True
+        ),
     )
 
 
@@ -123,26 +116,26 @@ def lead_text(material: ReportMaterial) -> str:
     return f"{text}. All clips together have {frames:,} frames at 60\u00a0Hz."
 
 
-def key_figures(material: ReportMaterial) -> list[KeyFigure]:
+def key_figures(material: ReportMaterial) -> list[parts.KeyFigure]:
     """The numbers at the top of the page, most important first."""
     figures = [figure for shown in measured_by(material, "figures") for figure in shown]
     seconds = sum(report.get("seconds", 0) for report in material.motion)
     if seconds:
         note = f"{len(material.motion)} clips, {_held_out_count(material)} of them held out"
-        value, _, unit = format_duration(seconds).partition(" ")
-        figures.append(KeyFigure("Motion data", value, unit, note, order=30))
+        value, _, unit = parts.format_duration(seconds).partition(" ")
+        figures.append(parts.KeyFigure("Motion data", value, unit, note, order=30))
     figures.append(_network_figure(material.network))
     if total := material.pipeline.get("total_seconds"):
-        value, _, unit = format_duration(total).partition(" ")
+        value, _, unit = parts.format_duration(total).partition(" ")
         note = (
             "sum over all jobs, from clips to measurements; jobs can run in parallel, so the run can be "
-            f"shorter; {format_bytes(material.pipeline.get('total_bytes'))} written"
+            f"shorter; {parts.format_bytes(material.pipeline.get('total_bytes'))} written"
         )
-        figures.append(KeyFigure("Whole pipeline", value, unit, note, order=50))
+        figures.append(parts.KeyFigure("Whole pipeline", value, unit, note, order=50))
     return sorted(figures, key=lambda figure: figure.order)
 
 
-def _network_figure(network: Mapping[str, Any]) -> KeyFigure:
+def _network_figure(network: Mapping[str, Any]) -> parts.KeyFigure:
     """Number of parameters, layers and size on disk. network: from `gather.describe_network`."""
     # A PFNN has a set of weights at each control point, and `parameters` counts one of these sets. For other
     # networks it counts all parameters. Motion matching has no layers, so its `sizes` are empty.
@@ -150,27 +143,29 @@ def _network_figure(network: Mapping[str, Any]) -> KeyFigure:
     if network["sizes"]:
         which = " at each control point" if "control points" in network["described"] else ""
         note = f"parameters{which}; layers of {'–'.join(map(str, network['sizes']))}"
-    note += f"; {format_bytes(network['bytes'])} on disk"
-    return KeyFigure("Network", format_number(network["parameters"] / 1e6, 3), "M", note, order=40)
+    note += f"; {parts.format_bytes(network['bytes'])} on disk"
+    return parts.KeyFigure(
+        "Network", parts.format_number(network["parameters"] / 1e6, 3), "M", note, order=40
+    )
 
 
-def hints(material: ReportMaterial, both: Mapping[str, Array] | None = None) -> list[Hint]:
+def hints(material: ReportMaterial, both: Mapping[str, Array] | None = None) -> list[parts.Hint]:
     """Warnings and advice in the order in which to follow them, then what is good, then plain facts.
 
     both: of `sections.seconds_of_data`, if the seconds were counted.
     """
     found = [
-        *(hint for shown in measured_by(material, "hints") for hint in shown),
+        *(each for shown in measured_by(material, "hints") for each in shown),
         *_training_hints(material),
         *_gait_hints(material),
         *_turning_hints(both or {}),
         *_repair_hints(material),
         *_cost_hints(material),
     ]
-    return sorted(found, key=lambda hint: (KIND_ORDER.index(hint.kind), hint.order))
+    return sorted(found, key=lambda each: (KIND_ORDER.index(each.kind), each.order))
 
 
-def _training_hints(material: ReportMaterial) -> Iterator[Hint]:
+def _training_hints(material: ReportMaterial) -> Iterator[parts.Hint]:
     """Whether the held-out error rises, still falls, or has stopped falling."""
     curve = zip(material.history.get("pass", ()), material.history.get("held_out_mse", ()), strict=False)
     points = [(p, error) for p, error in curve if p is not None and error is not None]
@@ -181,28 +176,32 @@ def _training_hints(material: ReportMaterial) -> Iterator[Hint]:
     means = {p: errors[passes == p].mean() for p in dict.fromkeys(passes)}
     best = min(means, key=lambda p: means[p])
     if means[passes[-1]] > 1.05 * means[best]:
-        yield hint("hints.lowest", best=f"{best:.0f}")
+        yield parts.hint("hints.lowest", best=f"{best:.0f}")
     # With another schedule, the error fell because the learning rate fell. That does not show whether more
     # passes would help.
     elif _training_options(material).get("schedule", "constant") == "constant":
         quarter = max(1, len(errors) // 4)
         fall = 1 - errors[-quarter:].mean() / errors[-2 * quarter : -quarter].mean()
-        yield hint("hints.falling", percent=f"{100 * fall:.0f}") if fall > 0.03 else hint("hints.flat")
+        yield (
+            parts.hint("hints.falling", percent=f"{100 * fall:.0f}")
+            if fall > 0.03
+            else parts.hint("hints.flat")
+        )
 
 
-def _gait_hints(material: ReportMaterial) -> Iterator[Hint]:
+def _gait_hints(material: ReportMaterial) -> Iterator[parts.Hint]:
     """Gaits of which there is little data or none."""
     train, held_out = own.gait_seconds(material).values()
     totals = {gait: train[gait] + held_out[gait] for gait in train}
     little = LITTLE_OF_A_GAIT * sum(totals.values())
     if little and not totals["stand"]:
-        yield hint("hints.standing")
+        yield parts.hint("hints.standing")
     scarce = sorted(g for g, seconds in totals.items() if 0 < seconds < little and g not in ("jump", "bump"))
     if scarce:
-        yield hint("hints.scarce", gaits=" and ".join(scarce), each=" each" if len(scarce) > 1 else "")
+        yield parts.hint("hints.scarce", gaits=" and ".join(scarce), each=" each" if len(scarce) > 1 else "")
 
 
-def _turning_hints(both: Mapping[str, Array]) -> Iterator[Hint]:
+def _turning_hints(both: Mapping[str, Array]) -> Iterator[parts.Hint]:
     """A warning if hardly anybody turns. both: of `sections.seconds_of_data`."""
     seconds = np.sum([of_split.sum(axis=1) for of_split in both.values()], axis=0)
     if not np.any(seconds):
@@ -210,23 +209,23 @@ def _turning_hints(both: Mapping[str, Array]) -> Iterator[Hint]:
     middles = (own.TURN_EDGES[:-1] + own.TURN_EDGES[1:]) / 2  # of the bins, degrees a second
     share = float(np.sum(seconds[np.abs(middles) > TURNING]) / np.sum(seconds))
     if share < LITTLE_TURNING:
-        yield hint("hints.turning", percent=f"{100 * share:.1f}", turning=f"{TURNING:.0f}")
+        yield parts.hint("hints.turning", percent=f"{100 * share:.1f}", turning=f"{TURNING:.0f}")
 
 
-def _repair_hints(material: ReportMaterial) -> Iterator[Hint]:
+def _repair_hints(material: ReportMaterial) -> Iterator[parts.Hint]:
     """How many clips were repaired or have warnings."""
     reports = [*material.labels, *material.channels]
     repaired = {report["clip"] for report in material.motion if report.get("repairs")}
     warned = {report["clip"] for report in reports if report.get("warnings")}
     if repaired or warned:
-        yield hint("hints.repaired", repaired=len(repaired), warned=len(warned))
+        yield parts.hint("hints.repaired", repaired=len(repaired), warned=len(warned))
 
 
-def _cost_hints(material: ReportMaterial) -> Iterator[Hint]:
+def _cost_hints(material: ReportMaterial) -> Iterator[parts.Hint]:
     """The stage that took more than half of the time, if any."""
     total = material.pipeline.get("total_seconds") or 0
     for stage in material.pipeline.get("stages") or ():
         if stage["seconds"] > 0.5 * total > 0:
             name = "training-time" if stage["stage"] == "training" else "stage-time"
             percent = f"{100 * stage['seconds'] / total:.0f}"
-            yield hint(f"hints.{name}", stage=stage["stage"], percent=percent)
+            yield parts.hint(f"hints.{name}", stage=stage["stage"], percent=percent)

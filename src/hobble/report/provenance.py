@@ -5,16 +5,16 @@ Time and memory are from Snakemake's benchmark files, disk space from the sizes 
 
 from __future__ import annotations
 
-import csv
 import json
 import os
 import platform
 import subprocess
-from collections import defaultdict
-from collections.abc import Container, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from importlib import metadata
 from pathlib import Path
 from typing import Any
+
+import pandas
 
 from hobble.core.errors import InputError
 from hobble.core.files import read_json, read_numbers
@@ -23,6 +23,7 @@ from hobble.database.chunks import FILE as MANIFEST
 from hobble.database.chunks import Manifest, database_sizes
 
 WEB = Path(__file__).parent / "web"  # the page's scripts
+MEASURED = ("s", "max_rss", "cpu_time")  # columns of a benchmark that are read
 # The Python packages whose versions are reported.
 PACKAGES = ("hobble", "torch", "numpy", "scipy", "numba", "snakemake", "pydantic", "jinja2")
 
@@ -100,21 +101,11 @@ def summarise_pipeline(
     missing: list[str] = []
     entries: list[dict[str, Any]] = []
     for stage, paths in stages.items():
-        clip_seconds = {
-            Path(folder).name: _recorded_seconds(Path(folder)) for folder in paths.get("made", ())
-        }
-        by_rule = _read_jobs(
-            paths.get("benchmarks", ()), missing, clip_seconds, set(paths.get("batches", ()))
-        )
-        for row in by_rule.get("training", ()):
-            row["s"] = max(row.get("s", 0.0), _training_seconds(paths.get("files", ())))
-        for rule, seconds in clip_seconds.items():
-            _scale_times(by_rule[rule], seconds)
-        file_sizes = _file_sizes(paths.get("files", ()), missing)
-        total = _total_of_jobs([row for rows in by_rule.values() for row in rows])
-        rules = [{"rule": rule, **_total_of_jobs(rows)} for rule, rows in sorted(by_rule.items()) if rows]
-        sizes = {"files": len(file_sizes), "bytes": sum(file_sizes)}
-        entries.append({"stage": stage, **total, **sizes, "rules": rules})
+        jobs = read_jobs(paths, missing)
+        files = [path.stat().st_size for _, path in _files_in(paths.get("files", ()), "*", missing)]
+        rules = [{"rule": rule, **totals_of_jobs(of_rule)} for rule, of_rule in jobs.groupby("rule")]
+        sizes = {"files": len(files), "bytes": sum(files)}
+        entries.append({"stage": stage, **totals_of_jobs(jobs), **sizes, "rules": rules})
     databases = [Path(p) for p in stages.get("database", {}).get("files", ()) if Path(p, MANIFEST).is_file()]
     return {
         "configuration": configuration,
@@ -128,31 +119,42 @@ def summarise_pipeline(
     }
 
 
-def _recorded_seconds(folder: Path) -> float:
-    """How many seconds it took to make the clips of a rule, from the records in its folder."""
-    return sum(float(read_json(path)["seconds"]) for path in folder.rglob("*.json"))
+def read_jobs(paths: Mapping[str, Iterable[str]], missing: list[str]) -> pandas.DataFrame:
+    """A row for each job of a stage, with its `rule` and the columns of its benchmark, such as `s`.
 
-
-def read_benchmark(path: str | Path) -> list[dict[str, float]]:
-    """The rows of a Snakemake benchmark file: column -> value. There is a row for each run of the job.
-
-    Values that were not measured ("-", "NA") are left out. Raises InputError if the file is not a benchmark.
+    paths: a value of `summarise_pipeline`'s `stages`. Benchmarks are called <rule>.tsv or <rule>/<name>.tsv.
     """
-    with open(path, encoding="utf-8", newline="") as file:
-        rows = list(csv.DictReader(file, delimiter="\t"))
-    if rows and "s" not in rows[0]:
-        raise InputError(path, "not a Snakemake benchmark: it has no column `s`", fix="Delete it.")
-    return [
-        {key: number for key, text in row.items() if (number := _number(text)) is not None} for row in rows
-    ]
+    # Rule -> seconds that it took to make the clips of the rule, from the records in its folder.
+    made = {
+        Path(folder).name: sum(float(read_json(path)["seconds"]) for path in Path(folder).rglob("*.json"))
+        for folder in paths.get("made", ())
+    }
+    batches = set(paths.get("batches", ()))
+    benchmarks = [pandas.DataFrame(columns=["rule", *MEASURED])]
+    for root, path in _files_in(paths.get("benchmarks", ()), "*.tsv", missing):
+        rule = path.stem if path == root else path.relative_to(root).parts[0].removesuffix(".tsv")
+        if rule not in made or path.stem in batches:
+            benchmarks.append(read_benchmark(path).assign(rule=rule))
+    jobs = pandas.concat(benchmarks).astype(dict.fromkeys(MEASURED, float)).reset_index(drop=True)
+    training = jobs["rule"] == "training"
+    jobs.loc[training, "s"] = jobs["s"][training].clip(lower=_training_seconds(paths.get("files", ())))
+    for rule, seconds in made.items():
+        of_rule = jobs["rule"] == rule
+        measured = jobs["s"][of_rule].sum()
+        if measured > 0:  # too short if the jobs found clips that earlier starts of the workflow had made
+            jobs.loc[of_rule, "s"] *= max(1.0, seconds / measured)
+    return jobs
 
 
-def _number(text: str | None) -> float | None:
-    """The number in a cell, or None if the cell has none."""
+def read_benchmark(path: str | Path) -> pandas.DataFrame:
+    """A Snakemake benchmark file, with a row for each run of the job. Raises InputError if it is not one."""
     try:
-        return float(text) if text else None
-    except ValueError:
-        return None
+        rows = pandas.read_csv(path, sep="\t", na_values="-")
+    except (pandas.errors.ParserError, pandas.errors.EmptyDataError):
+        rows = pandas.DataFrame()
+    if "s" not in rows:
+        raise InputError(path, "not a Snakemake benchmark: it has no column `s`", fix="Delete it.")
+    return rows.reindex(columns=list(MEASURED))
 
 
 def _files_in(paths: Iterable[str], pattern: str, missing: list[str]) -> Iterator[tuple[Path, Path]]:
@@ -168,38 +170,6 @@ def _files_in(paths: Iterable[str], pattern: str, missing: list[str]) -> Iterato
                 yield root, file
 
 
-def _read_jobs(
-    paths: Iterable[str], missing: list[str], batch_rules: Container[str], batches: Container[str]
-) -> dict[str, list[dict[str, float]]]:
-    """Rule -> rows of every benchmark in `paths`, whose files are called <rule>.tsv or <rule>/<name>.tsv.
-
-    Of the rules in `batch_rules`, only benchmarks whose name is in `batches` are read.
-    """
-    jobs: dict[str, list[dict[str, float]]] = defaultdict(list)
-    for root, path in _files_in(paths, "*.tsv", missing):
-        rule = path.stem if path == root else path.relative_to(root).parts[0].removesuffix(".tsv")
-        if rule not in batch_rules or path.stem in batches:
-            jobs[rule] += read_benchmark(path)
-    return jobs
-
-
-def _scale_times(rows: list[dict[str, float]], seconds: float) -> None:
-    """Make the times of a rule's jobs longer, so that they add up to `seconds`, the time of all its clips.
-
-    The measured time is too short if the jobs found clips that earlier starts of the workflow had made. Times
-    are never made shorter.
-    """
-    measured_seconds = sum(row.get("s", 0.0) for row in rows)
-    if seconds > measured_seconds > 0:
-        for row in rows:
-            row["s"] = row.get("s", 0.0) * seconds / measured_seconds
-
-
-def _file_sizes(paths: Iterable[str], missing: list[str]) -> list[int]:
-    """Bytes of every file in `paths`."""
-    return [path.stat().st_size for _, path in _files_in(paths, "*", missing)]
-
-
 def _training_seconds(paths: Iterable[str]) -> float:
     """Seconds of training over all starts, from history.csv in one of the folders `paths`; 0 without it."""
     for path in (Path(folder) / "history.csv" for folder in paths):
@@ -208,14 +178,13 @@ def _training_seconds(paths: Iterable[str]) -> float:
     return 0.0
 
 
-def _total_of_jobs(rows: list[dict[str, float]]) -> dict[str, Any]:
-    """Totals over jobs. rows: from `read_benchmark`."""
-    seconds = [row.get("s", 0.0) for row in rows]
-    memory = [row["max_rss"] for row in rows if "max_rss" in row]
+def totals_of_jobs(jobs: pandas.DataFrame) -> dict[str, Any]:
+    """Totals over some rows of `read_jobs`."""
+    memory = jobs["max_rss"].max()
     return {
-        "jobs": len(rows),
-        "seconds": round(sum(seconds), 3),
-        "longest": round(max(seconds, default=0.0), 3),
-        "cpu_seconds": round(sum(row.get("cpu_time", 0.0) for row in rows), 3),
-        "max_rss_mb": round(max(memory), 1) if memory else None,
+        "jobs": len(jobs),
+        "seconds": round(float(jobs["s"].sum()), 3),
+        "longest": round(float(jobs["s"].max()), 3) if len(jobs) else 0.0,
+        "cpu_seconds": round(float(jobs["cpu_time"].sum()), 3),
+        "max_rss_mb": None if pandas.isna(memory) else round(float(memory), 1),
     }

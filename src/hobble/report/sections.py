@@ -16,32 +16,8 @@ from hobble.core.messages import group_messages
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 from hobble.motion.retarget import MOST_DIFFERENCE, most_different
+from hobble.report import parts
 from hobble.report.gather import ReportMaterial
-from hobble.report.parts import (
-    Chart,
-    ChartPair,
-    Content,
-    PageSection,
-    Paragraph,
-    SectionPart,
-    Table,
-    TemplatePart,
-    Trace,
-    axis,
-    bar_trace,
-    chart,
-    dot_trace,
-    format_bytes,
-    format_duration,
-    format_number,
-    line_trace,
-    log_axis,
-    log_range,
-    ordered_axis,
-    table,
-    told_table,
-    words,
-)
 from hobble.rows.clip_rows import ClipRows, cut_into_excerpts, load_excerpt, row_count, shuffle_key
 from hobble.rows.layout import GAITS
 
@@ -63,57 +39,57 @@ PATH_PARTS = {"position": "path position", "direction": "path direction"}
 SHOW: Mapping[str, Callable[[Any], str]] = {
     "split": lambda split: SPLITS[split][0],
     "sha256": lambda text: text[:12],
-    "bytes": format_bytes,
-    "published_bytes": format_bytes,
-    "seconds": format_duration,
-    "longest": format_duration,
-    "published_seconds": format_duration,
-    "max_rss_mb": lambda memory: f"{format_number(memory)} MB",
+    "bytes": parts.format_bytes,
+    "published_bytes": parts.format_bytes,
+    "seconds": parts.format_duration,
+    "longest": parts.format_duration,
+    "published_seconds": parts.format_duration,
+    "max_rss_mb": lambda memory: f"{parts.format_number(memory)} MB",
 }
 
 
 def own_sections(
     material: ReportMaterial, counted: Mapping[str, Any], terrain: Sequence[str]
-) -> Iterator[PageSection]:
+) -> Iterator[parts.PageSection]:
     """The sections of a report that no measurement has.
 
     counted: from `seconds_of_data`. terrain: files of the terrain fits that are shown.
     """
     stages = {material.name: material.pipeline.get("stages") or ()}
-    costs = stage_charts(stages, "stage", words("stages.sum"), {material.name: "@accent"})
+    costs = stage_charts(stages, "stage", parts.words("stages.sum"), {material.name: "@accent"})
     missing = ", ".join(material.pipeline.get("missing") or ())
     fits = fit_table(terrain)
-    on_hills = [TemplatePart("terrain.html.j2"), Paragraph(words("terrain.table")), fits]
+    on_hills = [parts.TemplatePart("terrain.html.j2"), parts.Paragraph(parts.words("terrain.table")), fits]
     yield own_section("training", learning_curve(material), history_table(material))
     yield own_section(
         "data",
-        ChartPair([gait_chart(material), speed_and_turn_chart(counted)]),
+        parts.ChartPair([gait_chart(material), speed_and_turn_chart(counted)]),
         *channel_charts(counted, shown_names(material.network["skeleton"])),
         remarks_table(material),
         clip_table(material),
         long=True,
     )
-    yield own_section("terrain", *(on_hills if fits.rows else [Paragraph(words("terrain.flat"))]))
+    yield own_section("terrain", *(on_hills if fits.rows else [parts.Paragraph(parts.words("terrain.flat"))]))
     yield own_section(
         "costs",
-        ChartPair(costs),
+        parts.ChartPair(costs),
         stage_table(material),
-        Paragraph(words("stages.missing", files=missing)) if missing else None,
+        parts.Paragraph(parts.words("stages.missing", files=missing)) if missing else None,
     )
-    yield own_section("configuration", TemplatePart("configuration.html.j2"))
-    yield own_section("origin", TemplatePart("origin.html.j2"))
+    yield own_section("configuration", parts.TemplatePart("configuration.html.j2"))
+    yield own_section("origin", parts.TemplatePart("origin.html.j2"))
 
 
-def own_section(name: str, *contents: Content | None, long: bool = False) -> PageSection:
+def own_section(name: str, *contents: parts.Content | None, long: bool = False) -> parts.PageSection:
     """A section after those of the measurements, with title and note from captions.yaml."""
-    parts = [SectionPart(i, each, open=name in UNFOLDED) for i, each in enumerate(contents)]
-    return PageSection(
+    content = [parts.SectionPart(i, each, open=name in UNFOLDED) for i, each in enumerate(contents)]
+    return parts.PageSection(
         name,
-        parts,
-        words(f"sections.{name}.title"),
+        content,
+        parts.words(f"sections.{name}.title"),
         order=90,
         long=long,
-        note=words(f"sections.{name}.note"),
+        note=parts.words(f"sections.{name}.note"),
     )
 
 
@@ -154,30 +130,30 @@ def published_curve(published: Mapping[str, Any], configuration: str) -> tuple[l
     return [before + (n + 1) / 10 for n in range(len(errors))], errors
 
 
-def learning_curve(material: ReportMaterial) -> Chart:
+def learning_curve(material: ReportMaterial) -> parts.Chart:
     """The training error and, if clips were held out, the held-out error, on a logarithmic scale.
 
     Thin lines: the held-out error of each block of the output, the one with the largest error first.
     """
     history, has_held_out = material.history, any(material.history.get("held_out_mse", ()))
     x = passes_axis(history)
-    traces = [line_trace("training", x, history.get("train_mse", []), "@muted")]
+    traces = [parts.line_trace("training", x, history.get("train_mse", []), "@muted")]
     if has_held_out:
-        traces.append(line_trace("held out", x, history["held_out_mse"], "@accent", width=3))
+        traces.append(parts.line_trace("held out", x, history["held_out_mse"], "@accent", width=3))
     known = {name: [v for v in history[name] if v is not None] for name in material.blocks}
     last = {name: values[-1] for name, values in known.items() if values}
     for i, name in enumerate(sorted(last, key=lambda name: last[name], reverse=True)):
-        label = f"{part_in_words(name.removeprefix('held_out_'))}, {format_number(last[name])}"
+        label = f"{part_in_words(name.removeprefix('held_out_'))}, {parts.format_number(last[name])}"
         colour = BLOCK_COLOURS[i % len(BLOCK_COLOURS)]
-        traces.append(line_trace(label, x, history[name], colour, width=1.1))
+        traces.append(parts.line_trace(label, x, history[name], colour, width=1.1))
     more = ["held-out" if has_held_out else "none-held-out"]
     passes, errors_of_his = published_curve(material.published, material.name)
     if passes:
-        traces.append(line_trace("published", passes, errors_of_his, "@g2", dash="dot", width=1.4))
+        traces.append(parts.line_trace("published", passes, errors_of_his, "@g2", dash="dot", width=1.4))
         more.append("published")
-    errors = log_axis("mean squared error", [v for t in traces for v in t["y"]])
-    layout = {"xaxis": axis("pass", rangemode="tozero"), "yaxis": errors}
-    return chart("learning-curve", traces, layout, 440, more=more)
+    errors = parts.log_axis("mean squared error", [v for t in traces for v in t["y"]])
+    layout = {"xaxis": parts.axis("pass", rangemode="tozero"), "yaxis": errors}
+    return parts.chart("learning-curve", traces, layout, 440, more=more)
 
 
 def part_in_words(name: str) -> str:
@@ -185,7 +161,7 @@ def part_in_words(name: str) -> str:
     return PATH_PARTS.get(name, name.replace("_", " "))
 
 
-def history_table(material: ReportMaterial) -> Table:
+def history_table(material: ReportMaterial) -> parts.Table:
     """A row for each section (part of a pass) of training, as in history.csv."""
 
     def head(name: str) -> str:
@@ -197,10 +173,10 @@ def history_table(material: ReportMaterial) -> Table:
     whole = {"pass", "section", "samples"}
     records = [{k: int(v) if k in whole and v is not None else v for k, v in r.items()} for r in records]
     heads = {name: head(name) for name in material.history}
-    return table(f"{material.name}-history", records, heads, words("sections.training.table"))
+    return parts.table(f"{material.name}-history", records, heads, parts.words("sections.training.table"))
 
 
-def fit_table(paths: Iterable[str | Path]) -> Table:
+def fit_table(paths: Iterable[str | Path]) -> parts.Table:
     """The errors of the terrain fits, with a row for each clip on uneven ground, the largest first.
 
     paths: files `terrain/clips/<clip>.npz`. A fit is a ground that suits a gait cycle. C cycles of a clip
@@ -220,12 +196,12 @@ def fit_table(paths: Iterable[str | Path]) -> Table:
             fix = "Delete the file; the workflow makes it again."
             raise InputError(path, f"not the terrain of a clip ({problem})", fix=fix) from problem
     records.sort(key=lambda record: -record["mean"])
-    return told_table("terrain", records, "terrain.fits")
+    return parts.told_table("terrain", records, "terrain.fits")
 
 
 def stage_charts(
     stages: Mapping[str, Sequence[Mapping[str, Any]]], prefix: str, jobs: str, colours: Mapping[str, str]
-) -> list[Chart]:
+) -> list[parts.Chart]:
     """Two charts: the seconds and the bytes of each stage.
 
     stages: configuration -> its stages, from pipeline.json. prefix: of the charts' names. jobs: a sentence
@@ -235,32 +211,32 @@ def stage_charts(
     names = list(dict.fromkeys(stage["stage"] for each in stages.values() for stage in each))[::-1]
     charts = []
     for key, label, as_text in (
-        ("seconds", "seconds, sum over all jobs", format_duration),
-        ("bytes", "bytes on disk", format_bytes),
+        ("seconds", "seconds, sum over all jobs", parts.format_duration),
+        ("bytes", "bytes on disk", parts.format_bytes),
     ):
         traces, values = [], []
         for name, each in stages.items():
             rows = [stage for stage in each if stage.get(key)]
             x, y = [stage[key] for stage in rows], [stage["stage"] for stage in rows]
             values += x
-            trace = dot_trace(name, x, y, colours[name], "%{y}: %{text}") | {"cliponaxis": False}
+            trace = parts.dot_trace(name, x, y, colours[name], "%{y}: %{text}") | {"cliponaxis": False}
             trace["text"] = [f"  {as_text(value)}" for value in x]
             if len(stages) == 1:
                 trace |= {"mode": "markers+text", "textposition": "middle right"}
                 trace["textfont"] = {"size": 11.5, "color": "@soft"}
             traces.append(trace)
         layout = {
-            "xaxis": axis(label, type="log", tickformat="~s", dtick=1, range=log_range(values)),
-            "yaxis": ordered_axis(names),
+            "xaxis": parts.axis(label, type="log", tickformat="~s", dtick=1, range=parts.log_range(values)),
+            "yaxis": parts.ordered_axis(names),
             "showlegend": len(stages) > 1,
         }
         height = (80 if len(stages) == 1 else 110) + 31 * len(names)
         name = f"{prefix}-{key}"
-        charts.append(chart(name, traces, layout, height, entry=f"stage-{key}", jobs=jobs))
+        charts.append(parts.chart(name, traces, layout, height, entry=f"stage-{key}", jobs=jobs))
     return charts
 
 
-def stage_table(material: ReportMaterial) -> Table:
+def stage_table(material: ReportMaterial) -> parts.Table:
     """A table of times and sizes: a row for each stage.
 
     It has columns of published times and sizes if there are any for this configuration.
@@ -272,7 +248,7 @@ def stage_table(material: ReportMaterial) -> Table:
     }
     stages = material.pipeline.get("stages") or ()
     records = [{**stage, **published.get(stage["stage"], {})} for stage in stages]
-    return told_table(f"{material.name}-pipeline", records, "stages.table", SHOW)
+    return parts.told_table(f"{material.name}-pipeline", records, "stages.table", SHOW)
 
 
 def seconds_of_data(paths: Sequence[str], splits: Mapping[str, str]) -> dict[str, Any]:
@@ -330,18 +306,22 @@ def gait_seconds(material: ReportMaterial) -> dict[str, dict[str, float]]:
     return totals
 
 
-def gait_chart(material: ReportMaterial) -> Chart:
+def gait_chart(material: ReportMaterial) -> parts.Chart:
     """Seconds of each gait, in training clips and held-out clips; empty without labels."""
     traces = [
-        bar_trace(label, GAITS, [*seconds.values()], colour, "%{x}: %{y:.1f} s<extra></extra>")
+        parts.bar_trace(label, GAITS, [*seconds.values()], colour, "%{x}: %{y:.1f} s<extra></extra>")
         for (label, colour), seconds in zip(SPLITS.values(), gait_seconds(material).values(), strict=True)
         if any(seconds.values())
     ]
-    layout = {"barmode": "stack", "yaxis": axis("seconds", rangemode="tozero"), "xaxis": {"type": "category"}}
-    return chart("gaits", traces, layout, 300)
+    layout = {
+        "barmode": "stack",
+        "yaxis": parts.axis("seconds", rangemode="tozero"),
+        "xaxis": {"type": "category"},
+    }
+    return parts.chart("gaits", traces, layout, 300)
 
 
-def speed_and_turn_chart(counted: Mapping[str, Any]) -> Chart | None:
+def speed_and_turn_chart(counted: Mapping[str, Any]) -> parts.Chart | None:
     """Seconds at each combination of speed and turning speed. counted: from `seconds_of_data`."""
     speeds, turns, both = _middles(SPEED_EDGES), _middles(TURN_EDGES), sum(counted["both"].values())
     if not both.any():
@@ -353,11 +333,11 @@ def speed_and_turn_chart(counted: Mapping[str, Any]) -> Chart | None:
         "zmax": float(np.percentile(both[both > 0], 95)),
         "zmin": 0,
     }
-    turning = axis("degrees per second (positive: to the left)", automargin=True)
-    return _coverage_chart("speed-turn", trace, {"xaxis": axis("m/s"), "yaxis": turning}, 300, counted)
+    turning = parts.axis("degrees per second (positive: to the left)", automargin=True)
+    return _coverage_chart("speed-turn", trace, {"xaxis": parts.axis("m/s"), "yaxis": turning}, 300, counted)
 
 
-def channel_charts(counted: Mapping[str, Any], shown_name: Callable[[str], str] = str) -> list[Chart]:
+def channel_charts(counted: Mapping[str, Any], shown_name: Callable[[str], str] = str) -> list[parts.Chart]:
     """A chart for each channel that has a value above 0 in any clip: seconds at each value of each column.
 
     counted: from `seconds_of_data`. shown_name: column -> its name on the page.
@@ -372,7 +352,7 @@ def channel_charts(counted: Mapping[str, Any], shown_name: Callable[[str], str] 
         hover = "%{y} at %{x}: %{z:.1f} s"
         trace = _seconds_trace(x, y, np.array([seconds[column] for column in columns]), hover)
         trace |= {"colorscale": [[0, "@hurt-low"], [1, "@hurt-high"]], "xgap": 3, "ygap": 3}
-        across = axis(definition.value_word, dtick=tenth, range=[0.4 * tenth, 10.6 * tenth])
+        across = parts.axis(definition.value_word, dtick=tenth, range=[0.4 * tenth, 10.6 * tenth])
         layout, height = {"xaxis": across, "yaxis": {"automargin": True}}, 120 + 24 * len(columns)
         values = {"of": definition.title, "value": definition.value_word, "entry": "coverage"}
         charts.append(_coverage_chart(f"{name}-coverage", trace, layout, height, counted, **values))
@@ -380,18 +360,23 @@ def channel_charts(counted: Mapping[str, Any], shown_name: Callable[[str], str] 
 
 
 def _coverage_chart(
-    name: str, trace: Trace, layout: Mapping[str, Any], height: int, counted: Mapping[str, Any], **values: Any
-) -> Chart:
+    name: str,
+    trace: parts.Trace,
+    layout: Mapping[str, Any],
+    height: int,
+    counted: Mapping[str, Any],
+    **values: Any,
+) -> parts.Chart:
     """A chart of the seconds that were counted, with empty cells where there are none.
 
     If only a part of the data was read, the rest may have data for a cell that is empty.
     """
     estimate = counted["estimate"]
     amount = "little or no" if estimate else "no"
-    return chart(name, [trace], layout, height, amount=amount, estimate=estimate, **values)
+    return parts.chart(name, [trace], layout, height, amount=amount, estimate=estimate, **values)
 
 
-def _seconds_trace(x: Sequence, y: Sequence, seconds: Array, hover: str) -> Trace:
+def _seconds_trace(x: Sequence, y: Sequence, seconds: Array, hover: str) -> parts.Trace:
     """A heatmap of seconds, (len(y), len(x)). Cells without data are empty."""
     cells = [[value or None for value in row] for row in np.round(seconds, 3).tolist()]
     bar = {"title": {"text": "s"}, "thickness": 10, "outlinewidth": 0}
@@ -404,7 +389,7 @@ def _middles(edges: Array) -> list[float]:
     return np.round((edges[:-1] + edges[1:]) / 2, 3).tolist()
 
 
-def clip_table(material: ReportMaterial) -> Table:
+def clip_table(material: ReportMaterial) -> parts.Table:
     """A row for each clip: split, file, length, labels, difference from its file, and checksum.
 
     Clips that were retargeted and differ most from their files come first.
@@ -422,10 +407,10 @@ def clip_table(material: ReportMaterial) -> Table:
     total = len(material.motion)
     which = f"All {total:,}" if len(records) == total else f"{len(records):,} of {total:,}"
     values = {"which": which, "most": f"{MOST_DIFFERENCE:.0f}"}
-    return told_table(f"{material.name}-clips", records, "sections.data.clips", SHOW, **values)
+    return parts.told_table(f"{material.name}-clips", records, "sections.data.clips", SHOW, **values)
 
 
-def remarks_table(material: ReportMaterial) -> Table:
+def remarks_table(material: ReportMaterial) -> parts.Table:
     """A row for each kind of doubt, warning and repair, doubts first."""
     messages = [
         (report["clip"], stage or report["channel"], sentence)
@@ -443,4 +428,4 @@ def remarks_table(material: ReportMaterial) -> Table:
         for each in group_messages(messages)[:MOST_REMARKS]
     ]
     name, count = f"{material.name}-remarks", f"{len(messages):,}"
-    return told_table(name, records, "sections.data.remarks", count=count)
+    return parts.told_table(name, records, "sections.data.remarks", count=count)
