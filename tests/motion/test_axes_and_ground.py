@@ -126,12 +126,16 @@ def test_a_floor_at_another_height_is_moved_to_0_and_reported(walker, bvh, make,
         make(path, defects="refuse")
 
 
-def test_uneven_ground_stays_where_it_is(walk, bvh, make):
+def test_uneven_ground_stays_where_it_is_unless_it_is_far_below(walk, bvh, make):
     stairs = raised(walk, np.interp(walk.root[:, 2], [80, 120], [20, 60]))
     clip, report = make(bvh(stairs))
-    assert "too uneven for flat ground: set `ground: rocky` for this clip" in report["notes"][0]
+    assert "too uneven for flat ground: set `ground: rocky` for this clip" in report["unsure"][0]
     assert report["repairs"] == []
     np.testing.assert_allclose(clip.root, stairs.root[::2], atol=1e-6)
+    clip, report = make(bvh(raised(stairs, -120.0)))
+    assert "too uneven" in report["unsure"][0]
+    assert "The floor lies at -10" in report["repairs"][0]
+    assert np.percentile(clip.positions[:, clip.skeleton.role("left_toe"), 1], 10) == pytest.approx(2, abs=3)
     beam = bvh(raised(walk, 40.0), name="beam")
     clip, report = make(beam, ground="beam", defects="refuse")
     assert report["repairs"] == report["notes"] == []

@@ -23,10 +23,13 @@ X, Y, _ = np.eye(3)
 ARMATURE = quat.from_axis_angle(X, -np.pi / 2)  # Blender writes its Z-up figures below such a node
 
 
-def write_gltf(path: Path, clip: Clip, interpolation: str = "LINEAR", posed: bool = False) -> Path:
+def write_gltf(
+    path: Path, clip: Clip, interpolation: str = "LINEAR", posed: bool = False, second: str = ""
+) -> Path:
     """Write a clip as Blender does: bones point along Y of their joints; an armature scales it to metres.
 
-    posed: the nodes stand in a contorted pose; how the body rests is told only by its skin.
+    posed: the nodes stand in a contorted pose; how the body rests is told only by its skin. second: name of
+    another animation, which lasts half as long.
     """
     skeleton = clip.skeleton
     bones = [
@@ -92,6 +95,10 @@ def write_gltf(path: Path, clip: Clip, interpolation: str = "LINEAR", posed: boo
             pygltflib.AnimationChannel(sampler=len(animation.samplers) - 1, target=target)
         )
     gltf.animations = [animation]
+    if second:
+        short = accessor(np.arange(len(clip))[:, None] / clip.fps / 2, "SCALAR")
+        samplers = [replace(sampler, input=short) for sampler in animation.samplers]
+        gltf.animations.append(replace(animation, name=second, samplers=samplers))
     uri = f"data:application/octet-stream;base64,{base64.b64encode(blob).decode()}"
     gltf.buffers = [pygltflib.Buffer(byteLength=len(blob), uri=uri)]
     if path.suffix == ".glb":
@@ -130,6 +137,19 @@ def test_a_captured_clip_as_gltf(tmp_path, shared, make):
 def test_keys_that_are_far_apart_are_interpolated(tmp_path, walk):
     file = read_motion(write_gltf(tmp_path / "sparse.glb", replace(walk.part(slice(0, None, 30)), fps=4.0)))
     assert (len(file), file.frame_time) == (61, 1 / 30)
+
+
+def test_the_longest_of_several_animations_is_read_or_the_named_one(tmp_path, walk, make):
+    path = write_gltf(tmp_path / "two.glb", walk, second="Hurry")
+    longest, report = make(path)
+    assert (
+        "Of its 2 animations (animation_0, Hurry), the longest was read: animation_0" in report["unsure"][0]
+    )
+    named, report = make(path, animation="Hurry", accept_doubt=True)
+    assert (len(named), len(longest)) == (61, 121)
+    assert "animations" not in " ".join(report["unsure"])
+    with pytest.raises(InputError, match="has no animation 'Run'; it has animation_0, Hurry"):
+        make(path, animation="Run")
 
 
 @pytest.mark.parametrize(

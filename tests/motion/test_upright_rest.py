@@ -11,6 +11,7 @@ from hobble.core import quat
 from hobble.core.bvh import write_bvh
 from hobble.core.clip import Clip
 from hobble.core.errors import InputError
+from hobble.motion.axes import degrees_between
 from tests.motion.other_rigs import PLAIN, rigged
 from tests.motion.scramble import X, compare, source_of
 
@@ -75,3 +76,22 @@ def test_a_squat_on_tiptoe_without_a_standing_zero_pose_is_refused(standing, tmp
     rewritten(squat(standing, 0.0), "one axis", tmp_path, make)
     with pytest.raises(InputError, match="The height of the ankles is uncertain"):
         rewritten(squat(standing, 0.5), "one axis", tmp_path, make)
+
+
+@pytest.mark.parametrize("site", [(0.0, -6.0, 0.0), (0.1, -6.0, 0.0)])
+def test_a_foot_points_ahead_even_if_its_end_site_lies_under_the_ankle(walk, bvh, make, site):
+    rig = walk.skeleton
+    keep = [j for j, name in enumerate(rig.joints) if "Toe" not in name]
+    legs = replace(
+        rig,
+        joints=tuple(rig.joints[j] for j in keep),
+        parents=(-1, *(keep.index(rig.parents[j]) for j in keep[1:])),
+        offsets=rig.offsets[keep],
+        end_sites={"LeftFoot": site, "RightFoot": site},
+    )
+    made, _ = make(bvh(replace(walk, skeleton=legs, rotations=walk.rotations[:, keep])))
+    foot = [
+        clip.at_roles()["left_toe"] - clip.at_roles()["left_heel"]
+        for clip in (made, walk.part(slice(None, None, 2)))
+    ]
+    assert degrees_between(*foot).max() < 8

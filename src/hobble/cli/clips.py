@@ -170,7 +170,7 @@ def convert_file(name: str, file: Path, options: argparse.Namespace) -> tuple[Cl
         clip, report = make_clip(file, target, skeleton_folder(), name, target.stem, settings)
         return resample(clip, options.fps), report_messages(report)
     target_file, folder = load_skeleton(find_skeleton(SKELETON)), skeleton_folder()
-    source = load_source(read_motion(file), target_file, folder, settings)
+    source = load_source(read_motion(file, settings.animation), target_file, folder, settings)
     doubts = accept(file, clip_problems(source.clip, source.clip.fps, 1.0, settings), settings)
     clip = resample(source.clip, options.fps)
     if settings.loops > 1:

@@ -53,6 +53,7 @@ STANCE = 0.2  # a foot counts as standing in this share of the frames: those wit
 # one it lands on its heel.
 LEAST_STEEP = (10.0, 30.0)
 FEWEST = 3  # least number of frames in which a foot is flat
+STEEPEST = np.radians(70.0)  # a foot is usually less steep than this; some end sites lie under the ankle
 SLOW = 0.5  # leg lengths a second: the ball of a standing foot is slower than this
 # A figure runs if the balls of its feet are slow in less than this share of the frames. In CMU's walks the
 # share is at least 0.41.
@@ -344,15 +345,17 @@ class BodySample:
     def _ahead(self, side: str) -> Array:
         """(S, 3) vectors to where a foot points at the S moments of the sample: from the ankle to the ball.
 
-        A foot without a ball points from the ankle to the ankle's end site. If there is none either, the foot
-        points where the hips face on average.
+        A foot without a ball points from the ankle to the ankle's end site. If there is none either, or if it
+        lies under the ankle, the foot points where the hips face on average.
         """
         heel, toe = self.body.legs[side][2:]
         if toe is not None:
             return self.positions[:, toe] - self.positions[:, heel]
-        site = self.end_sites.get(heel)
-        if site is None or np.linalg.norm(site) <= SHORT:
-            site = self.mean_in_joint_axes(heel, np.cross(self.hips_left, UP))
+        site = self.end_sites.get(heel, np.zeros(3))
+        ahead = quat.rotate(self.rotations[:, heel], site)
+        if np.linalg.norm(site) > SHORT and np.median(_downward(ahead)) < STEEPEST:
+            return ahead
+        site = self.mean_in_joint_axes(heel, np.cross(self.hips_left, UP))
         return quat.rotate(self.rotations[:, heel], site)
 
     def foot_frames(self) -> dict[int, Array]:

@@ -76,11 +76,10 @@ LOW = 1.5
 def put_on_floor(clip: Clip) -> tuple[Clip, list[str], list[str]]:
     """Move a clip on flat ground up or down so that its floor lies at height 0, if it is too far off.
 
-    Too far is more than MOST_OFF, or more than MOST_OFF_CRAWLING for a figure that is not upright.
+    Too far is more than MOST_OFF, or more than MOST_OFF_CRAWLING for a figure that is not upright. If the
+    heights of its standing feet differ too much for flat ground, too far is more than they differ.
 
-    Returns the clip and two lists. If the clip was moved, the first list holds a sentence that says so. If it
-    was not moved because the heights of its standing feet differ too much for flat ground, the second list
-    holds a sentence that says so.
+    Returns the clip, a sentence that it was moved, if it was, and doubts.
     """
     lower_toe = clip.positions[:, [clip.skeleton.role(f"{side}_toe") for side in SIDES], 1].min(axis=1)
     standing = lower_toe[:-1][np.abs(np.diff(lower_toe)) * clip.fps / 60.0 < SLOW_RISE]
@@ -94,11 +93,14 @@ def put_on_floor(clip: Clip) -> tuple[Clip, list[str], list[str]]:
     is_upright = np.median(hips - lower_toe) > UPRIGHT * leg_length(clip.skeleton)
     if abs(floor) <= (MOST_OFF if is_upright else MOST_OFF_CRAWLING):
         return clip, [], []
+    doubts = []
     if high - low > EVEN:
         heights = f"The feet stand {low:.0f} to {high:.0f} cm high, too uneven for flat ground"
-        return clip, [], [f"{heights}: set `ground: rocky` for this clip in the data set."]
+        doubts = [f"{heights}: set `ground: rocky` for this clip in the data set."]
+        if abs(floor) < high - low:
+            return clip, [], doubts
     moved = replace(clip, root=clip.root - [0.0, floor, 0.0])
-    return moved, [f"The floor lies at {floor:.1f} cm; the clip was moved so that it lies at 0."], []
+    return moved, [f"The floor lies at {floor:.1f} cm; the clip was moved so that it lies at 0."], doubts
 
 
 def tilt_problem(clip: Clip) -> Problem | None:

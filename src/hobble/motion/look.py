@@ -332,7 +332,7 @@ def picture_of_file(bvh: Path, skeleton: Path, skeleton_folder: Path, options: C
     read or that has this skeleton's bones already.
     """
     target = load_skeleton(skeleton, skeleton.stem)
-    source = load_source(read_motion(bvh), target, skeleton_folder, options)
+    source = load_source(read_motion(bvh, options.animation), target, skeleton_folder, options)
     made, scale, _, _ = fit_skeleton(source, target.skeleton, options)
     if scale is None:
         problem = f"already has the bones of {target.skeleton.name}, so there is no retargeting to draw"

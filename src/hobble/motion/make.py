@@ -19,7 +19,7 @@ from hobble.core.errors import InputError
 from hobble.core.skeleton import Skeleton, rest_positions
 from hobble.motion.axes import straighten, turned_about_vertical
 from hobble.motion.body import Body, body_by_roles, match_joints
-from hobble.motion.edit import facing_angle, loop_clip, repair_defects, resample
+from hobble.motion.edit import facing_angle, loop_clip, repair_defects, resample, sample_times
 from hobble.motion.ground import put_on_floor, tilt_problem
 from hobble.motion.limbs import on_four_legs
 from hobble.motion.options import ACCEPT, ClipMotion, MotionOptions, Problem, accept
@@ -42,8 +42,8 @@ from hobble.motion.skeleton_file import KnownSkeleton, load_skeleton
 STILL = 0.1  # cm: a joint that stays this close to its offset counts as fixed to its parent
 SAME = 1e-3  # cm: offsets count as equal if they differ from the target skeleton's by at most this much
 MOST_HEIGHT_ERROR = 3.0  # cm (two standard deviations): a clip whose height is more uncertain is refused
-FEWEST_FRAMES = 5  # fewer frames show no motion
-NO_MOTION = 0.01  # cm: a figure of which no joint moves further does not move
+FEWEST_FRAMES = 5  # of the finished clip; fewer show no motion
+NO_MOTION = 1e-3  # degrees, or units of length: a file in which no value changes by more shows no motion
 UNKNOWN_RIG = "found"  # stands in reports instead of the rig's name if the rig is no known skeleton
 
 
@@ -66,7 +66,7 @@ def make_clip(
     `defects: refuse`, for all defects.
     """
     target = load_skeleton(skeleton, skeleton_name)
-    file = read_motion(bvh)
+    file = read_motion(bvh, options.animation)
     if options.frames is not None:
         file = _cut(file, *options.frames)
     source = load_source(file, target, skeleton_folder, options)
@@ -120,13 +120,13 @@ def _cut(file: Bvh, first: int, last: int) -> Bvh:
 def clip_problems(
     clip: Clip, source_fps: float, scale: float, options: MotionOptions
 ) -> list[Problem | None]:
-    """What speaks against a clip: its motion, knees, pace, tilt and frame rate.
+    """What speaks against a clip: its knees, pace, tilt and frame rate.
 
     source_fps: frame rate of its file. scale: size of the clip's figure / size of the captured person.
     `defects: leave` switches the checks of knees, pace and tilt off. The check of the tilt is also off if the
     user has set the axis that points up.
     """
-    found: list[Problem | None] = [_no_motion_problem(clip)]
+    found: list[Problem | None] = []
     if options.defects != "leave":
         found.append(knee_problem(clip, KNEE_AHEAD if options.handedness == "auto" else KNEE_BACKWARD))
         found.append(pace_problem(clip))
@@ -134,15 +134,20 @@ def clip_problems(
     return [*found, rate_problem(clip, source_fps, scale)]
 
 
-def _no_motion_problem(clip: Clip) -> Problem | None:
-    """A clip of a few frames, or of a figure that never moves, such as a T-pose alone."""
-    moved = np.ptp(clip.positions, axis=0).max()
-    if len(clip) >= FEWEST_FRAMES and moved > NO_MOTION:
+def _no_motion_problem(file: Bvh, options: MotionOptions) -> Problem | None:
+    """A file of a few frames, or of a figure that never moves, such as a T-pose alone."""
+    frames = len(sample_times(len(file), _source_fps(file, options), options.fps))
+    moves = np.ptp(file.values, axis=0).max() > NO_MOTION
+    if frames >= FEWEST_FRAMES and moves:
         return None
     seen = "one pose, held all the time, such as a T-pose or the zero pose"
-    if moved > NO_MOTION:
-        seen = f"{len(clip)} frames of {clip.fps:g} a second"
+    if moves:
+        seen = f"{frames} frames of {options.fps:g} a second"
     return Problem(f"there is no motion in it, only {seen}", "Export the clip with its motion.")
+
+
+def _source_fps(file: Bvh, options: MotionOptions) -> float:
+    return options.source_fps or frame_rate(file.frame_time, file.frame_time_text)
 
 
 def _check_length(file: Bvh, clip: Clip, target: Skeleton, options: ClipMotion) -> None:
@@ -221,17 +226,18 @@ def load_source(
         if options.defects == "refuse":
             raise InputError(file.path, problem, fix="Export the clip again, or set motion.defects: repair.")
         counted = [f"The file {problem}. The {len(file)} frames are used."]
+    still = accept(file.path, [_no_motion_problem(file, options)], options)
     source = _load_rig(file, target, skeleton_folder, options)
-    clip, first, mended, notes = source.clip, 0, list[str](), source.notes
+    clip, first, mended, unsure = source.clip, 0, list[str](), [*file.unsure, *still, *source.unsure]
     if options.defects != "leave":
         clip, first, mended = repair_defects(clip)
         if options.ground == "flat":
-            clip, floor_repairs, floor_notes = put_on_floor(clip)
-            mended, notes = mended + floor_repairs, notes + floor_notes
+            clip, moved, doubts = put_on_floor(clip)
+            mended, unsure = mended + moved, unsure + doubts
     if mended and options.defects == "refuse":
         raise InputError(file.path, mended[0], fix="Set motion.defects: repair to repair it this way.")
     found, repairs = {**source.found, "source_start": first}, counted + source.repairs + mended
-    return replace(source, clip=clip, found=found, repairs=repairs, notes=notes)
+    return replace(source, clip=clip, found=found, repairs=repairs, unsure=unsure)
 
 
 def _load_rig(file: Bvh, target: KnownSkeleton, folder: str | Path, options: ClipMotion) -> FileMotion:
@@ -256,7 +262,7 @@ def _load_rig(file: Bvh, target: KnownSkeleton, folder: str | Path, options: Cli
         raise InputError(file.path, "the figure goes on four legs", fix=fix)
     unit, unit_name, unsure = _unit(leg, options.unit)
     roles = match.roles if match.is_usable else body.roles(clip.skeleton.joints)
-    clip = _scaled(clip, unit, options.source_fps or frame_rate(file.frame_time, file.frame_time_text))
+    clip = _scaled(clip, unit, _source_fps(file, options))
     clip = replace(clip, skeleton=replace(clip.skeleton, roles=roles))
     has_moving_joints = _has_moving_joints(clip, body)
     try:
@@ -373,7 +379,7 @@ def fit_skeleton(
         has_equal_offsets = np.abs(reordered.skeleton.offsets - target.offsets).max() <= SAME
         if has_equal_offsets or kept:
             reordered = replace(reordered, skeleton=target) if has_equal_offsets else reordered
-            return reordered, None, [f"{moved}kept."] if source.has_moving_joints else [], []
+            return reordered, None, [f"{moved}kept."] if source.has_moving_joints else [], source.unsure
     followed_joints, unsure = match.followed_joints, source.unsure
     # Retargeting needs a rest pose that stands. Rigs that are no known skeleton have got one.
     if match.has_known_rest_pose:

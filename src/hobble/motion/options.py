@@ -101,6 +101,9 @@ class ClipMotion(MotionOptions):
     frames: FrameRange | None = Field(
         None, description="first and last frame of the file that are used, counted from 1"
     )
+    animation: str | None = Field(
+        None, description="name of the animation that is read from a glTF or FBX file; by default the longest"
+    )
 
 
 ACCEPT = "To use the clip as it is, set motion.accept_doubt: true (option --accept-doubt)."

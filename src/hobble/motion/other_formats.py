@@ -33,6 +33,9 @@ ROTATIONS = tuple(f"{axis}rotation" for axis in ORDER)
 BOUND, MOST_TURN = 0.05, 60.0  # longest bones, degrees; see _bind_pose
 MOVES = 1e-3  # longest bones: a joint that moves further relative to its parent gets position channels
 LONGEST_STEP, SPARSE = 0.11, 30.0  # seconds: keys that are further apart get frames at 30 Hz between them
+MOST_NAMED = 300  # characters of the names of a file's animations in a message
+# (node, "translation", "rotation" or "scale") -> times, values, and the interpolation
+Keys = dict[tuple[int, str], tuple[Array, Array, str]]
 BLENDER_SECONDS = 600  # Blender may take this long for one file
 # What Blender runs: reads the FBX file and writes a glTF file with a key for each frame.
 BLENDER_SCRIPT = """
@@ -45,14 +48,18 @@ bpy.ops.export_scene.gltf(filepath=target, export_format="GLB", export_force_sam
 """
 
 
-def read_motion(path: str | Path) -> Bvh:
-    """Read a file by its suffix, see MOTION_SUFFIXES. Raises InputError for a bad file."""
+def read_motion(path: str | Path, animation: str | None = None) -> Bvh:
+    """Read a file by its suffix, see MOTION_SUFFIXES. Raises InputError for a bad file.
+
+    animation: name of the animation in a glTF or FBX file; by default the longest.
+    """
     path = Path(path)
     readers = {".glb": read_gltf, ".gltf": read_gltf, ".fbx": read_fbx}
-    return readers.get(path.suffix.lower(), read_bvh)(path)
+    reader = readers.get(path.suffix.lower())
+    return reader(path, animation) if reader else read_bvh(path)
 
 
-def read_fbx(path: Path) -> Bvh:
+def read_fbx(path: Path, animation: str | None = None) -> Bvh:
     """Read an FBX file, which Blender converts to glTF. Raises InputError without Blender, or if it fails."""
     data = read_bytes(path, MOST_BYTES)
     with tempfile.TemporaryDirectory() as folder:
@@ -80,50 +87,66 @@ def read_fbx(path: Path) -> Bvh:
         if not target.is_file():
             problem = f"Blender cannot convert it: {printable(' '.join(last), 200)}"
             raise InputError(path, problem, fix="Export the clip as BVH or glTF.")
-        converted = read_gltf(target, path)
+        converted = read_gltf(target, animation, path)
     return replace(converted, sha256=hashlib.sha256(data).hexdigest(), bytes=len(data))
 
 
-def read_gltf(path: Path, named: Path | None = None) -> Bvh:
-    """Read the longest animation of a glTF file (.glb or .gltf).
+def read_gltf(path: Path, animation: str | None = None, named: Path | None = None) -> Bvh:
+    """Read an animation of a glTF file (.glb or .gltf).
 
-    named: the file that errors name, by default the same. Raises InputError for a file that is no glTF or has
-    no animated joints.
+    animation: its name; by default the longest, with a sentence that names the others. named: the file that
+    errors name, by default the same. Raises InputError for a file that is no glTF, or has no animated joints
+    or no such animation.
     """
     from pygltflib import GLTF2  # imported here because most jobs read BVH files
 
     named, data = named or path, read_bytes(path, MOST_BYTES)
     try:
         gltf = GLTF2().load(str(path))
-        scene = _Scene.of(gltf, path)
+        animations = _animations(gltf, path)
+        chosen, unsure = _chosen(named, animations, animation)
+        scene = _Scene.of(gltf, path, animations[chosen])
     except InputError:
         raise
     except Exception as error:  # the library raises whatever its parts raise
         problem = f"not a readable glTF file: {printable(error, 200)}"
         raise InputError(named, problem, fix=EXPORT) from None
-    if not scene.keys:
+    checksum = hashlib.sha256(data).hexdigest()
+    return replace(scene.as_bvh(named), sha256=checksum, bytes=len(data), unsure=unsure)
+
+
+def _chosen(path: Path, animations: dict[str, Keys], wanted: str | None) -> tuple[str, tuple[str, ...]]:
+    """The name of the wanted animation, or of the longest with a sentence that names the others."""
+    if not animations:
         fix = "Export it with its animation."
-        raise InputError(named, "a glTF file without an animation of joints", fix=fix)
-    return replace(scene.as_bvh(named), sha256=hashlib.sha256(data).hexdigest(), bytes=len(data))
+        raise InputError(path, "a glTF file without an animation of joints", fix=fix)
+    known = printable(", ".join(animations), MOST_NAMED)
+    if wanted is not None:
+        if wanted not in animations:
+            raise InputError(path, f"has no animation {printable(wanted)!r}; it has {known}")
+        return wanted, ()
+    chosen = max(animations, key=lambda name: _seconds(animations[name]))
+    if len(animations) == 1:
+        return chosen, ()
+    text = f"Of its {len(animations)} animations ({known}), the longest was read: {chosen}"
+    return chosen, (f"{text}. The option --animation NAME reads another one.",)
 
 
 @dataclass(frozen=True)
 class _Scene:
     """The nodes of a glTF file that are joints or carry joints, parents first, and one animation.
 
-    rest: for each node its translation, rotation (w, x, y, z) and scale. keys: (node, "translation",
-    "rotation" or "scale") -> times, values, and the interpolation.
+    rest: for each node its translation, rotation (w, x, y, z) and scale.
     """
 
     names: list[str]
     parents: list[int]
     rest: list[tuple[Array, Array, Array]]
-    keys: dict[tuple[int, str], tuple[Array, Array, str]]
+    keys: Keys
 
     @classmethod
-    def of(cls, gltf: Any, path: Path) -> _Scene:
+    def of(cls, gltf: Any, path: Path, channels: Keys) -> _Scene:
         above = {child: i for i, node in enumerate(gltf.nodes) for child in node.children or ()}
-        channels = _longest_animation(gltf, path)
         joints = {j for skin in gltf.skins or () for j in skin.joints} or {node for node, _ in channels}
         for joint in list(joints):
             while joint in above:
@@ -199,12 +222,11 @@ class _Scene:
         return places, turns
 
 
-def _longest_animation(gltf: Any, path: Path) -> dict[tuple[int, str], tuple[Array, Array, str]]:
-    """The keys of the animation that lasts longest, as in `_Scene`, by the file's numbers of nodes."""
-    best: dict[tuple[int, str], tuple[Array, Array, str]] = {}
-    longest = -1.0
-    for animation in gltf.animations or ():
-        found = {}
+def _animations(gltf: Any, path: Path) -> dict[str, Keys]:
+    """The animations of nodes by name, with keys by the file's numbers of nodes."""
+    out: dict[str, Keys] = {}
+    for number, animation in enumerate(gltf.animations or ()):
+        found: Keys = {}
         for channel in animation.channels:
             node, what = channel.target.node, channel.target.path
             if node is None or what not in ("translation", "rotation", "scale"):
@@ -214,10 +236,15 @@ def _longest_animation(gltf: Any, path: Path) -> dict[tuple[int, str], tuple[Arr
             if what == "rotation":
                 values = values[:, [3, 0, 1, 2]]
             found[node, what] = times, values, sampler.interpolation or "LINEAR"
-        seconds = max((float(np.ptp(times)) for times, _, _ in found.values()), default=-1.0)
-        if seconds > longest:
-            best, longest = found, seconds
-    return best
+        name = printable(animation.name or f"animation_{number}", 100)
+        if found:
+            out[name if name not in out else f"{name}_{number}"] = found
+    return out
+
+
+def _seconds(keys: Keys) -> float:
+    """How long an animation lasts."""
+    return max(float(np.ptp(times)) for times, _, _ in keys.values())
 
 
 def _bind_pose(gltf: Any, path: Path, above: dict[int, int]) -> dict[int, tuple[Array, Array, Array]]:

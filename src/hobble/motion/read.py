@@ -58,6 +58,7 @@ class Bvh:
     end_sites: name of a joint -> offsets (x, y, z) of its end sites, in the file's unit.
     declared: the number of frames that the file declares. F may differ by one (see `read_bvh`).
     sha256, bytes: hash and size of the file.
+    unsure: sentences on what else might have been meant by the file.
     """
 
     path: Path
@@ -72,6 +73,7 @@ class Bvh:
     declared: int
     sha256: str = ""
     bytes: int = 0
+    unsure: tuple[str, ...] = ()
 
     def __len__(self) -> int:
         return len(self.values)
