@@ -24,6 +24,7 @@ MIRROR = np.array([1.0, 1.0, -1.0, -1.0])
 # cm: a figure crawls or climbs along an axis only if its lowest joint moves by more than this along the axis.
 # The movement is measured between the quartiles of the joint's places.
 CLIMB = 20.0
+FLAT = 0.35  # end sites of ankles point ahead if they lie this share of their distance ahead, not under them
 DIRECTIONS = {  # name of an axis, such as "-X" -> (3,) unit vector
     sign + axis: np.eye(3)["XYZ".index(axis)] * (1 if sign == "+" else -1) for sign in "+-" for axis in "XYZ"
 }
@@ -110,20 +111,37 @@ def bend_direction(hip: Array, knee: Array, heel: Array) -> Array:
 
 
 def body_axes(skeleton: Skeleton, positions: Array) -> tuple[Array, Array, Array]:
-    """Unit vectors (..., 3): from right to left, from hips to head, and forward.
+    """Vectors (..., 3): unit ones from right to left and from hips to head, and one that points forward.
 
     Forward is the direction of the feet or, on a rig without toes, the direction in which the knees point.
-    positions: (..., J, 3) of the joints.
+    Its length says how much it tells: that of a nearly straight leg is short. positions: (..., J, 3) of the
+    joints.
     """
     at = {role: positions[..., skeleton.role(role), :] for role in skeleton.roles}
     left = at["left_hip"] - at["right_hip"] + at["left_shoulder"] - at["right_shoulder"]
-    ahead = sum(
-        at[f"{side}_toe"] - at[f"{side}_heel"]
-        if f"{side}_toe" in at
-        else bend_direction(*(at[f"{side}_{part}"] for part in ("hip", "knee", "heel")))
-        for side in ("left", "right")
-    )
-    return unit(left), unit(at["head"] - at["hips"]), unit(np.asarray(ahead))
+    upward = at["head"] - at["hips"]
+    if "left_toe" in at:
+        ahead = unit(sum(at[f"{side}_toe"] - at[f"{side}_heel"] for side in ("left", "right")))
+    else:
+        knees = [
+            bend_direction(*(at[f"{side}_{part}"] for part in ("hip", "knee", "heel")))
+            for side in ("left", "right")
+        ]
+        ahead = np.asarray(sum(knee * np.linalg.norm(knee, axis=-1, keepdims=True) for knee in knees))
+    return unit(left), unit(upward), ahead
+
+
+def _end_sites_ahead(clip: Clip, upward: Array) -> Array | None:
+    """(F, 3) where the end sites of the ankles are from them, across `upward`; None if they do not tell."""
+    sites, ahead = clip.skeleton.end_sites, np.zeros((len(clip), 3))
+    for heel in (clip.skeleton.role("left_heel"), clip.skeleton.role("right_heel")):
+        site = np.array(sites.get(clip.skeleton.joints[heel], (0.0, 0.0, 0.0)))
+        place = quat.rotate(clip.global_rotations[:, heel], site)
+        across = place - upward * np.sum(place * upward, axis=-1, keepdims=True)
+        if np.median(np.linalg.norm(across, axis=-1)) <= FLAT * np.linalg.norm(site):
+            return None
+        ahead = ahead + across
+    return ahead
 
 
 def rest_frame(skeleton: Skeleton) -> Array:
@@ -166,10 +184,13 @@ def straighten(
     """
     up_axis, note, in_doubt = _up_axis(clip, standing) if up == "auto" else (f"+{up}", "", False)
     if handedness == "auto":
-        left, upward, feet = body_axes(clip.skeleton, clip.positions)
+        left, upward, ahead = body_axes(clip.skeleton, clip.positions)
+        if "left_toe" not in clip.skeleton.roles:
+            sites = _end_sites_ahead(clip, upward)
+            ahead = ahead if sites is None else sites
         # In right-handed coordinates, the cross product of left and up points forward, like the feet.
-        cosine = np.mean(np.sum(np.cross(left, upward) * feet, axis=-1))
-        handedness = "left" if cosine < -0.2 else "right"
+        along = np.sum(np.cross(left, upward) * ahead)
+        handedness = "left" if along < -0.2 * np.linalg.norm(ahead, axis=-1).sum() else "right"
     if handedness == "left":
         clip = _changed(clip, lambda v: v * FLIP, clip.rotations * MIRROR, clip.root * FLIP)
         up_axis = {"+X": "-X", "-X": "+X"}.get(up_axis, up_axis)
