@@ -120,14 +120,14 @@ def body_axes(skeleton: Skeleton, positions: Array) -> tuple[Array, Array, Array
     at = {role: positions[..., skeleton.role(role), :] for role in skeleton.roles}
     left = at["left_hip"] - at["right_hip"] + at["left_shoulder"] - at["right_shoulder"]
     upward = at["head"] - at["hips"]
-    if "left_toe" in at:
-        ahead = unit(sum(at[f"{side}_toe"] - at[f"{side}_heel"] for side in ("left", "right")))
-    else:
-        knees = [
-            bend_direction(*(at[f"{side}_{part}"] for part in ("hip", "knee", "heel")))
-            for side in ("left", "right")
-        ]
-        ahead = np.asarray(sum(knee * np.linalg.norm(knee, axis=-1, keepdims=True) for knee in knees))
+    ahead = np.zeros_like(left)
+    for side in ("left", "right"):
+        if f"{side}_toe" in at:
+            ahead = ahead + at[f"{side}_toe"] - at[f"{side}_heel"]
+        else:
+            knee = bend_direction(*(at[f"{side}_{part}"] for part in ("hip", "knee", "heel")))
+            ahead = ahead + knee * np.linalg.norm(knee, axis=-1, keepdims=True)
+    ahead = unit(ahead) if "left_toe" in at else ahead
     return unit(left), unit(upward), ahead
 
 
