@@ -120,7 +120,7 @@ def body_axes(skeleton: Skeleton, positions: Array) -> tuple[Array, Array, Array
     at = {role: positions[..., skeleton.role(role), :] for role in skeleton.roles}
     left = at["left_hip"] - at["right_hip"] + at["left_shoulder"] - at["right_shoulder"]
     upward = at["head"] - at["hips"]
-    ahead = np.zeros_like(left)
+    ahead: Array = np.zeros_like(left)
     for side in ("left", "right"):
         if f"{side}_toe" in at:
             ahead = ahead + at[f"{side}_toe"] - at[f"{side}_heel"]
