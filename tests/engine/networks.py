@@ -10,6 +10,7 @@ import numpy as np
 
 from hobble.channels.speed_limits import Limits
 from hobble.core.skeleton import Skeleton, forward_kinematics
+from hobble.models.local import Local, LocalOptions
 from hobble.models.mann import Mann, MannOptions
 from hobble.models.matching.network import Matching
 from hobble.models.network import Network, TrainingFacts
@@ -21,10 +22,11 @@ from tests.models.matching.example import built
 HIDDEN = (24, 20)
 
 
-def shared_fields(skeleton: Skeleton) -> dict[str, Any]:
+def shared_fields(skeleton: Skeleton, local_phases: int = 0) -> dict[str, Any]:
     """The fields of all kinds: two channels with limits, and outputs in which feet land and lift."""
     links = skeleton.link_names
-    layout = RowLayout(len(skeleton.joints), channels=(("injury", len(links)), ("mood", 3), ("guarding", 1)))
+    channels = ("injury", len(links)), ("mood", 3), ("guarding", 1)
+    layout = RowLayout(len(skeleton.joints), channels=channels, local_phases=local_phases)
     rng = np.random.default_rng(5)
     y, spread = np.zeros(layout.y_size, np.float32), np.zeros(layout.y_size, np.float32)
     rest = np.tile([1.0, 0, 0, 0], (1, layout.joints, 1))
@@ -35,6 +37,7 @@ def shared_fields(skeleton: Skeleton) -> dict[str, Any]:
     for block, size in {
         "root_velocity": 0.6, "turn": 0.01, "phase_change": 0.004, "contacts": 0.6, "position": 3.0,
         "direction": 0.1, "joint_position": 3.0, "joint_velocity": 0.8, "joint_rotation": 0.3,
+        **({"local_phase": 0.5, "local_change": 0.02} if local_phases else {}),
     }.items():  # fmt: skip
         spread[layout.blocks("y")[block]] = size
     x_mean = rng.normal(0, 3, layout.x_size).astype(np.float32)
@@ -69,7 +72,7 @@ def layers(rng: np.random.Generator, sets: int, sizes: tuple[int, ...]) -> tuple
 
 def network_of(kind: str, skeleton: Skeleton, folder: Path) -> Network:
     """A network of a kind. folder: where files can be written."""
-    given, rng = shared_fields(skeleton), np.random.default_rng(8)
+    given, rng = shared_fields(skeleton, 4 if kind == "local" else 0), np.random.default_rng(8)
     layout = given["layout"]
     sizes = (layout.x_size, *HIDDEN, layout.y_size)
     if kind == "matching":
@@ -89,7 +92,8 @@ def network_of(kind: str, skeleton: Skeleton, folder: Path) -> Network:
     weights, biases = layers(rng, 4, sizes)
     if kind == "pfnn":
         return Pfnn(weights=weights, biases=biases, **given)
-    columns = np.array(MannOptions().gate_columns(layout, skeleton))
+    options, made_of = (LocalOptions(), Local) if kind == "local" else (MannOptions(), Mann)
+    columns = np.array(options.gate_columns(layout, skeleton))
     gate_weights, gate_biases = layers(rng, 1, (len(columns), 16, 4))
     gate = {"gate_weights": gate_weights, "gate_biases": gate_biases, "columns": columns}
-    return Mann(weights=weights, biases=biases, **gate, **given)
+    return made_of(weights=weights, biases=biases, **gate, **given)

@@ -30,7 +30,7 @@ from tests.engine.networks import network_of
 
 WARNINGS = ("-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic")
 RUNTIME_C = SOURCES / "hobble.c"
-KINDS = ("pfnn", "plain", "mann", "matching", "learned")
+KINDS = ("pfnn", "plain", "mann", "local", "matching", "learned")
 
 
 @pytest.fixture(scope="module")
@@ -70,6 +70,7 @@ def start(
         ("pfnn", "constant", "float32", {"foot_locking": False, "limits": False}),
         ("plain", "cubic", "float32", {"scales": {"injury": 2.0}, "rates": {"mood": 0.3}}),
         ("mann", "cubic", "int16", {}),
+        ("local", "cubic", "float32", {}),
         ("matching", "cubic", "float32", {}),
         ("matching", "cubic", "int16", {"steering": 0.0}),
         ("learned", "cubic", "float32", {}),

@@ -25,6 +25,7 @@ from hobble.rows.layout import GAITS, RowLayout
 from .matching.example import built
 
 OPTIONS: dict[str, dict[str, Any]] = {
+    "local": {"units": 18, "experts": 3},
     "mann": {"units": 18, "experts": 3},
     "plain": {"units": 18},
     "pfnn": {"units": 18},
@@ -46,8 +47,9 @@ def made(request: pytest.FixtureRequest, holden31: Skeleton, tmp_path_factory: A
     kind = request.param
     if kind in BUILT:
         return built(holden31, tmp_path_factory.mktemp(kind), kind, **BUILT[kind])
-    layout = RowLayout(len(holden31.joints), channels=(("injury", 30),))
     options = network_options({"kind": kind, **OPTIONS[kind]})
+    local = 4 if options.uses_local_phases else 0
+    layout = RowLayout(len(holden31.joints), channels=(("injury", 30),), local_phases=local)
     assert isinstance(options, TrainedOptions)
     trainable, again, other = (options.untrained_network(layout, holden31, seed) for seed in (1, 1, 2))
     assert trainable.flat.numel() == options.parameter_count(layout.x_size, layout.y_size)

@@ -29,6 +29,7 @@ def make_rows(piece, log):
         window=options.window,
         step=options.step,
         facing_sigma=options.facing_sigma,
+        with_local_phases=options.local_phases,
     )
     save_clip_rows(piece.output["rows"], rows)
     save_summary(piece.output["summaries"], summary_of_rows(rows))

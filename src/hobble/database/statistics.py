@@ -122,7 +122,7 @@ def clip_moments(rows: ClipRows, layout: RowLayout) -> tuple[Moments, Moments]:
         spread = float(np.sum(weight * (mean - row_mean[fit_row]) ** 2))
         heights = Moments.of_rows(rows.heights[part_fits], weight)
         x_frame = _moments_of_lowered(rows.x[part], body.x_joint_position, row_mean, spread)
-        parts = {name: x_frame.columns(block) for name, block in body.blocks("x").items() if name != TERRAIN}
+        parts = {name: x_frame.columns(block) for name, block in blocks_without_terrain(body).items()}
         parts |= {name: Moments.of_rows(rows.channels[name][part]) for name, _ in layout.channels}
         parts[TERRAIN] = heights
         x = x + _join_columns(*[parts[name] for name in layout.blocks("x")])
@@ -163,7 +163,9 @@ def x_groups(layout: RowLayout) -> list[slice]:
         for block in (layout.x_position, layout.x_direction)
         for start in (block.start, block.start + half)
     ]
-    return [*split, layout.x_gait, layout.x_joint_position, layout.x_joint_velocity, layout.x_terrain]
+    joints = layout.x_joint_position, layout.x_joint_velocity
+    local = [layout.x_local_phase] if layout.local_phases else []
+    return [*split, layout.x_gait, *joints, layout.x_terrain, *local]
 
 
 def y_groups(layout: RowLayout) -> list[slice]:

@@ -46,8 +46,9 @@ class LabelReport:
     """Says where the labels of a clip come from, and holds warnings.
 
     clip: its name. phase_source, gait_source: "file" (made by hand) or "automatic" (found from the motion).
-    phase_zero, margins: the values of these options in the section `labels`. cycles_dropped: number of cycles
-    that are not used. `load_report` of `hobble.core.declared` reads it from the JSON file beside the labels.
+    phase_zero, margins, between: the values of these options in the section `labels`. cycles_dropped: number
+    of cycles that are not used. `load_report` of `hobble.core.declared` reads it from the JSON file beside
+    the labels.
     """
 
     clip: str
@@ -56,6 +57,7 @@ class LabelReport:
     phase_zero: str
     margins: str
     cycles_dropped: int
+    between: bool = False
     warnings: tuple[str, ...] = ()
 
 

@@ -39,6 +39,11 @@ class LabelOptions(Section):
         "or end less than a second before its last frame. extend: they are used, and the path is continued "
         "straight past the clip's end. drop: they are left out, as in Holden et al. (2017)",
     )
+    between: bool = Field(
+        False,
+        description="also use the frames between gait cycles, cut into pieces of about a second. Their phase "
+        "means nothing, so take a kind of network without a phase (`local`, `mann`)",
+    )
     shortest_step: Positive = Field(
         5, description="a landing at most this many frames (at 120 Hz) after the other foot's is left out"
     )

@@ -28,6 +28,7 @@ FASTEST_PHASE = 0.25  # cycles a frame: a larger change of a hand-made phase is 
 # cycle it must have one frame more. With "extend", cycles near an end of the clip are used, because the path
 # can be continued past the end. With "drop", they are left out.
 MARGINS = {"extend": 1, "drop": 60}
+PIECE = 60  # frames of a piece between gait cycles
 
 
 def phase_of_footsteps(footsteps: Array, frames: int) -> tuple[Array, np.ndarray]:
@@ -127,6 +128,25 @@ def find_cycles(footsteps: Array, frames: int, zero: str, margins: str) -> tuple
         else:
             used.append((first, last))
     return np.array(used, int).reshape(-1, 2), left_out
+
+
+def fill_between(cycles: np.ndarray, frames: int, margins: str) -> np.ndarray:
+    """Cycles (D, 2), and the frames before, between and after them, in pieces of a second or a little more.
+
+    margins: as for `find_cycles`.
+
+    >>> fill_between(np.array([[100, 160]]), 230, "extend").tolist()
+    [[1, 100], [100, 160], [160, 227]]
+    """
+    margin = MARGINS[margins]
+    pieces = [list(pair) for pair in cycles.tolist()]
+    edges = [margin, *cycles.ravel().tolist(), frames - margin - 2]
+    for first, last in zip(edges[::2], edges[1::2], strict=True):
+        count = max(1, (last - first) // PIECE)
+        if last > first:
+            at = np.linspace(first, last, count + 1).astype(int).tolist()
+            pieces += [list(pair) for pair in itertools.pairwise(at)]
+    return np.array(sorted(pieces), int).reshape(-1, 2)
 
 
 def mirrored_footsteps(footsteps: Array) -> Array:

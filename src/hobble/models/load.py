@@ -135,7 +135,10 @@ def network_from_arrays(
         "training_facts": read_facts(path, arrays, layout.x_size, layout.y_size),
         "limits": _read_limits(path, meta, labels),
     }
-    network = options_of_kind(meta.kind).network_class().read(path, arrays, shared_fields)
+    kind = options_of_kind(meta.kind)
+    if kind.uses_local_phases != (layout.local_phases > 0):
+        raise InputError(path, f"a network of kind {meta.kind} and {layout} do not fit: local phases")
+    network = kind.network_class().read(path, arrays, shared_fields)
     _check_prediction(path, network)
     return network
 

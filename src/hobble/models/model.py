@@ -38,6 +38,9 @@ class Options(Section):
 
     modes: ClassVar[tuple[str, ...]] = ("exact",)  # the modes of its networks, see `Network.modes`
 
+    # Whether its rows have columns of local phases, see `hobble.labels.local_phase`.
+    uses_local_phases: ClassVar[bool] = False
+
     kind: str = ""
 
     @classmethod

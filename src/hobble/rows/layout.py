@@ -20,11 +20,15 @@ from hobble.core.errors import HobbleError, InputError
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 from hobble.core.untrusted import printable
+from hobble.labels.local_phase import MIRRORED_PARTS
 
 GAITS = ("stand", "walk", "jog", "crouch", "jump", "bump")
 CONTACTS = ("left_heel", "left_toe", "right_heel", "right_toe")
 MOST_COLUMNS = 1 << 16  # of X or Y
 SIDES = ("left", "centre", "right")  # where X has ground heights: left of the path, on it, right of it
+# Keys of `RowLayout.to_dict` that are one number each.
+NUMBERS = ("joints", "window", "step", "local_phases")
+LOCAL = "local_phase"  # name of the block of local phases in X and Y
 # The blocks of X that every network has, in the order of Holden et al. (2017).
 BODY = ("position", "direction", "gait", "joint_position", "joint_velocity", "terrain")
 
@@ -51,8 +55,9 @@ class RowLayout:
     """The columns of X (inputs) and Y (outputs) of the network. Each block of columns is a slice.
 
     joints: number of joints. window: frames of the trajectory before and after the present frame. step:
-    frames between two samples of the trajectory. channels: (name, number of columns) of each channel. In X,
-    the blocks of BODY come first, then the channels.
+    frames between two samples of the trajectory. channels: (name, number of columns) of each channel.
+    local_phases: number of parts of the body with a phase of their own (`hobble.labels.local_phase`). In X,
+    the blocks of BODY come first, then the local phases, then the channels.
 
     With 31 joints, window 60 and step 10, X has 342 columns and Y has 311. With a channel of 30 columns, X
     has 372. Joint blocks hold x, y, z of joint 0, then of joint 1, and so on. Trajectory blocks hold x of
@@ -63,6 +68,7 @@ class RowLayout:
     window: int = 60
     step: int = 10
     channels: tuple[tuple[str, int], ...] = ()
+    local_phases: int = 0
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> RowLayout:
@@ -70,12 +76,13 @@ class RowLayout:
 
         Raises KeyError, TypeError or ValueError if the data describe no layout.
         """
-        if unknown := set(data) - {"joints", "window", "step", "channels"}:
+        if unknown := set(data) - {*NUMBERS, "channels"}:
             raise ValueError(f"there is no such key: {min(unknown)}")
-        numbers = {key: data[key] for key in ("joints", "window", "step") if key in data}
+        numbers = {key: data[key] for key in NUMBERS if key in data}
         channels = dict(data.get("channels", {}))
-        for least, values in ((1, numbers), (0, channels)):
+        for of_numbers, values in ((True, numbers), (False, channels)):
             for key, value in values.items():
+                least = 1 if of_numbers and key != "local_phases" else 0
                 if type(value) is not int or not least <= value <= MOST_COLUMNS:
                     raise ValueError(
                         f"{key} is {value!r:.40}, not a whole number from {least} to {MOST_COLUMNS}"
@@ -87,6 +94,7 @@ class RowLayout:
     def to_dict(self) -> dict[str, Any]:
         """The layout as data that JSON can hold, for `from_dict`."""
         sizes = {"joints": self.joints, "window": self.window, "step": self.step}
+        sizes |= {"local_phases": self.local_phases} if self.local_phases else {}
         return {**sizes, "channels": [list(pair) for pair in self.channels]}
 
     def with_channels(self, names: Iterable[str]) -> RowLayout:
@@ -123,7 +131,7 @@ class RowLayout:
                 strict=True,
             )
         )
-        return _side_by_side(sizes | dict(self.channels))
+        return _side_by_side(sizes | {LOCAL: 2 * self.local_phases} | dict(self.channels))
 
     # Trajectory positions, x then z, in the root coordinates of the row's frame, cm.
     x_position = _Block()
@@ -138,6 +146,9 @@ class RowLayout:
     # Ground heights at the trajectory samples, cm above the mean height on the path. All samples left (+x) of
     # the path come first, then those on it, then those right of it.
     x_terrain = _Block()
+
+    # Local phases now: cosine and sine times the amplitude, of each part of the body.
+    x_local_phase = _Block()
 
     def x_channel(self, name: str) -> slice:
         """The columns of a channel. Raises KeyError if there is no such channel."""
@@ -166,6 +177,10 @@ class RowLayout:
     y_joint_velocity = _Block()
     # Joint rotations of this frame in its root coordinates: axis times half the angle, radians.
     y_joint_rotation = _Block()
+    # Local phases in the next frame, as in X.
+    y_local_phase = _Block()
+    # By how much the angle of each local phase changes until then, cycles.
+    y_local_change = _Block()
 
     @cached_property
     def _y_blocks(self) -> dict[str, slice]:
@@ -174,12 +189,13 @@ class RowLayout:
         sizes = {"root_velocity": 2, "turn": 1, "phase_change": 1, "contacts": len(CONTACTS)}
         sizes |= {"position": trajectory, "direction": trajectory}
         sizes |= {"joint_position": joints, "joint_velocity": joints, "joint_rotation": joints}
+        sizes |= {LOCAL: 2 * self.local_phases, "local_change": self.local_phases}
         return _side_by_side(sizes)
 
     @property
     def y_size(self) -> int:
         """Number of columns of Y."""
-        return self.y_joint_rotation.stop
+        return self.y_local_change.stop
 
     def blocks(self, prefix: str) -> dict[str, slice]:
         """All blocks of X ("x") or Y ("y") by name, in column order: {"position": slice(0, 24), ...}."""
@@ -343,6 +359,7 @@ def mirror_of_x(layout: RowLayout, skeleton: Skeleton) -> ColumnMirror:
     collected.joints(layout.x_joint_position, POINT)
     collected.joints(layout.x_joint_velocity, POINT)
     collected.swap(layout.x_terrain, np.arange(len(SIDES))[::-1])
+    collected.parts(layout.x_local_phase)
     for name, columns in layout.channels:
         # Mirrors the numbers of the columns, which shows from which column each one is taken.
         swapped = channel(name).mirror(np.arange(columns, dtype=float)[None], skeleton)[0]
@@ -362,6 +379,8 @@ def mirror_of_y(layout: RowLayout, skeleton: Skeleton) -> ColumnMirror:
     collected.joints(layout.y_joint_position, POINT)
     collected.joints(layout.y_joint_velocity, POINT)
     collected.joints(layout.y_joint_rotation, ROTATION)
+    collected.parts(layout.y_local_phase)
+    collected.parts(layout.y_local_change)
     return collected.mirror()
 
 
@@ -389,6 +408,11 @@ class _Columns:
         """
         self.swap(block, self.mirror_joints)
         self.sign[block] = np.tile(signs, len(self.mirror_joints))
+
+    def parts(self, block: slice) -> None:
+        """Mirror a block of local phases, which may be empty: the parts of the body swap."""
+        if block.stop > block.start:
+            self.swap(block, np.array(MIRRORED_PARTS))
 
     def swap(self, block: slice, order: np.ndarray) -> None:
         """Mirror a block of equally long parts by changing their order.

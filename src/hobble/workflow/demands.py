@@ -18,6 +18,7 @@ from typing import Any, NamedTuple
 
 from hobble.channels import channel
 from hobble.core.clip_files import is_hurt_version, original
+from hobble.labels.local_phase import PARTS
 from hobble.measures.measure import Cost, measure_named
 from hobble.models.model import TrainedOptions
 from hobble.rows.layout import RowLayout
@@ -183,7 +184,8 @@ def layout_of(configuration: NamedConfiguration) -> RowLayout:
     skeleton = dataset.catalogue.skeleton(dataset.settings.skeleton)
     channels = tuple((name, len(channel(name).columns(skeleton))) for name in configuration.channels)
     row_options = dataset.options("database", "window", "step")
-    return RowLayout(joints=len(skeleton.joints), channels=channels, **row_options)
+    local_phases = len(PARTS) if dataset.settings.database.local_phases else 0
+    return RowLayout(len(skeleton.joints), channels=channels, local_phases=local_phases, **row_options)
 
 
 def thousands_of_frames(dataset: NamedDataset, clip: str) -> float:

@@ -94,6 +94,8 @@ def _check_configuration(project: Project, name: str, seen: dict[str, NamedConfi
         _check_configuration(project, other, seen)
     if settings.training.continues:
         _check_continues(configuration, seen[settings.training.continues])
+    if not settings.network_of:
+        _check_local_phases(configuration)
     if settings.training.symmetric and not settings.network_of:
         _check_symmetric(configuration)
 
@@ -107,6 +109,19 @@ def _check_symmetric(configuration: NamedConfiguration) -> None:
         raise HobbleError(
             f"{where}: data set {configuration.dataset.name} has no mirrored clips, so its left and right "
             "may differ. Write `mirror: true` in the data set, or `symmetric: false`."
+        )
+
+
+def _check_local_phases(configuration: NamedConfiguration) -> None:
+    """Check that the data set has local phases exactly if the network uses them."""
+    network, dataset = configuration.settings.network, configuration.dataset
+    if network.uses_local_phases != dataset.settings.database.local_phases:
+        there = "has none" if network.uses_local_phases else "has them"
+        raise HobbleError(
+            f"configuration {configuration.name}: a network of kind {network.kind} "
+            f"{'needs' if network.uses_local_phases else 'cannot use'} local phases, and data set "
+            f"{dataset.name} {there}. Set `database: {{local_phases: "
+            f"{str(network.uses_local_phases).lower()}}}` in a data set that extends it."
         )
 
 

@@ -101,7 +101,7 @@ enum { I32 = 1, F32 = 2, F64 = 3, I16 = 4, U8 = 5 };
 enum { HEADER = 64, ENTRY = 40, NAME = 16 };
 
 /* The values of the section "sizes". EXTRA: 2 if the first layer gets sine and cosine of the phase after X,
-   else 0. */
+   else 0. LATENT: of a gated network, the number of local phases, see `carry_phases`. */
 enum {
     JOINTS,
     WINDOW,
@@ -173,6 +173,7 @@ typedef struct { /* a character file, read only */
     channel channels[MOST_CHANNELS];
     stack network, gate;
     const int32_t *gate_columns;
+    const double *start_phases; /* local phases of a character that starts */
     /* Motion matching: the Y and the features of each recorded frame, and how many frames of its run follow.
      */
     const void *frames;
@@ -371,8 +372,10 @@ static void read_sizes(reader *r, model *m) {
     m->y_position = 8;
     m->y_direction = 8 + 2 * m->future;
     m->y_joints = 8 + 4 * m->future;
-    require(r, m->size[X_SIZE] == m->samples * (7 + GAITS) + 6 * joints + m->size[COLUMNS], "sizes");
-    require(r, m->size[Y_SIZE] == m->y_joints + 9 * joints, "sizes");
+    int local = form == GATED ? m->size[LATENT] : 0;
+    require(r, m->size[X_SIZE] == m->samples * (7 + GAITS) + 6 * joints + 2 * local + m->size[COLUMNS],
+            "sizes");
+    require(r, m->size[Y_SIZE] == m->y_joints + 9 * joints + 3 * local, "sizes");
     require(r, form == RECORDED ? m->size[ROWS] > 0 && m->size[EVERY] > 0 : m->size[LAYERS] > 0, "sizes");
     require(r, form != PHASED || m->size[BLENDED] == 1 || m->size[BLENDED] == 2 || m->size[BLENDED] == 4,
             "sizes");
@@ -570,6 +573,10 @@ static int read_model(const void *file, size_t bytes, model *m, char *why) {
         m->gate.sets = 1;
         m->gate.storage = FLOAT32;
         m->gate_columns = indices(&r, "gate_columns", (uint64_t)m->size[GATE_INPUTS], 0, m->size[INPUTS] - 1);
+        if (m->size[LATENT]) {
+            m->start_phases = doubles(&r, "start_phases", 2 * (uint64_t)m->size[LATENT], -1e6, 1e6);
+            require(&r, m->x_first[X_TERRAIN] + 3 * m->samples + 2 * m->size[LATENT] <= m->size[X_SIZE], "x_first");
+        }
         read_stack(&r, &m->gate, gate, m->size[GATE_INPUTS], m->size[SETS]);
     }
     return !r.failed;
@@ -863,13 +870,43 @@ static void softmax(float *logits, int count) {
     }
 }
 
+/* Local phases: each foot and hand has a phase of its own, a vector, which the network predicts with the pose.
+   memory: ROW, which is 1 once the character was shown, then the vectors (LATENT, 2).
+   models/local/predictor.py explains it. Writes the vectors into the input row x. */
+static void write_phases(const model *m, double *memory, float *x) {
+    float *at = x + m->x_first[X_TERRAIN] + 3 * m->samples;
+    for (int i = 0; i < 2 * m->size[LATENT]; i++) {
+        if (memory[ROW] != 1) memory[ROW + 1 + i] = m->start_phases[i];
+        at[i] = (float)memory[ROW + 1 + i];
+    }
+    memory[ROW] = 1;
+}
+
+/* The local phases of the next frame, from the prediction y. */
+static void carry_phases(const model *m, double *memory, const float *y) {
+    int count = m->size[LATENT];
+    const float *predicted = y + m->y_joints + 9 * m->size[JOINTS], *change = predicted + 2 * count;
+    for (int i = 0; i < count; i++) {
+        double *vector = memory + ROW + 1 + 2 * i, x = predicted[2 * i], z = predicted[2 * i + 1];
+        double cosine = cos(2 * PI * change[i]), sine = sin(2 * PI * change[i]);
+        double mean_x = vector[0] * cosine - vector[1] * sine + x;
+        double mean_z = vector[0] * sine + vector[1] * cosine + z;
+        double length = sqrt(mean_x * mean_x + mean_z * mean_z);
+        double factor = length > 1e-6 ? sqrt(x * x + z * z) / length : 0;
+        vector[0] = factor > 0 ? mean_x * factor : x;
+        vector[1] = factor > 0 ? mean_z * factor : z;
+    }
+}
+
 /* Standardises the columns of X that the network reads, and writes Y of all characters. */
 static void predict_blend(hobble *h) {
     const model *m = &h->model;
+    int local = m->size[FORM] == GATED ? m->size[LATENT] : 0;
     size_t inputs = (size_t)m->size[INPUTS], extra = (size_t)m->size[EXTRA], sets = (size_t)m->size[SETS];
     for (int c = 0; c < h->characters; c++) {
-        const float *x = h->x + (size_t)c * (size_t)m->size[X_SIZE];
+        float *x = h->x + (size_t)c * (size_t)m->size[X_SIZE];
         float *z = h->z + (size_t)c * (inputs + extra);
+        if (local) write_phases(m, h->state[c].memory, x);
         for (size_t i = 0; i < inputs; i++) z[i] = (x[m->inputs[i]] - m->x_mean[i]) * m->x_inverse[i];
         if (extra) {
             z[inputs] = (float)sin(2 * PI * h->state[c].phase);
@@ -891,6 +928,8 @@ static void predict_blend(hobble *h) {
         for (int c = 0; c < h->characters; c++) softmax(h->shares + (size_t)c * sets, m->size[SETS]);
     }
     run_stack(h, &m->network, h->shares, h->z, h->y);
+    for (int c = 0; local && c < h->characters; c++)
+        carry_phases(m, h->state[c].memory, h->y + (size_t)c * (size_t)m->size[Y_SIZE]);
 }
 
 /* ---- 4. Motion matching ----------------------------------------------------------------------------------
@@ -2200,7 +2239,9 @@ static void distribute(hobble *h, arena *a) {
         size_t widest = widest_layer(stacks[i]);
         h->widest = widest > h->widest ? widest : h->widest;
     }
-    h->memory_size = plays ? OFFSETS + (int)state + OFFSETS_PER_JOINT * m->size[JOINTS] : 0;
+    h->memory_size = plays                  ? OFFSETS + (int)state + OFFSETS_PER_JOINT * m->size[JOINTS]
+                     : m->size[FORM] == GATED && m->size[LATENT] ? ROW + 1 + 2 * m->size[LATENT]
+                                                                 : 0;
     h->number_count = lay_out(h, &one, NULL);
     h->names = take(a, (uint64_t)name_count(m), sizeof *h->names);
     h->state = take(a, count, sizeof *h->state);

@@ -40,9 +40,15 @@ class MannOptions(BlendedOptions):
     """
 
     kind: Literal["mann"] = "mann"
+    gate_inputs: ClassVar[int] = GATE_INPUTS  # number of `gate_columns`
     experts: Annotated[int, Field(ge=2, le=32)] = 8
     gate_layers: Annotated[int, Field(ge=1, le=4)] = 2
     gate_units: Annotated[int, Field(gt=0, le=1024)] = 32
+
+    @property
+    def trainable_class(self) -> type[TrainableMann]:
+        """The class of the kind's networks in training."""
+        return TrainableMann
 
     @classmethod
     def network_class(cls) -> type[Mann]:
@@ -51,8 +57,8 @@ class MannOptions(BlendedOptions):
 
     def trainable(self, flat: Any, sizes: tuple[int, ...], columns: tuple[int, ...]) -> TrainableMann:
         """As in `BlendedOptions`."""
-        gate = (GATE_INPUTS, *[self.gate_units] * self.gate_layers, self.experts)
-        return TrainableMann(flat, sizes, self.experts, gate, columns)
+        gate = (self.gate_inputs, *[self.gate_units] * self.gate_layers, self.experts)
+        return self.trainable_class(flat, sizes, self.experts, gate, columns)
 
     def gate_columns(self, layout: RowLayout, skeleton: Skeleton) -> tuple[int, ...]:
         """The columns of X that the gate gets.

@@ -1,0 +1,100 @@
+"""A mixture of experts gated by local phases (Starke, Zhao, Komura, Zaman 2020).
+
+Each foot and hand has a phase of its own (`hobble.labels.local_phase`), so that motion without a gait cycle
+can be learned. The network predicts the phases of the next frame with the pose. The gate gets the phases
+alone, and where the character is to go.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hobble.core.quat import Array
+from hobble.core.skeleton import Skeleton
+from hobble.labels.local_phase import PARTS
+from hobble.models.mann import Mann, MannOptions, TrainableMann
+from hobble.rows.layout import GAITS, RowLayout
+
+if TYPE_CHECKING:
+    from hobble.models.local.predictor import LocalPredictor
+
+
+class LocalOptions(MannOptions):
+    """Experts gated by local phases. It needs `database: {local_phases: true}` in the data set.
+
+    experts, gate_layers, gate_units: as for `mann`.
+    """
+
+    kind: Literal["local"] = "local"  # type: ignore[assignment]
+    gate_inputs: ClassVar[int] = 2 * len(PARTS) + 2 * len(GAITS) + 2
+    uses_local_phases: ClassVar[bool] = True
+
+    @classmethod
+    def network_class(cls) -> type[Local]:
+        """As in `Options`."""
+        return Local
+
+    @property
+    def trainable_class(self) -> type[TrainableLocal]:
+        """As in `MannOptions`."""
+        return TrainableLocal
+
+    def gate_columns(self, layout: RowLayout, skeleton: Skeleton) -> tuple[int, ...]:
+        """The local phases, the gait now and at the end of the trajectory, and the trajectory's end."""
+        goal = super().gate_columns(layout, skeleton)[-(2 * len(GAITS) + 2) :]
+        return (*range(layout.x_local_phase.start, layout.x_local_phase.stop), *goal)
+
+
+OPTIONS = LocalOptions
+
+
+@dataclass(frozen=True)
+class Local(Mann):
+    """A network of K experts, gated by local phases.
+
+    At run time a character remembers its local phases. The network's inputs of them are taken from there, and
+    not from X.
+    """
+
+    kind: ClassVar[str] = "local"
+
+    @property
+    def memory_size(self) -> int:
+        """As in `Network`: see `hobble.models.local.predictor`."""
+        return 1 + 2 * self.layout.local_phases
+
+    @property
+    def description(self) -> str:
+        """As in `Network`."""
+        return f"network of {self.layers_in_words()} and {self.sets} experts, gated by local phases"
+
+    @property
+    def start(self) -> Array:
+        """(2 * parts,) the local phases of a character that starts."""
+        facts = self.training_facts
+        return (self.x_mean if facts is None else facts.start_x)[self.layout.x_local_phase].astype(float)
+
+    def predictor(self, mode: str | None = None, storage: str | None = None) -> LocalPredictor:
+        """As in `Network`."""
+        from hobble.models.local.predictor import LocalPredictor
+
+        prepared = self.prepare(self.resolve_mode(mode))
+        return LocalPredictor(self, *prepared, self.extended, storage or self.default_storage)
+
+    def engine_data(
+        self, mode: str, storage: str, inputs: NDArray[np.int64]
+    ) -> tuple[dict[str, int], dict[str, np.ndarray]]:
+        """As in `Network`."""
+        sizes, sections = super().engine_data(mode, storage, inputs)
+        return sizes | {"latent": self.layout.local_phases}, sections | {"start_phases": self.start}
+
+
+@dataclass(frozen=True)
+class TrainableLocal(TrainableMann):
+    """A network with experts that are gated by local phases, in training."""
+
+    kind: ClassVar[str] = "local"
