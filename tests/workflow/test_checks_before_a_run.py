@@ -66,6 +66,24 @@ def test_a_symmetric_training_without_mirrors_is_refused(
         check_targets(Project(base, {}), ["results/lame/report.html"])
 
 
+@pytest.mark.parametrize(
+    ("kind", "local_phases", "message"),
+    [
+        ("local", False, "kind local needs local phases, and data set mine has none.*local_phases: true}"),
+        ("mann", True, "kind mann cannot use local phases, and data set mine has them.*local_phases: false}"),
+        ("local", True, ""),
+    ],
+)
+def test_only_a_network_of_local_phases_gets_them(
+    base: Path, unchecked: None, kind: str, local_phases: bool, message: str
+) -> None:
+    section = f"database: {{local_phases: {str(local_phases).lower()}}}\n"
+    (base / "config/datasets/mine.yaml").write_text(DATASET + section)
+    (base / "config/one.yaml").write_text(f"dataset: mine\nnetwork: {{kind: {kind}}}\n")
+    with pytest.raises(HobbleError, match=message) if message else contextlib.nullcontext():
+        check_targets(Project(base, {}), ["results/one/report.html"])
+
+
 LISTED = "skeleton: s\nfolder: mine\nclips: {a: , b: {%s}}\n"
 
 
