@@ -93,7 +93,7 @@ def test_a_loop_of_extends_is_reported(folder: Path) -> None:
         ({"training": {"batch": "many"}}, r"training\.batch: .*integer.*not 'many'"),
         (
             {"evaluation": {"rollouts": []}},
-            r"evaluation\.rollouts: .*at least one number of frames, not \[\]",
+            r"evaluation\.rollouts: .*at least 1 item.*, not \[\]",
         ),
         ({"evaluation": {"lap_seconds": 0.01}}, r"evaluation\.lap_seconds: .*equal to 1, not 0\.01"),
         ({"runtime": {"mode": "quartic"}}, r"runtime\.mode: .*'constant', 'linear' or 'cubic'"),
