@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 
 from hobble.core.quat import Array
-from hobble.models.local import Local
 from hobble.models.network import inverse_or_0
 from hobble.models.predict import BlendPredictor
 
@@ -17,7 +16,7 @@ SHOWN = 0  # index in a character's memory: 1 once it was shown. Its local phase
 class LocalPredictor(BlendPredictor):
     """A `Predictor` that carries each character's local phases from frame to frame."""
 
-    network: Local
+    network: Any  # a `Local`
 
     def evaluate(self, z: Array, phase: Array, out: Array, memory: Any = None, *_: Any) -> None:
         """As in `Predictor`. memory: (C, M) float64. With None, the local phases are those in z."""
