@@ -32,11 +32,6 @@ FLAGS = (
 )
 
 
-def executable() -> str | None:
-    """Path of a browser, or None."""
-    return next(filter(None, map(shutil.which, BROWSERS)), None)
-
-
 # What plotly draws inside a chart is its own; what stands around it is ours.
 AXE = """axe.run({ exclude: [[".main-svg"]] }, { resultTypes: ["violations"] }).then(({ violations }) =>
   violations.flatMap(({ id, nodes }) => nodes.map(({ target }) => `${id}: ${target}`)))"""
@@ -47,13 +42,7 @@ class Browser:
 
     def __init__(self, path: str, profile: Path, width: int = 1280, height: int = 900) -> None:
         (read_there, self._write), (self._read, write_there) = os.pipe(), os.pipe()
-        command = [
-            path,
-            *FLAGS,
-            f"--user-data-dir={profile}",
-            f"--window-size={width},{height}",
-            "about:blank",
-        ]
+        own = (f"--user-data-dir={profile}", f"--window-size={width},{height}")
 
         def connect() -> None:  # the protocol speaks on descriptors 3 and 4
             ends = [fcntl.fcntl(fd, fcntl.F_DUPFD, 10) for fd in (read_there, write_there)]
@@ -61,7 +50,10 @@ class Browser:
             os.dup2(ends[1], 4)
 
         self._process = subprocess.Popen(
-            command, preexec_fn=connect, close_fds=False, stderr=subprocess.DEVNULL
+            [path, *FLAGS, *own, "about:blank"],
+            preexec_fn=connect,
+            close_fds=False,
+            stderr=subprocess.DEVNULL,
         )
         os.close(read_there)
         os.close(write_there)
@@ -95,7 +87,7 @@ class Browser:
         loaded = "document.readyState + location.href.startsWith('about:') + !!globalThis.leaving"
         while self.run(loaded) != "completefalsefalse":
             time.sleep(0.05)
-        self.until("globalThis.Hobble?.ready ?? true", 60)
+        assert self.until("globalThis.Hobble?.ready ?? true", 60), self.console
 
     def run(self, expression: str) -> Any:
         """The value of a JavaScript expression, awaited if it is a promise. Raises if it throws."""
@@ -118,13 +110,20 @@ class Browser:
 
     def size(self, width: int, height: int) -> None:
         """Give the window another size."""
-        self.send(
-            "Emulation.setDeviceMetricsOverride",
-            width=width,
-            height=height,
-            deviceScaleFactor=1,
-            mobile=False,
+        metrics = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": False}
+        self.send("Emulation.setDeviceMetricsOverride", **metrics)
+
+    def choose(self, what: str, index: int) -> None:
+        """Pick an option of the <select> with the id `what`."""
+        self.run(
+            f"(() => {{ const s = document.getElementById('{what}'); s.selectedIndex = {index};"
+            " s.dispatchEvent(new Event('change', { bubbles: true })); })()"
         )
+
+    @property
+    def fetched(self) -> list[str]:
+        """The addresses that the page requested from elsewhere."""
+        return [url for url in self.requests if not url.startswith(("file:", "data:", "blob:", "about:"))]
 
     def violations(self, modules: Path) -> list[str]:
         """What axe finds wrong with the page as it is now. modules: the folder of the npm packages."""
@@ -163,7 +162,7 @@ class Browser:
 
 def opened(page: str, folder: Path) -> Iterator[Browser]:
     """A browser that has opened the page, for a fixture. Without a browser the tests are skipped."""
-    path = executable()
+    path = next(filter(None, map(shutil.which, BROWSERS)), None)
     if path is None:
         pytest.skip(f"no browser here ({', '.join(BROWSERS)}): the page was not opened in one")
     (folder / "report.html").write_text(page, encoding="utf-8")

@@ -38,14 +38,6 @@ def show(tab: Browser, what: str) -> None:
     tab.run(f"document.getElementById('{what}').scrollIntoView({{ behavior: 'instant', block: 'center' }})")
 
 
-def choose(tab: Browser, what: str, index: int) -> None:
-    """Pick an option of a <select>."""
-    tab.run(
-        f"(() => {{ const s = document.getElementById('{what}'); s.selectedIndex = {index};"
-        " s.dispatchEvent(new Event('change')); })()"
-    )
-
-
 def test_charts_are_drawn_when_they_are_scrolled_to(tab: Browser) -> None:
     show(tab, "costs")
     assert tab.until(DRAWN)
@@ -69,7 +61,7 @@ def test_captured_and_predicted_are_drawn_played_and_stepped_through(tab: Browse
     tab.press(" ", "Space")
     assert tab.until(f"{time} > 3.5")
     tab.press(" ", "Space")
-    choose(tab, "compare-choice", tab.run("document.getElementById('compare-choice').options.length") - 1)
+    tab.choose("compare-choice", tab.run("document.getElementById('compare-choice').options.length") - 1)
     assert tab.until(f"{words}.startsWith('a training clip')")
 
 
@@ -89,7 +81,7 @@ def test_choosers_change_their_pictures(tab: Browser) -> None:
     drawn = "document.querySelector('[data-chart=\"sweep-speed\"]').data.map((trace) => trace.y)"
     tab.run("Hobble.drawAll()")
     before = tab.run(drawn)
-    choose(tab, "sweeps-choice", 1)
+    tab.choose("sweeps-choice", 1)
     assert tab.until(f"JSON.stringify({drawn}) !== {before!r}.length")
     assert tab.run(drawn) != before
 
@@ -212,4 +204,4 @@ def test_the_page_prints_no_console_message_and_makes_no_request(tab: Browser) -
     inline style, which the page's policy refuses. Plotly then draws each cell by itself.
     """
     assert [said for said in tab.console if not said.startswith("Applying inline style")] == []
-    assert [url for url in tab.requests if not url.startswith(("file:", "data:", "blob:", "about:"))] == []
+    assert tab.fetched == []
