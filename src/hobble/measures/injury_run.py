@@ -22,26 +22,14 @@ import pandas
 
 from hobble.channels.injury.shown import SLIDERS, link_of_part
 from hobble.core.quat import Array
+from hobble.measures import walks
 from hobble.measures.measure import MeasureInputs, Outcome
-from hobble.measures.walks import (
-    FPS,
-    SPEEDS,
-    CrowdTarget,
-    Walks,
-    channel_values,
-    cycle_frames,
-    distance_to_cycle,
-    generate_walks,
-    rounded,
-    settling_seconds,
-    spearman,
-)
 from hobble.models.load import load_network
 from hobble.models.network import Network
 from hobble.runtime.options import Runtime
 
 INJURY = "injury"  # the channel
-GAITS = tuple(SPEEDS)  # "walk" and "jog"
+GAITS = tuple(walks.SPEEDS)  # "walk" and "jog"
 SEVERITIES = np.arange(11.0)
 STEPS = [*SEVERITIES, *SEVERITIES[-2::-1]]  # severity in each stretch of the sweep: 0, 1, ..., 10, 9, ..., 0
 WORST = len(SEVERITIES) - 1  # index in STEPS of the highest severity
@@ -79,7 +67,7 @@ Stretch = tuple[float, Sequence[Injury]]  # length as a share of the time, and t
 
 def walk_crowd(
     network: Network, gaits: Sequence[str], stretches: Iterable[Stretch], seconds: float, runtime: Runtime
-) -> Walks:
+) -> walks.Walks:
     """Let a crowd walk. gaits: of each figure. seconds: the time of a stretch of length 1.
 
     Before the given stretches, there is one (stretch 0) in which the figures reach their speed, with the
@@ -87,10 +75,12 @@ def walk_crowd(
     """
     stretches = list(stretches)
     script = [
-        CrowdTarget(max(4, round(share * seconds * FPS)), gaits, channel_values(network, INJURY, injuries))
+        walks.CrowdTarget(
+            max(4, round(share * seconds * walks.FPS)), gaits, walks.channel_values(network, INJURY, injuries)
+        )
         for share, injuries in [(WALK_IN, stretches[0][1]), *stretches]
     ]
-    return generate_walks(network, script, runtime)
+    return walks.generate_walks(network, script, runtime)
 
 
 def injury_response(
@@ -135,7 +125,7 @@ def sweep(
     """`rows` (rising severity), `falling`, `responses` and the first `strips` of `injury_response`."""
     figures = [(gait, link) for gait in GAITS for link in links]
 
-    def crowd(*stretches: tuple[float, float]) -> Walks:
+    def crowd(*stretches: tuple[float, float]) -> walks.Walks:
         """The crowd of all figures. stretches: share of the time and severity of each."""
         hurt = [(share, [{link: severity} for _, link in figures]) for share, severity in stretches]
         return walk_crowd(network, [gait for gait, _ in figures], hurt, seconds, runtime)
@@ -163,7 +153,7 @@ def strip_of(cycles: Sequence[Array]) -> dict[str, Any]:
     return {"phase": round(at / len(cycles[0]), 5), "poses": [np.round(c[at], 1).tolist() for c in cycles]}
 
 
-def sweep_rows(crowd: Walks, figure: int, gait: str, link: str) -> Rows:
+def sweep_rows(crowd: walks.Walks, figure: int, gait: str, link: str) -> Rows:
     """One row for each of STEPS: labels, `gait_measures` and distances.
 
     from_healthy, from_worst, from_rising: distance from the healthy walk, from the walk at severity 10, and
@@ -184,7 +174,7 @@ def sweep_rows(crowd: Walks, figure: int, gait: str, link: str) -> Rows:
                 crowd.acceleration[crowd.measured_frames(1 + step, figure), figure].max()
             ),
         }
-        rows.append(rounded(row))
+        rows.append(walks.rounded(row))
     return rows
 
 
@@ -205,8 +195,10 @@ def respond(rows: Rows, largest: float, times: Mapping[str, float | None]) -> di
     measures = {name: [row[name] for row in rows] for name in healthy if name not in labels}
     spread = healthy["from_healthy"]
     found = {
-        "spearman": {n: spearman(SEVERITIES, values[: WORST + 1]) for n, values in measures.items()},
-        "spearman_falling": {n: spearman(SEVERITIES[::-1], values[WORST:]) for n, values in measures.items()},
+        "spearman": {n: walks.spearman(SEVERITIES, values[: WORST + 1]) for n, values in measures.items()},
+        "spearman_falling": {
+            n: walks.spearman(SEVERITIES[::-1], values[WORST:]) for n, values in measures.items()
+        },
         "from_healthy_cm": worst["from_healthy"] - spread,
         "after_healing_cm": healed["from_healthy"] - spread,
         "hysteresis_cm": max(row["from_rising"] for row in rows[WORST + 1 :]) - spread,
@@ -215,22 +207,22 @@ def respond(rows: Rows, largest: float, times: Mapping[str, float | None]) -> di
         "largest_acceleration": largest,
         "acceleration_share": largest / max(healthy["largest_acceleration"], 1e-9),
     }
-    return rounded(found)
+    return walks.rounded(found)
 
 
-def _settling_times(walks: Walks, figure: int) -> dict[str, float | None]:
+def _settling_times(crowd: walks.Walks, figure: int) -> dict[str, float | None]:
     """Time until the walk no longer changes, after the severity has jumped to 10 and back to 0.
 
     None if the walk does not change.
     """
-    phase = walks.phase[:, figure]
-    distance = distance_to_cycle(walks.local[:, figure], phase, walks.cycle(1, figure))
-    before, times = float(np.mean(distance[walks.measured_frames(1, figure)])), {}
+    phase = crowd.phase[:, figure]
+    distance = walks.distance_to_cycle(crowd.local[:, figure], phase, crowd.cycle(1, figure))
+    before, times = float(np.mean(distance[crowd.measured_frames(1, figure)])), {}
     # Stretch 2 is hurt, stretch 3 is healthy again. The second half of each shows the settled walk.
     for name, stretch in (("settle_seconds", 2), ("heal_seconds", 3)):
-        start, end = walks.starts[stretch : stretch + 2]
+        start, end = crowd.starts[stretch : stretch + 2]
         late = slice((start + end) // 2, end)
-        times[name] = settling_seconds(distance[start:end], before, cycle_frames(phase[late]))
+        times[name] = walks.settling_seconds(distance[start:end], before, walks.cycle_frames(phase[late]))
         before = float(np.mean(distance[late]))
     return times
 
@@ -263,7 +255,7 @@ def second_sweep(network: Network, links: Sequence[str], seconds: float, runtime
         labels = {"first": first, "second": second, "first_severity": first_severity}
         alone = single.index(second)
         rows = [
-            rounded(
+            walks.rounded(
                 {
                     **labels,
                     "severity": float(severity),
@@ -304,7 +296,7 @@ def thresholds_of(rows: Rows, equal: int) -> dict[str, float | None]:
     return {
         name: next((row["severity"] for row in rows if is_reached(row)), None)
         for name, is_reached in reached.items()
-    } | rounded({"equal_speed_share": share})
+    } | walks.rounded({"equal_speed_share": share})
 
 
 def into_a_jog(
@@ -322,30 +314,30 @@ def into_a_jog(
     """
     figures: list[tuple[str | None, float]] = [(None, 0.0)]
     figures += [(link, s) for link in links for s in (SEVERITIES[1:].tolist() if link in trained else [10.0])]
-    hurt = channel_values(network, INJURY, [{link: s} if link else {} for link, s in figures])
-    frames = max(4, round(seconds * FPS))
+    hurt = walks.channel_values(network, INJURY, [{link: s} if link else {} for link, s in figures])
+    frames = max(4, round(seconds * walks.FPS))
     # In stretch 0 the figures reach their speed.
     lengths = ((frames, "walk"), (frames, "walk"), (2 * frames, "jog"))
-    script = [CrowdTarget(length, [gait] * len(figures), hurt) for length, gait in lengths]
-    crowd, out = generate_walks(network, script, runtime), []
+    script = [walks.CrowdTarget(length, [gait] * len(figures), hurt) for length, gait in lengths]
+    crowd, out = walks.generate_walks(network, script, runtime), []
     start = int(crowd.starts[2])  # the first frame of the jog
     for i, (link, severity) in enumerate(figures):
         walking, jogging = (crowd.change(stretch, i, stretch, 0) for stretch in (1, 2))
         jog_speed = crowd.speed(2, i)
-        speeds = np.linalg.norm(np.diff(crowd.root[start:, i, ::2], axis=0), axis=1) * FPS
+        speeds = np.linalg.norm(np.diff(crowd.root[start:, i, ::2], axis=0), axis=1) * walks.FPS
         fast = np.flatnonzero(speeds >= JOG_SPEED_SHARE * jog_speed)
         row = {
             "link": link,
             "severity": severity,
             "walk_speed": crowd.speed(1, i),
             "jog_speed": jog_speed,
-            "reach_seconds": float(fast[0]) / FPS if len(fast) else None,
+            "reach_seconds": float(fast[0]) / walks.FPS if len(fast) else None,
             "walk_from_healthy_cm": walking,
             "jog_from_healthy_cm": jogging,
             "kept": jogging / walking if walking > LEAST_EFFECT_CM else None,
             "largest_acceleration": float(crowd.acceleration[start : start + frames, i].max()),
         }
-        out.append(rounded(row))
+        out.append(walks.rounded(row))
     return out
 
 
@@ -369,7 +361,7 @@ def divided_severities(network: Network, links: Sequence[str], seconds: float, r
                 "speed_share": crowd.speed(at, i) / max(crowd.speed(1, i), 1e-9),
                 "largest_acceleration": crowd.roughness(i, at, at + 1),
             }
-            out.append(rounded(row))
+            out.append(walks.rounded(row))
     return out
 
 
@@ -379,7 +371,7 @@ def summarise(responses: Rows) -> dict[str, dict[str, float | None]]:
         return {}
     frame = pandas.json_normalize(responses, sep="_").set_index("gait")[list(SUMMARISED)].astype(float)
     means = frame.groupby("gait", sort=False).mean().to_dict("index")
-    return {str(gait): rounded(row) for gait, row in means.items()}
+    return {str(gait): walks.rounded(row) for gait, row in means.items()}
 
 
 def run(inputs: MeasureInputs, options: Any) -> Outcome:

@@ -22,17 +22,8 @@ from hobble.channels import channel
 from hobble.core.errors import HobbleError
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
+from hobble.gait import profile
 from hobble.gait.cycles import WalkCycles, join_walks, measure_cycles
-from hobble.gait.profile import (
-    EFFECTS,
-    RIGHT,
-    Profile,
-    effects_of_people,
-    features,
-    healthy_profile,
-    measure_effects,
-    profile_of_walk,
-)
 from hobble.gait.recognise import SIDES, compare_walk, examples_of_people
 from hobble.hurt.effects import part_of_link
 from hobble.measures.measure import MeasureInputs, Outcome
@@ -84,9 +75,9 @@ class Walk:
     frames: int = 0
 
     @cached_property
-    def profile(self) -> Profile | None:
+    def profile(self) -> profile.Profile | None:
         """None if there is no whole cycle, which cannot happen in a captured walk."""
-        return profile_of_walk(self.cycles) if len(self.cycles) else None
+        return profile.profile_of_walk(self.cycles) if len(self.cycles) else None
 
     @property
     def performer(self) -> str:
@@ -171,7 +162,7 @@ def _walk_of_clip(
     return Walk(hurt, cycles, mean_cycle(local, phase), clip)
 
 
-def healthy_reference(walk: Walk, walks: Sequence[Walk]) -> tuple[Profile, str]:
+def healthy_reference(walk: Walk, walks: Sequence[Walk]) -> tuple[profile.Profile, str]:
     """The healthy walk to compare a captured walk with, and whose walk it is.
 
     "performer": it is measured over the performer's healthy clips. "data set": if the performer has no
@@ -182,8 +173,8 @@ def healthy_reference(walk: Walk, walks: Sequence[Walk]) -> tuple[Profile, str]:
     of_performer = [other for other in healthy if other.performer == walk.performer]
     for chosen, whose in ((of_performer, "performer"), (healthy, "data set")):
         if chosen:
-            return profile_of_walk(join_walks(other.cycles for other in chosen)), whose
-    return healthy_profile([]), "people"
+            return profile.profile_of_walk(join_walks(other.cycles for other in chosen)), whose
+    return profile.healthy_profile([]), "people"
 
 
 def measure_limps(
@@ -228,7 +219,7 @@ def measure_limps(
         "applies": True,
         "asked_cm_per_second": {gait: 60 * speed for gait, speed in SPEEDS.items()},
         "seconds": seconds,
-        "effects": EFFECTS,
+        "effects": profile.EFFECTS,
         "trained": [link for link in links if link in network.trained_labels(INJURY)],
         "hurt_seconds": hurt_seconds,
         "sizes": sizes,
@@ -236,7 +227,7 @@ def measure_limps(
         "named": _recognition(legs, "severity"),
         "people": {
             gait: {name: [round(v, 5) for v in mean_and_sd] for name, mean_and_sd in of_gait.items()}
-            for gait, of_gait in effects_of_people().items()
+            for gait, of_gait in profile.effects_of_people().items()
         },
         "captured": [_row_of_clip(skeleton, walk, captured) for walk in limps],
         "held_out_limps": [
@@ -271,7 +262,7 @@ def hurt_side(skeleton: Skeleton, injury: Injury) -> str:
 
     Links on the midline count as right, because the effects need a hurt side.
     """
-    return _part_and_side(skeleton, max(injury, key=lambda link: injury[link]))[1] or RIGHT
+    return _part_and_side(skeleton, max(injury, key=lambda link: injury[link]))[1] or profile.RIGHT
 
 
 def row_of_walk(skeleton: Skeleton, figure: Walk, healthy: Walk) -> dict[str, Any]:
@@ -290,13 +281,13 @@ def row_of_walk(skeleton: Skeleton, figure: Walk, healthy: Walk) -> dict[str, An
     row: dict[str, Any] = {"link": link, "part": part, "severity": severity, "side": side}
     row["speed_share"] = round(figure.speed / max(healthy.speed, 1e-9), 5)
     if figure.profile is None:
-        return row | dict.fromkeys((*EFFECTS, "called", "graded", *RECOGNISED))
+        return row | dict.fromkeys((*profile.EFFECTS, "called", "graded", *RECOGNISED))
     found = compare_walk(figure.cycles, figure.frames, healthy.profile)
-    wrong_side = SIDES[1 - SIDES.index(side or RIGHT)]
+    wrong_side = SIDES[1 - SIDES.index(side or profile.RIGHT)]
     answers = [(grade.is_impaired, grade.side == wrong_side) for grade in found.window_grades]
     return {
         **row,
-        **rounded(found.effects[side or RIGHT]),
+        **rounded(found.effects[side or profile.RIGHT]),
         "called": found.answer.name,
         "graded": found.grade.name,
         "impaired": share_of_true([answer.is_impaired for answer in found.window_answers]),
@@ -310,7 +301,7 @@ def _trends(rows: Rows) -> Rows:
     out = []
     for (gait, link), group in groupby(rows, key=lambda row: (row["gait"], row["link"])):
         of_link = list(group)
-        for name in EFFECTS:
+        for name in profile.EFFECTS:
             values = [row[name] for row in of_link]
             if None not in values:
                 rho = spearman([row["severity"] for row in of_link], values)
@@ -370,11 +361,13 @@ def _row_of_clip(skeleton: Skeleton, walk: Walk, captured: Sequence[Walk]) -> di
     """
     healthy, whose = healthy_reference(walk, captured)
     side = hurt_side(skeleton, walk.injury)
-    sizes = rounded(measure_effects(profile_of_walk(walk.cycles), healthy, side))
+    sizes = rounded(profile.measure_effects(profile.profile_of_walk(walk.cycles), healthy, side))
     return {"clip": walk.clip, "hurt": dict(walk.injury), "side": side, "healthy": whose, **sizes}
 
 
-def limp_distance(walk: Profile, healthy: Profile, other: Profile, other_healthy: Profile) -> float:
+def limp_distance(
+    walk: profile.Profile, healthy: profile.Profile, other: profile.Profile, other_healthy: profile.Profile
+) -> float:
     """How much the limps of two bodies differ. A limp is how a body's walk differs from its healthy walk.
 
     walk, healthy: profiles of the first body. other, other_healthy: profiles of the second body. The distance
@@ -382,12 +375,14 @@ def limp_distance(walk: Profile, healthy: Profile, other: Profile, other_healthy
     standard deviation of its feature over people's walks.
     """
     spread = examples_of_people()[0].std(axis=0)
-    a, b = (np.array(list(features(*pair).values())) for pair in ((walk, healthy), (other, other_healthy)))
+    a, b = (
+        np.array(list(profile.features(*pair).values())) for pair in ((walk, healthy), (other, other_healthy))
+    )
     return float(np.sqrt(np.mean(((a - b) / spread) ** 2)))
 
 
 def compare_held_out(
-    walk: Walk, figure: Walk, healthy: Walk, reference: tuple[Profile, str]
+    walk: Walk, figure: Walk, healthy: Walk, reference: tuple[profile.Profile, str]
 ) -> dict[str, Any]:
     """Whether the limp of a held-out clip is nearer to the hurt character than to the healthy one.
 
@@ -402,7 +397,7 @@ def compare_held_out(
         return {**row, "healthy": None, "hurt": None, "nearer": False}
     assert healthy.profile is not None
     from_healthy, from_hurt = (
-        limp_distance(profile_of_walk(walk.cycles), own, other, healthy.profile)
+        limp_distance(profile.profile_of_walk(walk.cycles), own, other, healthy.profile)
         for other in (healthy.profile, figure.profile)
     )
     distances = rounded({"healthy": from_healthy, "hurt": from_hurt})

@@ -121,14 +121,12 @@ def opening_slider(playable: Mapping[str, Any], measurements: Iterable[Mapping[s
     channel = opening_channel(playable)
     if channel is None:
         return {"part": None, "value": 0}
-    # Column -> label of its slider.
+    # Column -> label of its slider. A row of the limps that were measured names its column under "link".
     labels = {channel["columns"][i]: label for label, i in channel["sliders"].items()}
-    # Column -> its strongest limp. A row of the limps that were measured names its column under "link".
-    limps = dict.fromkeys(labels, 0.0)
-    for row in (row for results in measurements for row in results.get("sizes") or ()):
-        if row.get("gait") == "walk" and row["link"] in labels:
-            limps[row["link"]] = max(limps[row["link"]], _limp_size(row))
-    return {"part": labels[max(limps, key=lambda column: limps[column])], "value": OPENING_VALUE}
+    rows = [row for results in measurements for row in results.get("sizes") or ()]
+    limps = [row for row in rows if row.get("gait") == "walk" and row["link"] in labels]
+    part = labels[max(limps, key=_limp_size)["link"]] if limps else next(iter(labels.values()))
+    return {"part": part, "value": OPENING_VALUE}
 
 
 def _limp_size(row: Mapping[str, Any]) -> float:

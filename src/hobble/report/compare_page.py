@@ -137,15 +137,6 @@ def training_curves(compared: parts.Compared) -> parts.Chart | None:
     )
 
 
-# Published measure -> a longer name, if its own name is unclear.
-LONGER_NAMES = {
-    "patches": "patches: pieces of ground cut from height maps (ours: all files of the terrain stage)",
-    "database": "database, on disk",
-    "captured clips": "captured clips (ours: on the target skeleton, at 60 Hz)",
-    "weights of 50 phases": "weights of 50 phases, as the code of Holden et al. stores them",
-}
-
-
 def configuration_table(compared: parts.Compared, measured: Sequence[parts.ComparedValue]) -> parts.Table:
     """A row for each configuration: its settings, and the columns `measured` of its measurements."""
     entries = {entry["configuration"]: entry for entry in compared["configurations"]}
@@ -171,18 +162,22 @@ def configuration_table(compared: parts.Compared, measured: Sequence[parts.Compa
 
 def published_table(compared: parts.Compared) -> parts.Table:
     """The published results next to ours. Results that we did not measure come last."""
-    sources = compared["published"]["sources"]
+    sources, longer = compared["published"]["sources"], parts.told("published.longer")
     formats = {"bytes": parts.format_bytes, "s": parts.format_duration}
-    rows = []
+
+    def as_text(value: float | None, unit: str) -> str:
+        if value is None or unit in formats:
+            return "" if value is None else formats[unit](float(value))
+        return f"{parts.format_number(float(value), 3)} {unit}".strip()
+
     published = (*compared["against_published"], *compared["milliseconds"]["against_published"])
-    for row in sorted(published, key=lambda row: row["ours"] is None):
-        as_text = formats.get(row["unit"], lambda value: parts.format_number(value, 3))
-        unit = f" {row['unit']}" if row["unit"] and row["unit"] not in formats else ""
-        texts = [
-            "" if row[key] is None else f"{as_text(float(row[key]))}{unit}" for key in ("published", "ours")
-        ]
-        measure = LONGER_NAMES.get(row["measure"], row["measure"])
-        measure += ", mean" if row["unit"] == "ms" and not measure.startswith("standard") else ""
-        rows.append([measure, row["configuration"], *texts, parts.citation(row, sources)])
-    heads = [parts.Column(label) for label in ("measure", "configuration", "published", "ours", "source")]
-    return parts.Table("compare-published", heads, rows, "Comparison with published results")
+    records = [
+        {
+            "measure": longer.get(row["measure"], row["measure"]),
+            "configuration": row["configuration"],
+            **{key: as_text(row[key], row["unit"]) for key in ("published", "ours")},
+            "source": parts.citation(row, sources),
+        }
+        for row in sorted(published, key=lambda row: row["ours"] is None)
+    ]
+    return parts.table("compare-published", records, title=parts.words("sections.published.title"))

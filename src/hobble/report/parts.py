@@ -246,11 +246,6 @@ class Column:
         return cls(label, lambda value: f"{value:,.0f}", "n")
 
     @classmethod
-    def duration(cls, label: str) -> Column:
-        """A column of seconds."""
-        return cls(label, lambda value: format_duration(float(value)), "n")
-
-    @classmethod
     def size(cls, label: str) -> Column:
         """A column of bytes."""
         return cls(label, lambda value: format_bytes(float(value)), "n")
@@ -270,17 +265,6 @@ class Table:
     rows: Sequence[Sequence[Any]] = field(repr=False)
     title: str = "Table of the values"
     first: ClassVar[int] = 10  # rows that a page shows at first; its script adds the others
-
-    @classmethod
-    def of(
-        cls,
-        name: str,
-        columns: Mapping[str, Column],
-        records: Iterable[Mapping[str, Any]],
-        title: str = "Table of the values",
-    ) -> Table:
-        """A table with a row for each of `records`. columns: key of the records -> column."""
-        return cls(name, list(columns.values()), [[r.get(key) for key in columns] for r in records], title)
 
     @property
     def cells(self) -> list[list[tuple[str, str, str]]]:
@@ -611,7 +595,8 @@ def table(
             columns[key] = Column(head, kind="long" if is_long else "text")
         else:
             columns[key] = Column.count(head) if isinstance(value, int) else Column.number(head)
-    return Table.of(name, columns, records, title or "Table of the values")
+    rows = [[record.get(key) for key in columns] for record in records]
+    return Table(name, list(columns.values()), rows, title or "Table of the values")
 
 
 def in_words(key: str) -> str:
