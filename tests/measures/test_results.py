@@ -10,7 +10,7 @@ import pytest
 
 import hobble
 from hobble.core.errors import HobbleError
-from hobble.core.files import write_csv, write_tables
+from hobble.core.files import write_tables
 
 
 @pytest.fixture
@@ -21,14 +21,12 @@ def checkout(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         {"clip": c, "split": "train", "mean": m, "position_error_cm": 2.0}
         for c, m in (("a", 0.1), ("b", 0.2))
     ]
+    laps = [{"mode": m, "milliseconds_total": 0.1 * n} for m in ("constant", "cubic") for n in (1, 3)]
     write_tables(folder / "evaluation/accuracy", {"clips": clips, "excerpts": []})
-    laps = [
-        {"mode": m, "lap": n, "milliseconds_total": 0.1 * n} for m in ("constant", "cubic") for n in (1, 3)
-    ]
     write_tables(folder / "evaluation/responsivity", {"laps": laps})
-    (folder / "network").mkdir()
     history = [{"pass": p, "section": s, "train_mse": 1 / (p + s)} for p in (1, 2) for s in (1, 2)]
-    write_csv(folder / "network/history.csv", history)
+    write_tables(folder / "network", {"history": history})
+    write_tables(tmp_path / "results/compare/tables", {"stages": [{"stage": "training", "seconds": 3.5}]})
     monkeypatch.chdir(tmp_path)
     return tmp_path
 
@@ -37,8 +35,6 @@ def test_each_table_is_a_data_frame_with_its_numbers(checkout: Path) -> None:
     tables = hobble.results("test")
     assert sorted(tables) == ["accuracy/clips", "history", "responsivity/laps"]
     assert tables["accuracy/clips"].set_index("clip").loc["b", "mean"] == 0.2
-    (checkout / "results/compare/tables").mkdir(parents=True)
-    write_csv(checkout / "results/compare/tables/stages.csv", [{"stage": "training", "seconds": 3.5}])
     assert hobble.results("compare")["stages"]["seconds"].sum() == 3.5
     with pytest.raises(HobbleError, match=r"results/none has no tables. Make them: snakemake"):
         hobble.results("none")
