@@ -14,6 +14,7 @@ from hobble.core.skeleton import Skeleton, local_rotations
 from hobble.measures.measure import MeasureInputs, Outcome
 from hobble.measures.motion_quality import FPS, cleanness, compare_windows, window_features
 from hobble.measures.sample import HURT_VERSION, ClipPart, clip_parts
+from hobble.measures.walks import in_world
 from hobble.models.load import load_network
 from hobble.models.network import Network
 from hobble.rows.clip_rows import captured_stretches, headings, rotate_by_yaw
@@ -193,8 +194,7 @@ def _commands_of(part: ClipPart, skeleton: Skeleton) -> Iterator[Command]:
             continue
         yaw = headings(rows.y[captured.rows][:, layout.y_turn][:, 0].astype(float))
         turns = rows.y[captured.rows][:, layout.y_joint_rotation].reshape(len(captured), -1, 3)
-        positions = captured.local.copy()
-        positions[..., ::2] = rotate_by_yaw(positions[..., ::2], yaw[:, None]) + captured.root[:, None, ::2]
+        positions = in_world(captured.local, captured.root, yaw)
         motion = Motion(positions, local_rotations(skeleton, world_rotations(turns, yaw)))
         ahead = np.column_stack([np.sin(yaw), np.cos(yaw)])
         velocity = rotate_by_yaw(captured.velocity, yaw)
