@@ -16,17 +16,20 @@ from hobble.measures.measure import Row, flatten, functions
 from hobble.models import network_options
 
 
-def difference_in_sds(mean_a: float, sd_a: float, mean_b: float, sd_b: float) -> float | None:
+def difference_in_sds(
+    mean_a: float | None, sd_a: float | None, mean_b: float | None, sd_b: float | None
+) -> float | None:
     """The difference of two means, in units of the mean of both standard deviations.
 
-    This is 2 |mean_a - mean_b| / (sd_a + sd_b), equation 3.2 of Segerstedt 2021. None if both standard
-    deviations are 0.
+    This is 2 |mean_a - mean_b| / (sd_a + sd_b), equation 3.2 of Segerstedt 2021. None if a value is unknown,
+    or both standard deviations are 0.
 
     >>> difference_in_sds(3.0, 0.5, 1.0, 1.5)
     2.0
     """
-    deviations = sd_a + sd_b
-    return 2 * abs(mean_a - mean_b) / deviations if deviations > 0 else None
+    if mean_a is None or mean_b is None or sd_a is None or sd_b is None or sd_a + sd_b == 0:
+        return None
+    return 2 * abs(mean_a - mean_b) / (sd_a + sd_b)
 
 
 def fit_line(x: Sequence[float], y: Sequence[float]) -> dict[str, Any]:
@@ -116,15 +119,12 @@ def compare_series(a: Json, b: Json) -> dict[str, Any]:
     means.
     """
     (mean_a, sd_a), (mean_b, sd_b) = (mean_and_sd(series.get("means", ())) for series in (a, b))
-    difference_of_means = None
-    if mean_a is not None and mean_b is not None and sd_a is not None and sd_b is not None:
-        difference_of_means = difference_in_sds(mean_a, sd_a, mean_b, sd_b)
     return {
         **{f"{key}_{name}": series[key] for name, series in (("a", a), ("b", b)) for key in ("mean", "sd")},
         "difference": difference_in_sds(a["mean"], a["sd"], b["mean"], b["sd"]),
         "sd_of_means_a": sd_a,
         "sd_of_means_b": sd_b,
-        "difference_of_means": difference_of_means,
+        "difference_of_means": difference_in_sds(mean_a, sd_a, mean_b, sd_b),
     }
 
 
@@ -269,14 +269,18 @@ def published_differences(over: str, rows: Sequence[Json], published: Json) -> l
 
 
 def comparison_tables(compared: Json) -> dict[str, Sequence[Row]]:
-    """Table name -> rows, from the content of compare.json. The rows of a table have the same keys."""
+    """Table name -> rows, from the content of compare.json. A row may lack columns that others have."""
     measure_tables = {
         name: rows for _, make_tables in functions("tables") for name, rows in make_tables(compared).items()
     }
     return {
         "configurations": [flatten(row) for row in compared["configurations"]],
         **measure_tables,
-        "training": _training(compared),
+        "training": [
+            {key: value if key == "configuration" else value[i] for key, value in of.items()}
+            for of in compared["training"]
+            for i in range(len(of.get("pass", ())))
+        ],
         "stages": list(compared["stages"]),
         "difference": [
             {"measure": measure, **row}
@@ -288,14 +292,3 @@ def comparison_tables(compared: Json) -> dict[str, Sequence[Row]]:
         ],
         "published": [*compared["against_published"], *compared["milliseconds"]["against_published"]],
     }
-
-
-def _training(compared: Json) -> list[Row]:
-    """A row for each pass of each training. A value that the training did not record is None."""
-    columns = dict.fromkeys(key for entry in compared["training"] for key in entry if key != "configuration")
-    return [
-        {"configuration": entry["configuration"]}
-        | {column: entry[column][i] if column in entry else None for column in columns}
-        for entry in compared["training"]
-        for i in range(len(entry.get("pass", ())))
-    ]
