@@ -131,8 +131,8 @@ def tables(compared: Json) -> dict[str, list[Row]]:
 
 def compared_values(compared: Compared) -> Iterator[parts.ComparedValue]:
     """Skating, with the cleanest feet, the circle, with who is closest to it, and the Frechet distance."""
-    skating = "Cleanest feet", "{name} has {value} cm a frame in a straight walk"
-    circle = "Closest to a circle", "{name} has {value} cm from it on average"
+    skating = "Cleanest feet", "the feet of {name} skate {value} cm a frame in a straight walk"
+    circle = "Closest to a circle", "{name} is {value} cm off a circle on average"
     for order, key, label, verdict in (
         (60, "straight_skating", "skating, cm", skating),
         (61, "paths_circle_cm", "off a circle, cm", circle),

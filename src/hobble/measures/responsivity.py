@@ -442,9 +442,9 @@ def compared_values(compared: Compared) -> Iterator[parts.ComparedValue]:
     of_off = "{name} is never more than {value} cm off the track"
     of_slide = "the feet of {name} slide {value} cm a step"
     of_time, of_size = "the median frame of {name} takes {value} ms", "{name} needs {value} of memory to run"
-    yield value(30, number("cm off the track"), off, "Closest to the track", of_off, left_out)
-    yield value(31, number("foot slide, cm a step", 2), slides, "Smoothest", of_slide)
-    yield value(32, number("largest turn in a frame, °"), turns)
+    yield value(30, number("off the track, cm"), off, "Closest to the track", of_off, left_out)
+    yield value(31, number("foot slide, cm", 2), slides, "Smoothest", of_slide)
+    yield value(32, number("largest turn, °"), turns)
     yield value(40, number("ms per frame, median"), frames, "Fastest", of_time)
     yield value(41, parts.Column.count("parameters of one frame"), counts)
     yield value(110, parts.Column.size("in memory"), stored, "Smallest", of_size)

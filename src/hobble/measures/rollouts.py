@@ -92,7 +92,7 @@ def compared_values(compared: Compared) -> Iterator[parts.ComparedValue]:
         if any(value is not None for value in errors.values()):
             of_what = f"in roll-outs of {length} frames on {label}"
             far = "the joints of {name} are {value} cm from the captured joints on average, " + of_what
-            column = parts.Column.number(f"cm from captured joints {of_what}")
+            column = parts.Column.number("roll-out error, cm")
             yield parts.ComparedValue(25, column, errors, "Closest to captured motion", far)
             return
 
