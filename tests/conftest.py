@@ -19,6 +19,9 @@ from hypothesis import HealthCheck, settings
 from hobble.core.skeleton import Skeleton
 from tests.checkout import Workflow, copy_of
 
+# Each process of pytest has a core. More threads for matrix products would only wait for each other.
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+
 ROOT = Path(__file__).resolve().parents[1]
 collect_ignore = ["engine/bake_in_blender.py"]  # it runs in Blender
 

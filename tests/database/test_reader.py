@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 
 from hobble.core.errors import HobbleError, InputError
 from hobble.core.files import read_json
-from hobble.database.chunks import to_stored_type
+from hobble.database.chunks import database_sizes, to_stored_type
 from hobble.database.reader import Block, Database
 from hobble.database.write import write_database
 from hobble.rows.clip_rows import pair_batches
@@ -211,6 +211,17 @@ def test_an_incomplete_database_is_refused(path, tmp_path):
     (tmp_path / "manifest.json").write_text(json.dumps(manifest))
     with pytest.raises(InputError, match="chunks"):
         Database.open(tmp_path)
+
+
+def test_a_database_is_much_smaller_than_in_the_original_layout(path):
+    """The original has each pair of a frame and a ground apart. Most numbers here are of grounds."""
+    manifest = Database.open(path).manifest
+    found, layout = database_sizes(manifest), manifest.layout
+    rows = sum(manifest.row_count(split) for split in ("train", "held_out"))
+    assert (found["frames"], found["pairs"]) == (rows, 10 * rows)
+    assert found["bytes"] == sum(file.stat().st_size for file in path.rglob("*.safetensors"))
+    assert found["original_bytes"] == 10 * rows * 4 * (layout.x_size + layout.y_size + 1)
+    assert found["share"] == found["bytes"] / found["original_bytes"] < 0.25
 
 
 def test_a_chunk_can_be_opened_with_numpy(path):

@@ -20,6 +20,7 @@ from hobble.training.augment import Augmentation, RollOut
 from hobble.training.batches import SampleBatch
 from hobble.training.optimiser import Update
 from hobble.training.options import Training
+from hobble.training.train import run
 
 SPLITS = {"walk": "train", "hop": "train", "turn": "held_out"}
 
@@ -78,6 +79,15 @@ def data(small_database: Path) -> Database:
 @pytest.fixture
 def network() -> PfnnOptions:
     return PfnnOptions(hidden_layers=2, units=24, control_points=4)
+
+
+def run_in(folder: Path, database: Path, network: Any, training: Any, **more: Any) -> Path:
+    """Train as the workflow does. Returns the folder with weights.npz, history.csv and checkpoint.npz."""
+    files = {"weights": "weights.npz", "history": "history.csv", "checkpoint": "checkpoint.npz"}
+    options = {name: folder / file for name, file in files.items()} | {"checkpoints": folder / "checkpoints"}
+    options |= {"configuration": "example", "threads": 1, "start": None, "code": None} | more
+    run(database, network=network, training=training, **options)
+    return folder
 
 
 class Recipe(Training):

@@ -16,8 +16,9 @@ from hobble.models.load import load_network
 from hobble.models.matching import MatchingOptions
 from hobble.rows.clip_rows import save_clip_rows
 from hobble.training.options import Training
-from hobble.training.train import run
 from tests.models.matching.example import FRAMES, clip
+
+from .conftest import run_in
 
 SPLITS = {"clip-0": "train", "clip-1": "held_out"}
 
@@ -34,20 +35,8 @@ def files(holden31: Skeleton, tmp_path: Path) -> dict[str, Path]:
 
 
 def built(folder: Path, clips: dict[str, Path]) -> None:
-    run(
-        folder / "all",
-        configuration="example",
-        network=MatchingOptions(),
-        training=Training(memory_mb=64, device="cpu"),
-        checkpoints=folder / "checkpoints",
-        threads=1,
-        start=None,
-        code=None,
-        weights=folder / "weights.npz",
-        history=folder / "history.csv",
-        checkpoint=folder / "checkpoint.npz",
-        clips=clips,
-    )
+    recipe = Training(memory_mb=64, device="cpu")
+    run_in(folder, folder / "all", MatchingOptions(), recipe, clips=clips)
 
 
 def test_a_built_network_holds_the_training_clips_and_has_a_held_out_error(files, tmp_path: Path) -> None:

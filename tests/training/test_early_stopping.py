@@ -14,7 +14,8 @@ from hobble.core.errors import HobbleError
 from hobble.database.reader import Database
 from hobble.training import train
 from hobble.training.checkpoint import State
-from hobble.training.train import run
+
+from .conftest import run_in
 
 Settings = dict[str, Any]
 # Noise that grows: a rate at which the error falls for some sections and then rises.
@@ -56,33 +57,19 @@ def test_training_ends_after_that_many_sections_without_a_lower_error(go: Callab
     assert go("stopped").sections_done == len(whole), "without patience it goes on"
 
 
-def written(folder: Path, small_database: Path, network: Settings, training: Settings, keep: str) -> Any:
-    paths = {name: folder / f"{keep}-{name}.npz" for name in ("weights", "checkpoint")}
-    run(
-        small_database,
-        configuration="example",
-        network=network,
-        training=training | {**WILD, "keep": keep},
-        checkpoints=folder / "checkpoints",
-        threads=1,
-        start=None,
-        code=None,
-        history=folder / f"{keep}.csv",
-        **paths,
-    )
-    return paths
-
-
 def test_the_best_weights_are_written_and_the_checkpoint_keeps_the_last(
     small_database: Path, network: Settings, training: Settings, tmp_path: Path
 ) -> None:
-    best, last = (written(tmp_path, small_database, network, training, keep) for keep in ("best", "last"))
-    checkpoint = dict(np.load(last["checkpoint"]))
-    for name, value in np.load(best["checkpoint"]).items():
-        if name != "seconds":
+    best, last = (
+        run_in(tmp_path / keep, small_database, network, training | {**WILD, "keep": keep})
+        for keep in ("best", "last")
+    )
+    checkpoint = dict(np.load(last / "checkpoint.npz"))
+    for name, value in np.load(best / "checkpoint.npz").items():
+        if name not in ("seconds", "history"):
             np.testing.assert_array_equal(value, checkpoint[name], err_msg=name)
     assert not np.array_equal(checkpoint["weights"], checkpoint["best"])
-    meta = [json.loads(str(np.load(files["weights"])["meta"])) for files in (best, last)]
+    meta = [json.loads(str(np.load(folder / "weights.npz")["meta"])) for folder in (best, last)]
     errors = checkpoint["history"][:, 5]
     assert meta[0]["best_section"] == int(errors.argmin()) + 1 < len(errors)
     assert "best_section" not in meta[1]

@@ -15,7 +15,9 @@ from hobble.core.files import load_npz, save_npz
 from hobble.database.reader import Database
 from hobble.rows.layout import CONTACTS, GAITS, RowLayout
 from hobble.training.checkpoint import State, pack, recipe_hash
-from hobble.training.train import run, train
+from hobble.training.train import train
+
+from .conftest import run_in
 
 Settings = dict[str, Any]
 
@@ -27,12 +29,12 @@ def test_more_passes_resume_and_fewer_start_again(
 
     def to(passes: float, folder: str) -> State:
         settings = training | {"passes": passes}
-        return train(data, network=network, training=settings, checkpoints=tmp_path / folder, threads=2)
+        return train(data, network=network, training=settings, checkpoints=tmp_path / folder, threads=1)
 
     third, whole = to(1 / 3, "a"), to(1, "b")
     assert third.samples == data.section_sample_count("train", 0, 3) < data.sample_count("train")
     assert [row[:3] for row in third.history] == [row[:3] for row in whole.history[:1]]
-    for passes in (1, 4 / 3, 3):
+    for passes in (1, 7 / 3):
         resumed = to(passes, "a")
         assert len(resumed.history) == round(3 * passes)
         assert torch.equal(resumed.network.flat, to(passes, f"to {passes}").network.flat)
@@ -46,21 +48,10 @@ def test_continuing_a_configuration_equals_one_longer_training(
     small_database: Path, data: Database, network: Settings, training: Settings, tmp_path: Path
 ) -> None:
     def go(name: str, passes: int, start: str | None) -> dict[str, np.ndarray]:
-        folder = tmp_path / name
-        run(
-            small_database,
-            configuration=name,
-            network=network,
-            training=training | {"passes": passes, "continues": start},
-            checkpoints=folder / "checkpoints",
-            threads=2,
-            start=tmp_path / start / "checkpoint.npz" if start else None,
-            code="fingerprint",
-            weights=folder / "weights.npz",
-            history=folder / "history.csv",
-            checkpoint=folder / "checkpoint.npz",
-        )
-        return load_npz(folder / "weights.npz")
+        recipe = training | {"passes": passes, "continues": start}
+        begun = tmp_path / start / "checkpoint.npz" if start else None
+        run_in(tmp_path / name, small_database, network, recipe, start=begun, code="fingerprint")
+        return load_npz(tmp_path / name / "weights.npz")
 
     go("holden", 2, None)
     continued, scratch = go("holden-xt", 4, "holden"), go("scratch", 4, None)
@@ -69,7 +60,8 @@ def test_continuing_a_configuration_equals_one_longer_training(
             assert np.array_equal(continued[name], scratch[name]), name
     assert len((tmp_path / "holden-xt" / "history.csv").read_text().splitlines()) == 1 + 4 * 3
     assert json.loads(str(continued["meta"]))["passes"] == 4
-    assert [f["steps"] for f in _checkpoints(tmp_path)] == [288, 144, 288]
+    names = ("holden-xt", "holden", "scratch")
+    assert [load_npz(tmp_path / name / "checkpoint.npz")["steps"] for name in names] == [288, 144, 288]
 
 
 def test_another_start_network_ignores_the_earlier_checkpoint(
@@ -99,51 +91,31 @@ def test_another_start_network_ignores_the_earlier_checkpoint(
     assert len(list((tmp_path / "run").iterdir())) == 3
 
 
-@pytest.mark.parametrize(
-    ("units", "settings", "message"),
-    [
-        (24, {"passes": 4, "sections": 2}, "was trained with 3 sections a pass, but training.sections is 2"),
-        (24, {"passes": 1}, "has 2 passes, but training.passes is 1"),
-        (30, {}, r"holds a network of \d+-24-24-\d+ units.* not of .*-30-30-"),
-    ],
-)
-def test_an_unusable_start_network_is_refused(
-    data: Database,
-    network: Settings,
-    training: Settings,
-    tmp_path: Path,
-    units: int,
-    settings: Settings,
-    message: str,
+def test_a_start_network_of_another_shape_is_refused(
+    data: Database, network: Settings, training: Settings, tmp_path: Path
 ) -> None:
-    state = train(data, network=network, training=training, checkpoints=tmp_path / "a")
-    start = tmp_path / "start.npz"
+    """`hobble.workflow.targets` refuses other sections and fewer passes, before the run."""
+    state, start = train(data, network=network, training=training, checkpoints=tmp_path), tmp_path / "s.npz"
     save_npz(start, **pack(state))
-    other = network.model_copy(update={"units": units})
-    with pytest.raises(InputError, match=rf"start\.npz: {message}"):
-        train(data, network=other, training=training | settings, checkpoints=tmp_path / "b", start=start)
-
-
-def _checkpoints(folder: Path) -> list[dict[str, np.ndarray]]:
-    return [load_npz(folder / name / "checkpoint.npz") for name in ("holden-xt", "holden", "scratch")]
+    other = network.model_copy(update={"units": 30})
+    with pytest.raises(InputError, match=r"s\.npz: holds a network of \d+-24-24-.* not of .*-30-30-"):
+        train(data, network=other, training=training, checkpoints=tmp_path / "b", start=start)
 
 
 def test_the_weights_file_is_enough_for_the_runtime(
     small_database: Path, data: Database, network: Settings, training: Settings, tmp_path: Path
 ) -> None:
-    files = {name: tmp_path / name for name in ("weights", "history", "checkpoint")}
-    settings = {"network": network, "training": training, "threads": 2, "start": None, "code": None}
-    settings |= {"configuration": "small", "terrain_side": 31.0}
-    run(small_database, checkpoints=tmp_path / "c", **settings, **files)
-    first = files["weights"].read_bytes()
-    run(small_database, checkpoints=tmp_path / "d", **settings, **files)
-    assert files["weights"].read_bytes() == first
-    weights = load_npz(files["weights"])
+    first, again = (
+        run_in(tmp_path / name, small_database, network, training, terrain_side=31.0) / "weights.npz"
+        for name in ("first", "again")
+    )
+    assert first.read_bytes() == again.read_bytes()
+    weights = load_npz(first)
     meta = json.loads(str(weights["meta"]))
     assert RowLayout.from_dict(meta["layout"]) == data.layout
     assert list(meta["skeleton"]["joints"]) == list(data.skeleton["joints"])
     assert (meta["gaits"], meta["contacts"]) == (list(GAITS), list(CONTACTS))
-    assert (meta["channels"], meta["configuration"]) == ({"injury": ["Hips-LeftLeg"]}, "small")
+    assert (meta["channels"], meta["configuration"]) == ({"injury": ["Hips-LeftLeg"]}, "example")
     assert (meta["kind"], meta["terrain_side"]) == ("pfnn", 31.0)
     assert meta["network"].startswith("y = W2 elu(W1 elu(W0 x + b0) + b1) + b2 on")
     assert weights["W0"].shape == (4, 24, data.layout.x_size)
@@ -156,7 +128,9 @@ def test_the_weights_file_is_enough_for_the_runtime(
             x = weights[f"W{layer}"][int(phase * 4)] @ x + weights[f"b{layer}"][int(phase * 4)]
             x = np.where(x > 0, x, np.expm1(x)) if layer < 2 else x
         y.append(x)
-    state = train(data, network=network, training=training, checkpoints=tmp_path / "c", threads=2)
+    state = train(
+        data, network=network, training=training, checkpoints=tmp_path / "first/checkpoints", threads=1
+    )
     ours = state.network(torch.from_numpy(block.x[:2]), torch.from_numpy(p.astype(np.float32)))
     assert np.allclose(ours.numpy(), np.stack(y), rtol=1e-4, atol=1e-4)
 

@@ -9,6 +9,7 @@ import sys
 import time
 from pathlib import Path
 
+import psutil
 import pytest
 
 from hobble.core.errors import HobbleError, InputError
@@ -32,7 +33,7 @@ def started(log: str | Path, work: str, run: int | None = None) -> subprocess.Po
     """A job of the run with that process id, after its work has begun."""
     environment = dict(os.environ)
     if run is not None:
-        environment[lifetime.RUN_VARIABLE] = f"{run} {lifetime._start_time(run)}"
+        environment[lifetime.RUN_VARIABLE] = f"{run} {psutil.Process(run).create_time()}"
     command = [sys.executable, "-c", SCRIPT.format(log=str(log), work=work)]
     pipe = subprocess.PIPE
     process = subprocess.Popen(command, env=environment, stdout=pipe, stderr=subprocess.STDOUT, text=True)

@@ -84,19 +84,16 @@ class Limits:
     def from_dict(
         cls, path: str | Path, name: str, data: Mapping[str, Any], gaits: int, labels: int, highest: float
     ) -> Limits:
-        """The inverse of `to_dict`. In older files without `usual`, it is the highest of the gait's `speeds`.
+        """The inverse of `to_dict`.
 
         path, name: the file and the name of the channel, for messages. gaits, labels: how many there are.
         highest: the highest value of the channel. Raises InputError for limits that are not possible.
         """
-        where, arrays = f"limits of {name}: ", {}
+        where = f"limits of {name}: "
         try:
-            for key in ("levels", "speeds", "usual"):
-                arrays[where + key] = np.array(
-                    np.max(data["speeds"], axis=(1, 2), initial=0.0) if key not in data else data[key], float
-                )
+            arrays = {where + key: np.array(data[key], float) for key in ("levels", "speeds", "usual")}
         except (KeyError, TypeError, ValueError, OverflowError):
-            problem = f"{where}`levels` and `speeds` have to be tables of numbers"
+            problem = f"{where}`levels`, `speeds` and `usual` have to be tables of numbers"
             raise InputError(path, problem) from None
         declared = {
             f"{where}levels": ArrayOf(("K",), low=0.0, high=highest),

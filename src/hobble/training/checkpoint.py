@@ -243,11 +243,10 @@ def begin_or_resume(
     start: path of another checkpoint to start from, or None.
 
     The state comes from the run's own checkpoint. If there is none, or if it has more passes than
-    `training.passes`, the state comes from `start`. Without `start`, it is new. Raises InputError for a
-    checkpoint that is damaged or has a network of another shape, and for a `start` that has more passes than
-    `training.passes` or another number of sections in a pass. If there are several processes, the first one
-    reads the checkpoint and sends the state to the other processes. These get `checkpoints` as the path,
-    which they do not use.
+    `training.passes`, the state comes from `start`, which must have as many sections in a pass. Without
+    `start`, it is new. Raises InputError for a checkpoint that is damaged or has a network of another shape.
+    If there are several processes, the first one reads the checkpoint and sends the state to the other
+    processes. These get `checkpoints` as the path, which they do not use.
     """
     state, path = new_state(database, network, training, processes), checkpoints
     if processes.is_first:
@@ -282,7 +281,6 @@ def _restore(state: State, training: Training, recipe: str, checkpoints: Path, s
         )
     if start is not None and start_arrays is not None:
         unpack(start_arrays, state, start)
-        _check_start(state, training, start)
         if state.recipe != recipe:
             log.warning(
                 "%s was made with other settings, data or code; the training resumes from it all the same",
@@ -290,28 +288,6 @@ def _restore(state: State, training: Training, recipe: str, checkpoints: Path, s
             )
         log.info("resuming from %s, after section %d of %d", start, state.sections_done, last_section)
     return own_path
-
-
-def _check_start(state: State, training: Training, path: Path) -> None:
-    """Raise InputError if the start checkpoint does not fit the training.
-
-    It must have the same number of sections in a pass, and must not have more passes than the training.
-    """
-    # row[1] is the number of a section in its pass, from 1. So the largest is the number of sections a pass.
-    sections = int(max(row[1] for row in state.history)) if state.history else training.sections
-    if sections != training.sections:
-        raise InputError(
-            path,
-            f"was trained with {sections} sections a pass, but training.sections is {training.sections}",
-            fix=f"Set training.sections to {sections}, or remove training.continues.",
-        )
-    if state.sections_done > training.all_sections:
-        passes = f"{state.sections_done / sections:g}"
-        raise InputError(
-            path,
-            f"has {passes} passes, but training.passes is {training.passes:g}",
-            fix=f"Set training.passes to more than {passes}, or remove training.continues.",
-        )
 
 
 def new_state(

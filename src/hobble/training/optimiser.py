@@ -189,10 +189,7 @@ class Symmetry:
         skeleton = Skeleton.from_dict(database.skeleton)
         inputs = mirror_of_x(layout, skeleton).for_standardised_rows(statistics.x_mean, statistics.x_std)
         outputs = mirror_of_y(layout, skeleton).for_standardised_rows(statistics.y_mean, statistics.y_std)
-        mirrors = network.mirrors(inputs, outputs)
-        self.layers = [
-            LayerSymmetry(layer, mirror) for layer, mirror in zip(network.layers, mirrors, strict=True)
-        ]
+        self.layers = list(zip(network.layers, network.mirrors(inputs, outputs), strict=True))
 
     def make_new_network_symmetric(self) -> None:
         """Make the random weights of a new network symmetric.
@@ -201,8 +198,8 @@ class Symmetry:
         weights, but not the biases, are then multiplied by sqrt(2).
         """
         self.enforce()
-        for symmetry in self.layers:
-            symmetry.layer[:, :, :-1].mul_(2**0.5)
+        for layer, _ in self.layers:
+            layer[:, :, :-1].mul_(2**0.5)
         self.enforce()  # again, because the symmetric biases depend on the weights
 
     def after_step(self, steps: int) -> None:
@@ -214,13 +211,13 @@ class Symmetry:
             self.enforce()
 
     def enforce(self) -> None:
-        """Make the network symmetric."""
-        for symmetry in self.layers:
-            symmetry.enforce()
+        """Replace each layer by the mean of itself and its mirror image."""
+        for layer, mirror in self.layers:
+            layer.add_(mirror_image(layer, mirror)).mul_(0.5)
 
 
-class LayerSymmetry:
-    """Makes the parameters of a layer equal to those of its mirror image.
+def mirror_image(layer: Tensor, mirror: LayerMirror) -> Tensor:
+    """The mirror image (out, K, in + 1) of a layer.
 
     A layer y = W x + b is symmetric if mirrored inputs, half a cycle later, give mirrored outputs. The mirror
     images of x and y are x' = M x + d and y' = N y + e. M and N are permutations with signs, and each is its
@@ -228,28 +225,13 @@ class LayerSymmetry:
     of half a cycle later. Mirroring twice gives the same layer, so the mean of a layer and its mirror image
     is symmetric.
     """
-
-    def __init__(self, layer: Tensor, mirror: LayerMirror) -> None:
-        device = layer.device
-        self.layer, self.half_cycle = layer, mirror.half_cycle
-        self.input_source, self.output_source = (
-            torch.from_numpy(columns.source).to(device) for columns in (mirror.inputs, mirror.outputs)
-        )
-        self.input_shift, self.output_shift = (
-            torch.from_numpy(columns.shift).to(device, layer.dtype)
-            for columns in (mirror.inputs, mirror.outputs)
-        )
-        signs = np.outer(mirror.outputs.sign, mirror.inputs.sign)
-        self.weight_signs = torch.from_numpy(signs).to(device, layer.dtype)[:, None]
-        self.bias_signs = torch.from_numpy(mirror.outputs.sign).to(device, layer.dtype)[:, None]
-
-    def mirror_image(self) -> Tensor:
-        """The mirror image (out, K, in + 1) of the layer."""
-        swapped = self.layer.roll(self.half_cycle, 1)[self.output_source]
-        weights, biases = swapped[:, :, :-1], swapped[:, :, -1]
-        biases = self.bias_signs * (biases + weights @ self.input_shift) + self.output_shift[:, None]
-        return torch.cat([weights[:, :, self.input_source] * self.weight_signs, biases[:, :, None]], dim=2)
-
-    def enforce(self) -> None:
-        """Replace the layer by the mean of itself and its mirror image."""
-        self.layer.add_(self.mirror_image()).mul_(0.5)
+    inputs, outputs = mirror.inputs, mirror.outputs
+    swapped = layer.roll(mirror.half_cycle, 1)[torch.from_numpy(outputs.source).to(layer.device)]
+    weights, biases = swapped[:, :, :-1], swapped[:, :, -1]
+    signs, input_signs, shift, input_shift = (
+        torch.from_numpy(numbers).to(layer.device, layer.dtype)
+        for numbers in (outputs.sign, inputs.sign, outputs.shift, inputs.shift)
+    )
+    weights_across = weights[:, :, torch.from_numpy(inputs.source).to(layer.device)]
+    biases = signs[:, None] * (biases + weights @ input_shift) + shift[:, None]
+    return torch.cat([weights_across * (signs[:, None, None] * input_signs), biases[:, :, None]], dim=2)

@@ -17,6 +17,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from types import FrameType
 
+import psutil
+
 from hobble.core.errors import HobbleError, InputError
 
 LOCK = Path(".snakemake/run.lock")
@@ -32,7 +34,7 @@ def set_run_variable() -> None:
 
 def this_process() -> str:
     """Id and start time of this process, in the form that RUN_VARIABLE has."""
-    return f"{os.getpid()} {_start_time(os.getpid())}"
+    return f"{os.getpid()} {psutil.Process().create_time()}"
 
 
 def ensure_user_name() -> None:
@@ -95,8 +97,6 @@ def end_children(pid: int, grace: float = GRACE_SECONDS) -> None:
 
     SIGKILL ends those that still run after `grace` seconds.
     """
-    import psutil  # a dependency of Snakemake; imported here because it is slow to import
-
     with contextlib.suppress(psutil.NoSuchProcess):
         descendants = psutil.Process(pid).children(recursive=True)
         for end in (psutil.Process.terminate, psutil.Process.kill):
@@ -162,19 +162,7 @@ def _is_alive(pid: int, began: str) -> bool:
     The start time is compared because a new process may have got the id of one that has ended.
     """
     try:
-        os.kill(pid, 0)
-    except ProcessLookupError:
+        process = psutil.Process(pid)
+        return str(process.create_time()) == began and process.status() != psutil.STATUS_ZOMBIE
+    except psutil.NoSuchProcess:
         return False
-    except OSError:
-        return True  # it is another user's process
-    return _start_time(pid) == began
-
-
-def _start_time(pid: int) -> str:
-    """Start time of a process in clock ticks since boot; "" for a zombie, "?" if /proc does not have it."""
-    try:
-        # The fields after the program's name, which is in parentheses: first the state, later the start time.
-        fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
-    except OSError:
-        return "?"
-    return "" if fields[0] == "Z" else fields[19]
