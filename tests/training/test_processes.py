@@ -54,20 +54,20 @@ def database(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-def end(database: Path, folder: Path, processes: int, stretches: int, windows: list[int]) -> list[Any]:
-    """The ends of trainings, each with so many chunks held at a time (0 for all)."""
+def ends(database: Path, folder: Path, processes: int, ways: list[tuple[int, int]]) -> list[Any]:
+    """The ends of trainings. ways: numbers of stretches, and of chunks held at a time (0 for all)."""
     jobs = [
         {
             "database": str(database),
             "network": {"kind": "pfnn", "hidden_layers": 2, "units": 24, "control_points": 4},
             "training": HARD | {"stretches": stretches},
-            "checkpoints": str(folder / f"{processes}-{stretches}-{window}"),
-            "out": str(folder / f"{processes}-{stretches}-{window}.npz"),
+            "checkpoints": str(folder / f"{processes}-{number}"),
+            "out": str(folder / f"{processes}-{number}.npz"),
             "window": window,
         }
-        for window in windows
+        for number, (stretches, window) in enumerate(ways)
     ]
-    job_file = folder / f"{processes}-{stretches}.json"
+    job_file = folder / f"{processes}.json"
     job_file.write_text(json.dumps(jobs))
     start = ["-m", "torch.distributed.run", "--standalone", f"--nproc-per-node={processes}"]
     arguments = [*(start if processes > 1 else []), str(IN_FLOAT64), str(job_file)]
@@ -83,9 +83,8 @@ def furthest(one: dict[str, np.ndarray], other: dict[str, np.ndarray]) -> float:
 
 def test_several_processes_train_like_one(database: Path, tmp_path: Path) -> None:
     """With three stretches for each process, all chunks in memory or three at a time."""
-    (uncut,), alone, both = (
-        end(database, tmp_path, *way) for way in ((1, 1, [0]), (1, 6, [0, 3]), (2, 6, [0, 3]))
-    )
+    uncut, *alone = ends(database, tmp_path, 1, [(1, 0), (6, 0), (6, 3)])
+    both = ends(database, tmp_path, 2, [(6, 0), (6, 3)])
     for one, other in zip(alone, both, strict=True):
         assert furthest(one, other) < 1e-10
         assert furthest(uncut, other) > 1e-6
