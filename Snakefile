@@ -44,10 +44,11 @@ onstart:
             logger.warning(sentence)
 
 
+# What `make report` makes.
 rule all:
     default_target: True
     input:
-        "results/holden/report.html",
+        "results/limp/report.html",
 
 
 include: "workflow/rules/common.smk"

@@ -16,8 +16,8 @@ INK = """(() => {{
   const context = copy.getContext("2d", {{ willReadFrequently: true }});
   context.drawImage(canvas, 0, 0);
   const pixels = context.getImageData(0, 0, copy.width, copy.height).data;
-  let sum = 0;
-  for (let i = 3; i < pixels.length; i += 4) sum += pixels[i] > 0;
+  let sum = 0; // pixels that differ from the sky at the left edge
+  for (let i = 0; i < pixels.length; i += 4) sum += pixels[i] !== pixels[i - i % (4 * copy.width)];
   return sum / (copy.width * copy.height);
 }})()"""
 FOLDS = "[...document.querySelectorAll('.fold')]"

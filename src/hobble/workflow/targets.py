@@ -60,7 +60,7 @@ def check_targets(project: Project, targets: Iterable[str]) -> list[str]:
     """
     datasets: list[str] = []
     configurations: dict[str, NamedConfiguration] = {}
-    for target in list(targets) or ["results/holden/report.html"]:
+    for target in list(targets) or ["results/limp/report.html"]:
         _, name, folder, file, *_ = (*Path(target).parts, "", "", "")
         if name == "datasets":
             datasets.append(folder)

