@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import io
 import json
 import os
-import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -200,23 +198,6 @@ def test_what_is_not_a_regular_file_is_refused(name: str, tmp_path: Path, holden
     (tmp_path / name).symlink_to("/dev/zero")
     with pytest.raises(InputError, match=f"{name}: a device or a pipe"):
         load_network(tmp_path, holden31)
-
-
-def test_entries_that_overlap_take_no_memory(tmp_path: Path, holden31: Skeleton) -> None:
-    """Many entries for the same bytes: a small file that would fill the memory."""
-    path, one = tmp_path / "weights.npz", io.BytesIO()
-    np.save(one, np.zeros(1 << 18, np.float32))
-    with zipfile.ZipFile(path, "w") as archive:
-        archive.writestr("W0.npy", one.getvalue())
-        first = archive.infolist()[0]
-        for i in range(1, 40):
-            again = zipfile.ZipInfo(f"W{i}.npy")
-            for key in ("header_offset", "CRC", "compress_size", "file_size"):
-                setattr(again, key, getattr(first, key))
-            archive.filelist.append(again)
-            archive.NameToInfo[again.filename] = again
-    with pytest.raises(InputError, match=r"over each other|overlap"):
-        load_network(path)
 
 
 def test_the_ground_is_sampled_as_far_to_the_side_as_in_training(tmp_path: Path, holden31: Skeleton) -> None:

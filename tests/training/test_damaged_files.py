@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import shutil
 from collections.abc import Callable
 from pathlib import Path
@@ -14,9 +13,7 @@ import pytest
 from hobble.core.errors import HobbleError, InputError
 from hobble.core.files import load_npz, read_json, save_npz, write_json
 from hobble.database.reader import Database
-from hobble.rows.clip_rows import load_clip_rows, load_summary, save_clip_rows, save_summary, summary_of_rows
 from hobble.training.train import train
-from tests.training.conftest import clip_rows
 
 # What is written in place of a value, whatever it was.
 JUNK = [None, True, -1, 0.5, 1e300, "", "../x", [], {}, [None]]
@@ -95,18 +92,3 @@ def test_a_changed_checkpoint(data: Database, network: Any, training: Any, tmp_p
                 continue  # NaN as without held-out clips
             with pytest.raises(InputError, match=r"checkpoint\.npz: "):
                 go()
-
-
-def test_changed_rows_and_summaries_of_a_clip(tmp_path: Path) -> None:
-    rows, file, summary = clip_rows("walk", 60, 2, 1), tmp_path / "walk.npz", tmp_path / "walk.json"
-    save_clip_rows(file, rows)
-    arrays = load_npz(file)
-    for name in arrays:
-        for how, change in ARRAYS.items():
-            array = change(arrays[name])
-            save_npz(file, **{k: v for k, v in {**arrays, name: array}.items() if v is not None})
-            sound(f"{name}: {how}", lambda: [load_clip_rows(file).x])
-    save_summary(summary, summary_of_rows(rows))
-    for where, other in changed(read_json(summary)):
-        summary.write_text(json.dumps(other))
-        sound(where, lambda: [kind.speed for kind in load_summary(summary).kinds])
