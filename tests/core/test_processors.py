@@ -1,23 +1,19 @@
+import os
 from pathlib import Path
 
+import psutil
 import pytest
 
 from hobble.core.processors import count_cores, multiplies_bfloat16
 
 
-def topology(folder: Path, shared: dict[int, str]) -> Path:
-    for processor, siblings in shared.items():
-        file = folder / f"cpu{processor}" / "topology" / "core_cpus_list"
-        file.parent.mkdir(parents=True)
-        file.write_text(f"{siblings}\n")
-    return folder
-
-
-def test_two_threads_of_one_core_count_once(tmp_path: Path) -> None:
-    folder = topology(tmp_path, {0: "0,4", 4: "0,4", 1: "1,5", 5: "1,5"})
-    assert count_cores([0, 4], folder) == 1
-    assert count_cores([0, 1], folder) == 2
-    assert count_cores([0, 1, 4, 5], folder) == 2
+@pytest.mark.parametrize(("usable", "cores", "found"), [(4, 2, 2), (1, 2, 1), (4, None, 4)])
+def test_two_threads_of_one_core_count_once(
+    monkeypatch: pytest.MonkeyPatch, usable: int, cores: int | None, found: int
+) -> None:
+    monkeypatch.setattr(os, "sched_getaffinity", lambda _: set(range(usable)))
+    monkeypatch.setattr(psutil, "cpu_count", lambda logical: 8 if logical else cores)
+    assert count_cores() == found
 
 
 @pytest.mark.parametrize(

@@ -4,36 +4,25 @@ from __future__ import annotations
 
 import os
 import platform
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 
-TOPOLOGY = Path("/sys/devices/system/cpu")  # where Linux says which processors share a core
 CPUINFO = Path("/proc/cpuinfo")  # where Linux lists the processors with their names and features
 # oneDNN is the library that multiplies matrices for PyTorch. With one of these values of the environment
 # variable ONEDNN_MAX_CPU_ISA, it uses no instructions for bfloat16.
 WITHOUT_BFLOAT16 = ("SSE41", "AVX", "AVX2", "AVX2_VNNI", "AVX512_CORE", "AVX512_CORE_VNNI")
 
 
-def count_cores(processors: Iterable[int] | None = None, topology: Path = TOPOLOGY) -> int:
-    """Number of physical cores, at least 1, to which the given processors belong.
+def count_cores() -> int:
+    """Number of physical cores, at least 1 and at most the number of processors that this process may use.
 
-    processors: numbers of logical processors, as Linux counts them; None: those this process may use. Two
-    processors (hardware threads) of a core count once, because matrix products gain nothing from a second
-    thread: on one core, two threads took 1.06 to 1.2 times as long as one. If the system does not say which
-    processors share a core, each processor counts.
+    Two processors (hardware threads) of a core count once, because matrix products gain nothing from a second
+    thread: on one core, two threads took 1.06 to 1.2 times as long as one.
     """
-    if processors is None:
-        processors = (
-            os.sched_getaffinity(0) if hasattr(os, "sched_getaffinity") else range(os.cpu_count() or 1)
-        )
-    core_ids = set()
-    for processor in processors:
-        file = topology / f"cpu{processor}" / "topology" / "core_cpus_list"
-        try:
-            core_ids.add(file.read_text().strip())
-        except OSError:
-            core_ids.add(str(processor))
-    return max(1, len(core_ids))
+    import psutil  # of the extra `workflow`, as PyTorch is, for which cores are counted
+
+    usable = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    return min(usable, psutil.cpu_count(logical=False) or usable)
 
 
 def multiplies_bfloat16(cpuinfo: Path = CPUINFO, environment: Mapping[str, str] = os.environ) -> bool:

@@ -56,7 +56,7 @@ from hobble.rows.layout import (
     frame_inputs,
 )
 
-# Size of a bucket (`hobble.database.write`). Sorting a bucket needs a few times as much memory.
+# Bytes of a bucket. Sorting a bucket needs a few times as much memory.
 BUCKET_BYTES = 64 << 20
 
 # The rows of a clip, or the path of the file with them.
@@ -154,9 +154,8 @@ def have_same_columns(one: Outline | Plan, other: Outline | Plan) -> bool:
 
 # Buckets: files that help to shuffle the rows of a database, which may be more than fit in memory.
 #
-# A row is a frame of a clip as a network gets it, with one or more terrain fits (ground heights that suit the
-# motion). The random order in which the rows are stored, the final order, is cut into stretches. Each bucket
-# collects the rows of one stretch, and later these few rows are sorted in memory.
+# The random order in which the rows are stored, the final order, is cut into stretches. Each bucket collects
+# the rows of one stretch on disk, and later these few rows are sorted in memory.
 
 
 # For each row: its place in the final order, its number of terrain fits, the number of its clip, its frame in
@@ -213,27 +212,24 @@ class Buckets:
     def _file(self, bucket: int, table: str) -> Path:
         return self.folder / f"{bucket:05d}.{table}"
 
-    def read(self, bucket: int) -> tuple[Array, Array, np.ndarray]:
-        """The tables frames, fits and index of a bucket, in the order in which rows were added."""
-        frames, fits = (np.fromfile(self._file(bucket, table), "<f4") for table in ("frames", "fits"))
-        index = np.fromfile(self._file(bucket, "index"), ROW_INDEX)
-        return frames.reshape(-1, self.columns), fits.reshape(-1, self.fit_columns), index
-
     def drain(self) -> Iterator[tuple[Array, Array, np.ndarray]]:
         """Yield the frames, fits and index of each bucket in the final order. Removes the files once read."""
         for bucket in range(self.count):
-            frames, fits, index = self.read(bucket)
-            for table in ("index", "frames", "fits"):
-                self._file(bucket, table).unlink()
+            frames, fits = self._take(bucket, "frames", "<f4"), self._take(bucket, "fits", "<f4")
+            index = self._take(bucket, "index", ROW_INDEX)
             order = np.argsort(index["place"])
-            yield frames[order], gather_fits(fits, index["count"], order), index[order]
+            fits = gather_fits(fits.reshape(-1, self.fit_columns), index["count"], order)
+            yield frames.reshape(-1, self.columns)[order], fits, index[order]
+
+    def _take(self, bucket: int, table: str, dtype: Any) -> np.ndarray:
+        """Read a table, and remove its file."""
+        values = np.fromfile(file := self._file(bucket, table), dtype)
+        file.unlink()
+        return values
 
 
-# First step of the shuffle: scatter the rows of clips over buckets.
-#
-# Each row has a random place in the final order of its split. A bucket collects, on disk, the rows of one
-# stretch of this order. The second step (`hobble.database.write`) sorts one bucket at a time, because
-# all rows together may not fit in memory.
+# First step of the shuffle: scatter the rows of clips over buckets. Each row has a random place in the final
+# order of its split.
 
 
 PART_ROWS = 8192  # rows of a clip are scattered so many at a time, to use little memory
@@ -297,9 +293,6 @@ def _frames_and_fits(clip: ClipRows, part: slice, layout: RowLayout) -> tuple[Ar
 
 
 # Second step of the shuffle: sort the rows of each bucket, standardise them and write them as chunks.
-#
-# The rows of a bucket are sorted by their places in the final order, which the first step
-# (`hobble.database.write`) has drawn at random.
 
 
 def write_chunks(

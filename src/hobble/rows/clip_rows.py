@@ -341,7 +341,7 @@ class RowsSummary:
     """A summary of a clip's rows.
 
     clip: name of the clip. rows: number of rows. kinds: what kind of motion is in each excerpt of the clip,
-    in the order of `hobble.rows.clip_rows.excerpts`.
+    in the order of `cut_into_excerpts`.
     """
 
     clip: str
