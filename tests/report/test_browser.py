@@ -129,17 +129,12 @@ def test_the_page_is_short_until_sections_are_opened(tab: Browser) -> None:
 
 
 def test_themes_recolour_page_and_charts(tab: Browser) -> None:
-    colours = []
     tab.run("Hobble.drawAll()")
-    for _ in range(2):
-        tab.run("document.getElementById('theme').click()")
-        colours.append(
-            tab.run(
-                "[getComputedStyle(document.body).backgroundColor,"
-                " document.querySelector('[data-chart=\"learning-curve\"]').data[1].line.color]"
-            )
-        )
-    assert colours == [["rgb(252, 251, 248)", "rgb(11, 110, 116)"], ["rgb(20, 23, 26)", "rgb(88, 188, 192)"]]
+    read = """[getComputedStyle(document.body).backgroundColor,
+      document.querySelector('[data-chart="learning-curve"]').data[1].line.color]"""
+    light, dark = ((tab.run("document.getElementById('theme').click()"), tab.run(read))[1] for _ in range(2))
+    assert light == ["rgb(252, 251, 248)", "rgb(11, 110, 116)"]
+    assert dark == ["rgb(20, 23, 26)", "rgb(88, 188, 192)"]
     tab.run("document.getElementById('theme').click()")
 
 

@@ -8,7 +8,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 
 from hobble.core.errors import HobbleError
@@ -41,19 +40,16 @@ def tab(made: tuple[Path, dict[str, Any]], tmp_path_factory: pytest.TempPathFact
 
 
 def again(tab: Browser, forget: bool = False) -> None:
-    """Open the page again, with or without the answers that the browser has stored."""
+    """Open the page again, with or without the answers that the browser has stored, and begin."""
     if forget:
         tab.run("localStorage.clear()")
     tab.open(tab.run("location.href"))
     assert tab.until("!!globalThis.Study")
 
 
-def answer_first(tab: Any) -> None:
-    """Give the first answer to each question, and go on."""
-    tab.run(
-        "document.querySelectorAll('#questions fieldset').forEach((f) => f.querySelector('input').click())"
-    )
-    tab.run("document.getElementById('next').click()")
+def click(tab: Browser, *selectors: str) -> None:
+    for selector in selectors:
+        tab.run(f"document.querySelector({json.dumps(selector)}).click()")
 
 
 def test_injuries_are_listed_in_a_file_and_not_in_the_page(made: tuple[Path, dict[str, Any]]) -> None:
@@ -68,78 +64,70 @@ def test_injuries_are_listed_in_a_file_and_not_in_the_page(made: tuple[Path, dic
 
 
 def test_each_film_is_asked_about_once_and_the_answers_can_be_counted(
-    tab: Any, made: tuple[Path, dict[str, Any]], tmp_path: Path
+    tab: Browser, made: tuple[Path, dict[str, Any]], tmp_path: Path
 ) -> None:
     again(tab, forget=True)
     tab.run("document.getElementById('person').value = 'Ann 1'")
-    tab.run("document.getElementById('begin').click()")
-    film = "document.getElementById('film')"
+    click(tab, "#begin")
+    film, disabled = "document.getElementById('film')", "document.getElementById('next').disabled"
     assert tab.until(f"{film}.complete && {film}.naturalWidth === 48")
-    disabled = "document.getElementById('next').disabled"
-    box = "document.querySelector(`#parts input[value='{}']`)"
     ticked = []
     for i in range(4):
         assert tab.run("document.getElementById('which').textContent") == f"Film {i + 1} of 4"
         assert tab.run(disabled)
         part = PARTS["sided"][i]
+        click(tab, f"#parts input[value='{part}']")
         if i == 2:  # "none of these" takes the ticks back
-            tab.run(f"{box.format(part)}.click(); {box.format('nothing')}.click()")
-            part = None
-        else:
-            tab.run(f"{box.format(part)}.click()")
+            click(tab, "#parts input[value=nothing]")
         for key, (_, choices) in QUESTIONS.items():
             assert tab.run(disabled), f"{key} is not answered yet"
-            choice = choices[i % len(choices)]
-            tab.run(f"document.querySelector(`#questions-asked input[name={key}][value='{choice}']`).click()")
+            click(tab, f"#questions-asked input[name={key}][value='{choices[i % len(choices)]}']")
         assert not tab.run(disabled)
-        tab.run("document.getElementById('again').click()")
-        tab.run("document.getElementById('next').click()")
-        ticked.append(() if part is None else (part,))
-    text = tab.run("document.getElementById('text').value")
+        click(tab, "#again", "#next")
+        ticked.append(() if i == 2 else (part,))
     assert not tab.run("document.getElementById('done').hidden")
-    data = json.loads(text)
+    (tmp_path / "answers.json").write_text(tab.run("document.getElementById('text').value"))
+    data = json.loads((tmp_path / "answers.json").read_text())
     assert data["person"] == "Ann 1"
     assert [row["plays"] for row in data["answers"]] == [2] * 4
-    (tmp_path / "answers.json").write_text(text)
     answers = read_answers(tmp_path / "answers.json", read_study(made[0] / "films.json"))
     assert sorted(data["order"]) == [a.film for a in answers] == [film.number for film in SHORT]
     answers.sort(key=lambda a: data["order"].index(a.film))
     assert [a.parts for a in answers] == ticked
     assert [a.realism for a in answers] == ["very poor", "poor", "fair", "good"]
     assert [a.noticed for a in answers] == ["yes", "no", "yes", "no"]
-    assert tab.console == []
-    assert tab.fetched == []
+    assert tab.console == tab.fetched == []
 
 
 @pytest.mark.slow
-def test_orders_differ_and_a_reopened_page_continues(tab: Any) -> None:
+def test_orders_differ_and_a_reopened_page_continues(tab: Browser) -> None:
     orders = set()
     for _ in range(12):
         again(tab, forget=True)
-        tab.run("document.getElementById('begin').click()")
+        click(tab, "#begin")
         orders.add(tuple(tab.run("Study.state.order")))
     assert len(orders) > 3
-    answer_first(tab)
+    tab.run(
+        "document.querySelectorAll('#questions fieldset').forEach((f) => f.querySelector('input').click())"
+    )
+    click(tab, "#next")
     order = tab.run("Study.state.order")
     again(tab)
     assert tab.until("document.getElementById('resumed').textContent.includes('answered 1 of 4')")
-    tab.run("document.getElementById('begin').click()")
+    click(tab, "#begin")
     assert tab.run("document.getElementById('which').textContent") == "Film 2 of 4"
     assert tab.run("Study.state.order") == order
 
 
 def test_the_link_that_was_hurt_in_training_is_hurt(network: Network) -> None:
     links = network.channels["injury"]
-    x_mean = network.x_mean.copy()
-    x_mean[network.layout.x_channel("injury")] = np.array(
-        [link == "LeftHand-LeftFingerBase" for link in links]
-    )
     assert part_links(network, ["left forearm", "right thigh"]) == [
-        "LeftForeArm-LeftHand",
-        "RightUpLeg-RightLeg",
+        *("LeftForeArm-LeftHand", "RightUpLeg-RightLeg")
     ]
-    taught = replace(network, x_mean=x_mean)
-    assert part_links(taught, ["left forearm"]) == ["LeftForeArm-LeftHand"], "a finger is no forearm"
+    mean = network.x_mean.copy()
+    mean[network.layout.x_channel("injury")] = [link == "LeftHand-LeftFingerBase" for link in links]
+    taught = part_links(replace(network, x_mean=mean), ["left forearm"])
+    assert taught == ["LeftForeArm-LeftHand"], "a finger is no forearm"
 
 
 def test_a_network_that_is_not_told_what_hurts_says_which_is(

@@ -74,13 +74,10 @@ def test_embedded_json_comes_back_and_cannot_end_its_element(value: dict) -> Non
     assert json.loads(text) == value
     assert not set("<>&") & set(text)
     assert json_data({"a": np.array([1.0, np.nan]), "b": np.float32("inf")}) == {"a": [1.0, None], "b": None}
-
-
-def test_texts_are_escaped_for_plotly() -> None:
-    chart = Chart("c", "t", "", [{"type": "bar", "y": ["<b>a & b"], "hovertemplate": "%{y}<extra></extra>"}])
-    (trace,) = chart.spec()["traces"]
-    assert trace["y"] == ["&lt;b>a &amp; b"]
-    assert trace["hovertemplate"] == "%{y}<extra></extra>"
+    (trace,) = Chart("c", "t", "", [{"y": ["<b>a & b"], "hovertemplate": "%{y}<extra></extra>"}]).spec()[
+        "traces"
+    ]
+    assert trace == {"y": ["&lt;b>a &amp; b"], "hovertemplate": "%{y}<extra></extra>"}, "plotly reads HTML"
 
 
 def test_turns_speeds_and_severities_are_counted_in_seconds(
@@ -234,23 +231,18 @@ def test_clips_without_turns_are_reported(material: ReportMaterial) -> None:
         assert any("Hardly anybody turns" in hint.head for hint in found) == is_said
 
 
-def test_the_page_opens_with_the_injury_that_limps_most() -> None:
-    parts = {"columns": ["hip-knee", "back-neck"], "regions": [1], "sliders": {"left thigh": 0, "back": 1}}
-
-    def limps(thigh: float, back: float, gait: str = "walk") -> dict[str, Any]:
-        """The limps of both parts at severities 10 and 3."""
-        return {
-            "sizes": [
-                {"gait": gait, "link": link, "stance": share * stance, "step_hurt": 1.0, "knee_hurt": None}
-                for share in (1.0, 0.3)
-                for link, stance in (("hip-knee", thigh), ("back-neck", back))
-            ]
-        }
-
-    for measurements, part in (
-        ([limps(0.15, 0.01)], "left thigh"),
-        ([limps(0.01, -0.15), {}], "back"),
-        ([limps(0.01, 0.15, gait="jog")], "left thigh"),
-    ):
-        assert opening_slider({"channels": [parts]}, measurements) == {"part": part, "value": 7}
+@pytest.mark.parametrize(
+    ("thigh", "back", "gait", "part"),
+    [(0.15, 0.01, "walk", "left thigh"), (0.01, -0.15, "walk", "back"), (0.01, 0.15, "jog", "left thigh")],
+)
+def test_the_page_opens_with_the_injury_that_limps_most(
+    thigh: float, back: float, gait: str, part: str
+) -> None:
+    channel = {"columns": ["hip-knee", "back-neck"], "regions": [1], "sliders": {"left thigh": 0, "back": 1}}
+    sizes = [
+        {"gait": gait, "link": link, "stance": share * stance, "step_hurt": 1.0, "knee_hurt": None}
+        for share in (0.3, 1.0)
+        for link, stance in (("hip-knee", thigh), ("back-neck", back))
+    ]
+    assert opening_slider({"channels": [channel]}, [{}, {"sizes": sizes}]) == {"part": part, "value": 7}
     assert opening_slider({"channels": []}, []) == {"part": None, "value": 0}

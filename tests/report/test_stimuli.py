@@ -58,13 +58,10 @@ def test_the_injured_part_is_coloured_if_requested(
     studio: BodyRenderer, standing: np.ndarray, holden31: Skeleton
 ) -> None:
     camera = Camera(np.array([0.0, 82.0, 0.0]), yaw=0.0, pitch=0.1, size=200)
-    severity = np.zeros(len(holden31.link_names))
-    severity[holden31.link_names.index("LeftLeg-LeftFoot")] = 1
-    plain, shown = (
-        studio.draw(standing, UPRIGHT, camera).astype(int),
-        studio.draw(standing, UPRIGHT, camera, severity).astype(int),
-    )
-    rows, columns = np.nonzero((shown[..., 0] - shown[..., 2] > 50) & (plain[..., 0] - plain[..., 2] <= 20))
+    severity = np.array([float(link == "LeftLeg-LeftFoot") for link in holden31.link_names])
+    plain, shown = (studio.draw(standing, UPRIGHT, camera, v).astype(int) for v in (None, severity))
+    red, before = (picture[..., 0] - picture[..., 2] for picture in (shown, plain))
+    rows, columns = np.nonzero((red > 50) & (before <= 20))
     assert len(rows) > 50
     keep = body_mesh(holden31).bones.tolist()
     x, y, _ = camera.project(standing).T
@@ -77,35 +74,22 @@ def test_the_distance_of_walks_ignores_start_and_heading(walk: np.ndarray) -> No
     def loop(positions: np.ndarray, way: tuple[float, float, float]) -> RepeatedWalk:
         return RepeatedWalk(positions, np.tile(quat.IDENTITY, (*positions.shape[:2], 1)), np.array(way), 0.0)
 
-    place = walk - [0, 0, 1] * walk[:, :1] + np.arange(len(walk))[:, None, None] * [0, 0, 2.0]
-    first, length = loop(place, (0, 0, 2.0 * len(place))), 2.0 * len(place)
-    later = np.roll(place, 20, axis=0) + np.where(np.arange(len(place)) < 20, -length, 0)[:, None, None] * [
-        0,
-        0,
-        1,
-    ]
+    along, length = np.array([0, 0, 1.0]), 2.0 * len(walk)
+    place = walk - along * walk[:, :1] + np.arange(len(walk))[:, None, None] * 2 * along
+    first = loop(place, (0, 0, length))
+    later = np.roll(place, 20, axis=0) - length * along * (np.arange(len(walk)) < 20)[:, None, None]
     turned = loop(later[..., [2, 1, 0]] * [1, 1, -1] + [500, 0, 7], (length, 0, 0))
     assert stimuli.loop_distance(turned, first) < 0.1
     lame = place + np.where(np.arange(31) == 5, 31.0, 0.0)[:, None] * [1, 0, 0]
     assert stimuli.loop_distance(loop(lame, (0, 0, length)), first) == pytest.approx(1, abs=0.1)
 
 
-def test_stimuli_without_a_visible_injury_get_a_warning() -> None:
-    def row(name: str, hurt: str, never: str, cm: float) -> dict:
-        return {
-            "name": name,
-            "values": dict.fromkeys(hurt.split(), 8.0),
-            "untrained": never.split(),
-            "from_plain_cm": cm,
-        }
-
-    fine = [row("healthy", "", "", 0.0), row("left-foot", "A", "", 1.5)]
-    assert stimuli.loop_warnings(fine) == []
-    same, part, never = stimuli.loop_warnings(
-        [*fine, row("left-arm", "B", "B", 0.0), row("weak", "A", "", 0.05), row("both", "A C", "C", 1.5)]
+def test_films_without_a_visible_injury_get_a_warning() -> None:
+    assert stimuli.film_warnings([("left-foot", 1.5, [])]) == []
+    same, never = stimuli.film_warnings(
+        [("left-foot", 1.5, []), ("left-arm", 0.0, ["B"]), ("weak", 0.05, []), ("both", 1.5, ["C"])]
     )
     assert same.startswith("left-arm, weak: they look like the neutral walk")
-    assert part.startswith("both: some of their values")
     assert never.startswith("Never above 0 in training: B, C.")
 
 

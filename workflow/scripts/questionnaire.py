@@ -2,8 +2,9 @@
 
 from pathlib import Path
 
-from hobble.measures.films import list_doubts, write_questionnaire
+from hobble.measures.films import write_questionnaire
 from hobble.models.load import load_network
+from hobble.report.stimuli import film_warnings
 from hobble.runtime.options import Runtime
 from hobble.workflow.job import job
 
@@ -17,6 +18,7 @@ with job(snakemake) as log:
         parts=snakemake.params.parts,
         threads=snakemake.threads,
     )
-    for doubt in list_doubts(solution):
-        log.warning("%s", doubt)
+    films = [(f"film {row['film']}", row["from_healthy_cm"], row["untrained"]) for row in solution["films"]]
+    for warning in film_warnings(films):
+        log.warning("%s", warning)
     log.info("wrote %d films to %s", len(solution["films"]), folder)

@@ -31,7 +31,7 @@ from hobble.measures.study import PARTS, QUESTIONS
 from hobble.models.network import Network
 from hobble.report.parts import embedded
 from hobble.report.raster import FPS, BodyRenderer, Camera, Picture, webp
-from hobble.report.stimuli import VISIBLE, draw_loop
+from hobble.report.stimuli import draw_loop
 from hobble.report.templates import load_template, page_style, questionnaire_script
 from hobble.runtime.animation import ProceduralAnimation
 from hobble.runtime.loops import make_loop
@@ -234,17 +234,6 @@ def write_questionnaire(
     write_text(folder / "questionnaire.html", page)
     write_json(folder / "films.json", solution)
     return solution
-
-
-def list_doubts(solution: Mapping[str, Any]) -> list[str]:
-    """Warnings: films in which nobody can see the injury, and hurt links that were never hurt in training.
-
-    solution: the content of films.json.
-    """
-    same = [str(row["film"]) for row in solution["films"] if row["from_healthy_cm"] < VISIBLE]
-    never = sorted({link for row in solution["films"] for link in row["untrained"]})
-    out = [f"film {', '.join(same)}: nobody can see the injury (less than {VISIBLE} cm)."] if same else []
-    return out + ([f"Never hurt in training: {', '.join(never)}."] if never else [])
 
 
 def write_limp_picture(network: Network, path: str | Path, runtime: Runtime) -> int:

@@ -115,7 +115,6 @@ def injury_response(
         "divided": divided_severities(network, trained, seconds, runtime),
         "strips": strips,
         "summary": summarise([r for r in responses if r["trained"]]),
-        "summary_untrained": summarise([r for r in responses if not r["trained"]]),
     }
 
 

@@ -36,7 +36,6 @@ from hobble.measures.walks import (
     mean_of_known,
     rounded,
     share_of_true,
-    spearman,
     walk_straight,
 )
 from hobble.models.load import load_network
@@ -223,7 +222,6 @@ def measure_limps(
         "trained": [link for link in links if link in network.trained_labels(INJURY)],
         "hurt_seconds": hurt_seconds,
         "sizes": sizes,
-        "trends": _trends(sizes),
         "named": _recognition(legs, "severity"),
         "people": {
             gait: {name: [round(v, 5) for v in mean_and_sd] for name, mean_and_sd in of_gait.items()}
@@ -294,19 +292,6 @@ def row_of_walk(skeleton: Skeleton, figure: Walk, healthy: Walk) -> dict[str, An
         "named": share_of_true([limps and not wrong for limps, wrong in answers]),
         "wrong_side": share_of_true([limps and wrong for limps, wrong in answers]) if side else None,
     }
-
-
-def _trends(rows: Rows) -> Rows:
-    """A row for each gait, link and effect: Spearman's rho with severity, and the size at severity 10."""
-    out = []
-    for (gait, link), group in groupby(rows, key=lambda row: (row["gait"], row["link"])):
-        of_link = list(group)
-        for name in profile.EFFECTS:
-            values = [row[name] for row in of_link]
-            if None not in values:
-                rho = spearman([row["severity"] for row in of_link], values)
-                out.append({"gait": gait, "link": link, "effect": name, "at_10": values[-1], "spearman": rho})
-    return out
 
 
 def _recognition(rows: Iterable[Mapping[str, Any]], *by: str) -> Rows:
@@ -430,7 +415,7 @@ def run(inputs: MeasureInputs, options: Any) -> Outcome:
         runtime=inputs.runtime,
         seconds=options.limp_seconds,
     )
-    tables = {name: result.get(name, []) for name in ("sizes", "trends", "named", "together")}
+    tables = {name: result.get(name, []) for name in ("sizes", "named", "together")}
     log_line = str(result.get("reason", ""))
     if result["applies"]:
         share = result["named"][-1]["impaired"]

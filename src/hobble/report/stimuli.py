@@ -5,7 +5,7 @@ They are stimuli for a questionnaire, or pictures for a README.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -111,25 +111,20 @@ def loop_distance(loop: RepeatedWalk, other: RepeatedWalk) -> float:
     return float(np.mean([np.linalg.norm(other_poses - pose, axis=-1).mean(axis=1).min() for pose in poses]))
 
 
-def loop_warnings(entries: Sequence[Mapping[str, Any]]) -> list[str]:
-    """Warnings about loops that look like the neutral walk or have values without effect.
+def film_warnings(films: Iterable[tuple[str, float, Sequence[str]]]) -> list[str]:
+    """Warnings about films that look like the neutral walk or have values without effect.
 
-    entries: from `write_stimuli`.
+    films: of each, its name, its distance from the neutral walk in cm, and the columns above 0 in it that
+    were never above 0 in training.
     """
-    unchanged = [entry for entry in entries if entry["values"] and entry["from_plain_cm"] < VISIBLE]
-    partly = [entry for entry in entries if entry["untrained"] and entry not in unchanged]
-    out = []
-    if unchanged:
-        names = ", ".join(entry["name"] for entry in unchanged)
-        out.append(
-            f"{names}: they look like the neutral walk (less than {VISIBLE} cm from it). Leave them out of a "
-            "questionnaire."
-        )
-    if partly:
-        out.append(f"{', '.join(entry['name'] for entry in partly)}: some of their values have no effect.")
-    if never := sorted({column for entry in [*unchanged, *partly] for column in entry["untrained"]}):
-        out.append(f"Never above 0 in training: {', '.join(never)}. Train on clips with such values.")
-    return out
+    films = list(films)
+    same = ", ".join(name for name, distance, _ in films if distance < VISIBLE)
+    never = ", ".join(sorted({column for *_, untrained in films for column in untrained}))
+    found = {
+        f"{same}: they look like the neutral walk (less than {VISIBLE} cm from it). Leave them out.": same,
+        f"Never above 0 in training: {never}. Train on clips with such values.": never,
+    }
+    return [warning for warning, about in found.items() if about]
 
 
 def draw_loop(renderer: BodyRenderer, loop: RepeatedWalk, values: Array | None, size: int) -> list[Picture]:
