@@ -142,6 +142,15 @@ def test_uneven_ground_stays_where_it_is_unless_it_is_far_below(walk, bvh, make)
     np.testing.assert_allclose(clip.root[:, 1], walk.root[::2, 1] + 40, atol=1e-6)
 
 
+def test_a_run_far_from_height_0_is_not_taken_for_uneven_ground(walk, bvh, make):
+    """Between two stances, its lower toe is slow at the top of its way."""
+    hop = np.maximum(np.sin(np.arange(len(walk)) * np.pi / 20), 0.0)
+    clip, report = make(bvh(raised(walk, 40 * hop - 30)))
+    assert report["unsure"] == []
+    assert "The floor lies at" in report["repairs"][0]
+    assert np.percentile(clip.positions[..., 1].min(axis=1), 5) == pytest.approx(2, abs=3)
+
+
 def tilted(clip, axis, degrees):
     return turned(clip, quat.from_axis_angle(np.asarray(axis), np.radians(degrees)))
 

@@ -116,10 +116,6 @@ def test_foreign_rigs_are_recognised_by_their_names(walker, rigs, bvh, make):
 
 # The clips on which standing heels are hardest to keep, by every performer, and each of the injured ones.
 SLIDING = ["cmu/02_01", "pfnn/LocomotionFlat09_000", "ferre/Injured_Walk_LLL", "ferre/Injured_LUL_Backwards"]
-MORE = """cmu/02_03 cmu/03_01 cmu/07_09 cmu/08_01 cmu/08_05 cmu/08_06 cmu/08_11 cmu/09_04 cmu/09_07 cmu/09_08
-    cmu/16_36 cmu/16_53 cmu/105_16 ferre/Injured_Walk_RUL ferre/Injured_Jog_LLA ferre/Injured_Run_LLL
-    ferre/Injured_Ilde ferre/Injured_Walk_RUL_extended_converted"""
-SLIDING += [pytest.param(name, marks=pytest.mark.slow) for name in MORE.split()]
 
 
 @pytest.mark.shared

@@ -13,7 +13,7 @@ import numpy as np
 from hobble.core import quat
 from hobble.core.clip import Clip
 from hobble.core.quat import Array
-from hobble.core.smooth import smoothstep, true_runs
+from hobble.core.smooth import lowest, smoothstep, true_runs
 from hobble.motion.axes import UP
 from hobble.motion.body import SIDES
 from hobble.motion.options import Problem
@@ -28,6 +28,7 @@ UPRIGHT = 0.8  # leg lengths: in an upright figure, the hips are at least this h
 # cm: on flat ground, the heights of standing feet (10th and 90th percentile) differ by at most this. In
 # running they differ by 9, on gentle bumps by 14.
 EVEN = 12.0
+STEP = 0.25  # seconds: in a run or walk, some foot comes down within this time before and after any moment
 SLOW_RISE = 0.3  # cm a frame at 60 Hz: a toe that rises or falls faster is in the air
 # If the feet stand in fewer frames, or for fewer seconds, they do not show where the floor is.
 FEWEST_FRAMES, SHORTEST = 4, 1 / 12
@@ -82,17 +83,20 @@ def put_on_floor(clip: Clip) -> tuple[Clip, list[str], list[str]]:
     Returns the clip, a sentence that it was moved, if it was, and doubts.
     """
     lower_toe = clip.positions[:, [clip.skeleton.role(f"{side}_toe") for side in SIDES], 1].min(axis=1)
-    standing = lower_toe[:-1][np.abs(np.diff(lower_toe)) * clip.fps / 60.0 < SLOW_RISE]
+    slow = np.abs(np.diff(lower_toe)) * clip.fps / 60.0 < SLOW_RISE
+    standing = lower_toe[:-1][slow]
     if len(standing) < max(FEWEST_FRAMES, round(SHORTEST * clip.fps)):
         low = float(lower_toe.min())
         lost = f"No foot stands long enough to show the floor, and the toes come down to {low:.0f} cm."
         return clip, [], [lost] if abs(low) > MOST_OFF_CRAWLING else []
-    low, usual, high = np.percentile(standing, [10, 25, 90])
-    floor = float(usual) - SOLE
+    floor = float(np.percentile(standing, 25)) - SOLE
     hips = clip.positions[:, clip.skeleton.role("hips"), 1]
     is_upright = np.median(hips - lower_toe) > UPRIGHT * leg_length(clip.skeleton)
     if abs(floor) <= (MOST_OFF if is_upright else MOST_OFF_CRAWLING):
         return clip, [], []
+    # In a run, a toe is slow in the air, too, but within a step it has been lower.
+    down = slow & (lower_toe < lowest(lower_toe, 2 * round(clip.fps * STEP) + 1) + SOLE)[:-1]
+    low, high = np.percentile(lower_toe[:-1][down] if down.any() else standing, [10, 90])
     doubts = []
     if high - low > EVEN:
         heights = f"The feet stand {low:.0f} to {high:.0f} cm high, too uneven for flat ground"
