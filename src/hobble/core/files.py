@@ -389,24 +389,21 @@ def read_table(path: str | Path, columns: Sequence[str]) -> Iterator[tuple[int, 
 def read_numbers(path: str | Path) -> dict[str, list[float | None]]:
     """Read a CSV file of numbers, such as history.csv, as column -> values.
 
-    The value of an empty, NaN or infinite cell is None. Raises InputError, which quotes the cell, if one is
-    not a number.
+    The value of an empty, NaN or infinite cell is None. Raises InputError if there are no rows, or, with the
+    line, if a line is not as long as the first or a cell is not a number.
     """
-    try:
-        reader = csv.DictReader(io.StringIO(read_text(path)))
-        rows, columns = list(reader), list(reader.fieldnames or ())
-        if not columns or any(None in row for row in rows):
-            raise ValueError("a line has more cells than the first" if columns else "it is empty")
-        return {name: [_number(row[name]) for row in rows] for name in columns}
-    except (ValueError, csv.Error) as error:
-        problem = f"not a table of numbers ({printable(error)})"
-        raise InputError(path, problem, fix="Delete the file and run again.") from None
-
-
-def _number(text: str | None) -> float | None:
-    """The number in a cell; None if it is empty, NaN or infinite, or if the line has too few cells."""
-    value = float(text) if text and text.strip() else math.nan
-    return value if math.isfinite(value) else None
+    found: dict[str, list[float | None]] = {}
+    fix = "Delete the file and run again."
+    for line, values in read_table(path, ()):
+        for name, text in values.items():
+            try:
+                value = float(text or "nan")
+            except ValueError as error:
+                raise InputError(path, f"not a number: {printable(error)}", line=line, fix=fix) from None
+            found.setdefault(name, []).append(value if math.isfinite(value) else None)
+    if not found:
+        raise InputError(path, "holds no numbers", fix=fix)
+    return found
 
 
 def to_base64(array: np.ndarray) -> str:

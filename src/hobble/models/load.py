@@ -36,7 +36,6 @@ MOST_NUMBERS = 1 << 26
 LARGEST_WEIGHT = 1e6  # trained weights are below 10
 LARGEST_MEAN = 1e9
 LARGEST_STD = 1e20  # so large because the std of a joint that the network shall not see is multiplied by 1e11
-# A skeleton's roles say which joint is the left knee and so on. These roles must have a joint.
 # Name of an array in a file -> field of `hobble.models.network.Network`.
 STATISTICS = {"Xmean": "x_mean", "Xstd": "x_std", "Ymean": "y_mean", "Ystd": "y_std"}
 DIVERGED = "The training diverged, or the file is damaged."
