@@ -67,15 +67,19 @@ def test_the_time_of_a_resumed_training_covers_all_its_calls(
 
 
 def test_times_of_clips_from_earlier_calls_are_counted(tmp_path: Path) -> None:
-    """The last call made one clip of two. Before a clip was added there were fewer batches."""
-    folder, made = tmp_path / "benchmarks/motion", tmp_path / ".made/motion_clips"
-    benchmark(folder / "motion_clips/00.tsv", 2.0)
-    benchmark(folder / "motion_clips/walk.tsv", 7.0)
-    benchmark(folder / "other/walk.tsv", 1.0)
-    (made / "motion").mkdir(parents=True)
-    for clip, seconds in (("a", 3.0), ("b", 1.5)):
+    """The last call made one clip of two. Before a clip was added there were fewer batches.
+
+    A time that is longer than that of its clips stays.
+    """
+    folder, made = tmp_path / "benchmarks/motion", tmp_path / ".made"
+    for name, seconds in (("clips/00", 2.0), ("clips/walk", 7.0), ("mirror/00", 6.0), ("other/walk", 1.0)):
+        benchmark(folder / f"{name}.tsv", seconds)
+    for name, seconds in (("clips/motion/a", 3.0), ("clips/motion/b", 1.5), ("mirror/motion/a", 1.0)):
+        (made / name).parent.mkdir(parents=True, exist_ok=True)
         record = {"key": "x", "files": [1], "seconds": seconds}
-        (made / f"motion/{clip}.npz.json").write_text(json.dumps(record))
-    motion = stage("motion", benchmarks=[folder], files=[], batches=["00"], made=[made])
-    assert {rule["rule"]: rule["seconds"] for rule in motion["rules"]} == {"motion_clips": 4.5, "other": 1.0}
-    assert (motion["jobs"], motion["seconds"]) == (2, 5.5)
+        (made / f"{name}.npz.json").write_text(json.dumps(record))
+    rules = [made / "clips", made / "mirror"]
+    motion = stage("motion", benchmarks=[folder], files=[], batches=["00"], made=rules)
+    found = {rule["rule"]: rule["seconds"] for rule in motion["rules"]}
+    assert found == {"clips": 4.5, "mirror": 6.0, "other": 1.0}
+    assert (motion["jobs"], motion["seconds"]) == (3, 11.5)

@@ -16,7 +16,7 @@ import numpy as np
 from hobble.core.files import Json
 from hobble.measures import compare, measure
 from hobble.measures.measure import SPLITS, Row
-from hobble.measures.shown import boxes, chart, in_words, ours_and_published, table, words
+from hobble.measures.shown import boxes, ours_and_published
 from hobble.report import parts
 from hobble.report.parts import SPLITS as SPLIT_LABELS
 from hobble.report.parts import Chart, Compared, Hint, PageSection, SectionPart, Trace
@@ -41,7 +41,9 @@ COLOURS = {"train": "@muted", "held_out": "@accent"}  # split -> its colour in t
 NAMES = {"held_out": "held out", "train": "training"}  # split -> its name on the page
 # Edges of a box, as plotly names them -> keys of accuracy.json.
 BOX = {"lowerfence": "p05", "q1": "p25", "median": "p50", "q3": "p75", "upperfence": "p95", "mean": "mean"}
-CLIP_HEADS = {key: in_words(key) for key in ("clip", "split", "frames", "mean", "sd", "position_error_cm")}
+CLIP_HEADS = {
+    key: parts.in_words(key) for key in ("clip", "split", "frames", "mean", "sd", "position_error_cm")
+}
 ERROR_AXIS = parts.axis("relative error, %", rangemode="tozero")
 # Key of a difference between two configurations in compare.json -> what it is divided by (eq. 3.2).
 DEVIATIONS = {"difference_of_means": "sd of the means of clips", "difference": "sd of single frames"}
@@ -53,8 +55,8 @@ def section(found: Json, material: ReportMaterial) -> PageSection:
         return PageSection("accuracy", [])
     # Readers may take the number in _hurt1 for a severity, so endings of names are explained.
     endings = [end for end in ("_hurt1", "_mirror") if any(end in row["clip"] for row in found["clips"])]
-    introduction = words("accuracy.introduction", *(f"accuracy.{end[1:]}" for end in endings))
-    of_clips = table(
+    introduction = parts.words("accuracy.introduction", *(f"accuracy.{end[1:]}" for end in endings))
+    of_clips = parts.table(
         f"{material.name}-accuracy", _measured(found), CLIP_HEADS, show={"split": NAMES.__getitem__}
     )
     # Only gait cycles are measured, so the clips are longer.
@@ -63,7 +65,7 @@ def section(found: Json, material: ReportMaterial) -> PageSection:
     shown = [
         SectionPart(0, parts.Paragraph(introduction + _about_sample(found))),
         SectionPart(
-            9, parts.Paragraph(words("accuracy.caveat", duration=duration, dataset=material.dataset))
+            9, parts.Paragraph(parts.words("accuracy.caveat", duration=duration, dataset=material.dataset))
         ),
         SectionPart(10, published_table(found, material), open=True, short=True),
         SectionPart(30, clip_boxes(found, material), tall=True),
@@ -89,7 +91,7 @@ def _about_sample(found: Json) -> str:
         if found[split].get("interval")
     ]
     sample = measure.sample_in_words(found)
-    return " " + words("accuracy.sample", sample=sample, means=", ".join(means))
+    return " " + parts.words("accuracy.sample", sample=sample, means=", ".join(means))
 
 
 def clip_boxes(found: Json, material: ReportMaterial) -> Chart:
@@ -117,7 +119,7 @@ def clip_boxes(found: Json, material: ReportMaterial) -> Chart:
     clips = parts.ordered_axis(row["clip"] for row in rows)
     layout = {"xaxis": ERROR_AXIS, "yaxis": clips, "boxmode": "overlay", **mean}
     more = ["held_out"] if any(row["split"] == "held_out" for row in rows) else []
-    return chart("accuracy-boxes", traces, layout, max(260, 110 + 21 * len(rows)), more=more)
+    return parts.chart("accuracy-boxes", traces, layout, max(260, 110 + 21 * len(rows)), more=more)
 
 
 def quantile_boxes(name: str, errors: Sequence[Json], colour: str, line: str, **more: Any) -> Trace:
@@ -150,7 +152,9 @@ def published_table(found: Json, material: ReportMaterial) -> parts.Table:
         "source": "source",
     }
     rows = [*ours, *material.published_records("accuracy")]
-    return table(f"{material.name}-published", rows, heads, words("accuracy.published"), long=["source"])
+    return parts.table(
+        f"{material.name}-published", rows, heads, parts.words("accuracy.published"), long=["source"]
+    )
 
 
 def figures(found: Json, material: ReportMaterial) -> Iterator[parts.KeyFigure]:
@@ -185,13 +189,13 @@ def hints(found: Json, material: ReportMaterial) -> Iterator[Hint]:
     # Places of hints (`Hint.order`): under 20 for advice on the data, 30 for advice on the network.
     train, held_out = ((found.get(split) or {}).get("mean") for split in SPLITS)
     if held_out is None:
-        yield Hint("warn", "No clips were held out.", words("accuracy.none-held-out"), 10)
+        yield Hint("warn", "No clips were held out.", parts.words("accuracy.none-held-out"), 10)
     elif train:
         ratio = held_out / train
         many = f"{ratio:.1f}" if ratio > 1.5 else f"{ratio:.2f}"
         head = f"The error on held-out clips is {many} times the error on training clips"
         if ratio > 1.5:
-            yield Hint("warn", f"{head}.", words("accuracy.overfits"), 30)
+            yield Hint("warn", f"{head}.", parts.words("accuracy.overfits"), 30)
         elif ratio < 1.2:
             head += ", so the network does not overfit."
             yield Hint("good", head, "A larger network may do better.", 30)
@@ -209,7 +213,7 @@ def _worst_clip(rows: Sequence[Json]) -> Iterator[Hint]:
     if worst["mean"] > 1.8 * median:
         source = worst["clip"].removesuffix("_mirror")
         whose = "its labels" if source == worst["clip"] else f"the labels of {source}, which it mirrors,"
-        text = words("accuracy.worst", times=f"{worst['mean'] / median:.1f}", whose=whose)
+        text = parts.words("accuracy.worst", times=f"{worst['mean'] / median:.1f}", whose=whose)
         yield Hint("note", f"{worst['clip']} has the largest error,", text, 12)
 
 
@@ -268,7 +272,7 @@ def clip_means(found: Json, split: str) -> list[float]:
 def compared_section(compared: Compared) -> PageSection:
     """The spread of the errors, differences between configurations, and errors of single clips."""
     charts = enumerate((error_boxes(compared), difference_map(compared), clip_lines(compared)))
-    shown = [SectionPart(10 + 20 * place, chart) for place, chart in charts]
+    shown = [SectionPart(10 + 20 * place, each) for place, each in charts]
     return PageSection("accuracy", shown, title="Accuracy", order=10, long=True)
 
 
@@ -313,7 +317,7 @@ def error_boxes(compared: Compared) -> Chart:
         )
         options[f"{label}, a value for each clip"] = ours_and_published(list(of_split), of_clips, theirs)
     layout = {"yaxis": ERROR_AXIS, "showlegend": False}
-    return chart("compare-boxes", layout=layout, height=400, choose="Clips", options=options)
+    return parts.chart("compare-boxes", layout=layout, height=400, choose="Clips", options=options)
 
 
 def clip_lines(compared: Compared) -> Chart | None:
@@ -343,7 +347,7 @@ def clip_lines(compared: Compared) -> Chart | None:
                 lines.append(parts.line_trace(f"{name}, published", their_clips, y, colour, **dotted))
     x = {"type": "category", **parts.ordered_axis(order), "showticklabels": len(order) < 40}
     layout = {"xaxis": x, "yaxis": ERROR_AXIS}
-    return chart("compare-clips", layout=layout, height=420, choose="Shown", options=options)
+    return parts.chart("compare-clips", layout=layout, height=420, choose="Shown", options=options)
 
 
 def difference_map(compared: Compared) -> Chart:
@@ -359,4 +363,4 @@ def difference_map(compared: Compared) -> Chart:
     category = {"type": "category"}
     layout = {"xaxis": category, "yaxis": {**category, "autorange": "reversed", "automargin": True}}
     height, choose = max(240, 90 + 42 * len(names)), "Clips and deviation"
-    return chart("compare-difference", layout=layout, height=height, choose=choose, options=options)
+    return parts.chart("compare-difference", layout=layout, height=height, choose=choose, options=options)

@@ -12,7 +12,6 @@ from hobble.core.section import Positive, Section
 from hobble.measures import measure
 from hobble.measures.compare import ComparisonAddition, ConfigurationResults
 from hobble.measures.measure import Row
-from hobble.measures.shown import table, words
 from hobble.report import parts
 from hobble.report.parts import Compared, Hint, PageSection, SectionPart
 from hobble.runtime.options import Runtime
@@ -76,11 +75,11 @@ def section(found: Json, material: ReportMaterial) -> PageSection:
     clips = "held-out" if found["split"] == "held_out" else "training"
     shown = [
         SectionPart(
-            10, parts.Paragraph(words("field.introduction", stretches=found["stretches"], clips=clips))
+            10, parts.Paragraph(parts.words("field.introduction", stretches=found["stretches"], clips=clips))
         ),
         SectionPart(
             20,
-            table("field", rows(found, material.published["field"]), HEADS, "Measures of the field"),
+            parts.table("field", rows(found, material.published["field"]), HEADS, "Measures of the field"),
             open=True,
         ),
     ]
@@ -110,7 +109,7 @@ def hints(found: Json, material: ReportMaterial) -> Iterator[Hint]:
         mine, theirs = (asked.get(who, {}).get(key) for who in ("character", "captured"))
         if mine and theirs and mine > MUCH_MORE * theirs:
             beside = f"{parts.format_number(mine)} against {parts.format_number(theirs)}."
-            text = f"{OF_MOTION[key]}: {beside} {words(f'field.{key}')}"
+            text = f"{OF_MOTION[key]}: {beside} {parts.words(f'field.{key}')}"
             yield Hint("note", f"The character's {faults} more than captured people's.", text, order=40)
 
 

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 from hobble.core.files import Json
 from hobble.measures.compare import ComparisonAddition, ConfigurationResults, published_row
 from hobble.measures.measure import Cost, Measure, Row, SampleOptions, sample_sentence
-from hobble.measures.shown import chart
 from hobble.report import parts
 from hobble.runtime.options import Runtime
 
@@ -51,7 +50,7 @@ def recognition_chart(found: Json) -> parts.Chart | None:
         "captured clips, cross-validated": captured["cross_validated"],
         "captured clips held out of training": captured["held_out"],
     }
-    return chart(
+    return parts.chart(
         "recognition",
         layout=NAMED_AXES,
         height=max(300, 190 + 20 * len(found["classes"])),

@@ -17,7 +17,7 @@ from hobble.core.files import Json
 from hobble.core.section import PhaseMode, Positive, Section
 from hobble.measures import compare, measure
 from hobble.measures.measure import Row
-from hobble.measures.shown import chart, ours_and_published, table, words
+from hobble.measures.shown import ours_and_published
 from hobble.report import parts
 from hobble.report.parts import Chart, Compared, Hint, KeyFigure, PageSection, SectionPart, Trace
 from hobble.runtime.options import Runtime
@@ -76,7 +76,7 @@ def section(found: Json, material: ReportMaterial) -> PageSection:
     if not found.get("laps"):
         return PageSection("speed", [])
     shown = [
-        SectionPart(0, parts.Paragraph(words("speed.track"))),
+        SectionPart(0, parts.Paragraph(parts.words("speed.track"))),
         SectionPart(10, parts.KeyFigures(track_figures(found))),
         SectionPart(15, track_chart(found)),
         SectionPart(20, lap_chart(found, material)),
@@ -121,7 +121,7 @@ def lap_chart(found: Json, material: ReportMaterial) -> Chart:
         text = f"{published['label']}: published mean"
         layout |= parts.reference_line(published["milliseconds"], text, vertical=False)
     more, choose = ["fewer"] if fewest < laps else [], "Phase mode" if len(options) > 1 else None
-    return chart("laps", layout=layout, choose=choose, options=options, more=more, fewest=fewest)
+    return parts.chart("laps", layout=layout, choose=choose, options=options, more=more, fewest=fewest)
 
 
 def _lap_bars(laps: Sequence[Json]) -> list[Trace]:
@@ -170,7 +170,7 @@ def track_chart(found: Json) -> Chart:
         "yaxis": parts.axis("z, m", scaleanchor="x", autorange="reversed", zeroline=False),
     }
     largest, more = f"{max(place[2][0] for place in places):.0f}", ["off"] if off_track else []
-    return chart(
+    return parts.chart(
         "track", traces, layout, 520, more=[*more, "largest"], limit=f"{OFF_TRACK:.0f}", largest=largest
     )
 
@@ -185,7 +185,7 @@ def lap_table(found: Json, name: str) -> parts.Table:
         for lap in found["laps"]
     ]
     show = {"finished": lambda finished: "yes" if finished else "no"}
-    return table(f"{name}-responsivity", records, show=show)
+    return parts.table(f"{name}-responsivity", records, show=show)
 
 
 def track_figures(found: Json) -> list[KeyFigure]:
@@ -195,7 +195,7 @@ def track_figures(found: Json) -> list[KeyFigure]:
     laps = found["laps"]
     steps = sum(lap["steps"] for lap in laps)
     slide = None if steps < FEWEST_STEPS else found["foot_slide_cm"]
-    turn = words(
+    turn = parts.words(
         "speed.turn",
         limit=f"{np.degrees(FASTEST_TURN):.0f}",
         limited=f"{found['turns_held_back']:,} of {sum(lap['frames'] for lap in laps):,} frames",
@@ -206,7 +206,7 @@ def track_figures(found: Json) -> list[KeyFigure]:
     figures = (
         ("Waypoints reached", reached, "", f"{found['laps_finished']} of {len(laps)} laps finished"),
         ("Largest distance from the track", overshoot, "cm", "the largest of all laps"),
-        ("Foot slide", slide, "cm" if slide is not None else "", words("speed.slide", steps=of_steps)),
+        ("Foot slide", slide, "cm" if slide is not None else "", parts.words("speed.slide", steps=of_steps)),
         ("Largest predicted turn", found["predicted_turn_degrees"], "°", turn),
         ("Slow frames", slow, "ms", "1 % of the frames are slower"),
     )
@@ -239,7 +239,7 @@ def speed_table(found: Json, material: ReportMaterial) -> parts.Table:
         "source": "source",
     }
     title = "Comparison with published results"
-    return table(f"{material.name}-published-speed", rows, heads, title, long=["source"])
+    return parts.table(f"{material.name}-published-speed", rows, heads, title, long=["source"])
 
 
 def median_time(found: Json) -> float:
@@ -259,9 +259,9 @@ def _speed_hint(found: Json) -> Hint:
         return Hint("warn", head, "Try mode: linear in the section runtime.", 60)
     if slow > FRAME_BUDGET_MS:
         head = f"1 % of the frames take {slow:.1f} ms or more, too slow for 60 Hz."
-        return Hint("warn", head, words("speed.slow", median=f"{milliseconds:.2f}"), 60)
+        return Hint("warn", head, parts.words("speed.slow", median=f"{milliseconds:.2f}"), 60)
     share, most = 100 * milliseconds / FRAME_BUDGET_MS, math.ceil(100 * slow / FRAME_BUDGET_MS)
-    head = words("speed.fast", share=f"{share:.1f}", most=most)
+    head = parts.words("speed.fast", share=f"{share:.1f}", most=most)
     return Hint("good", head, "That is fast enough for a game.", 60)
 
 
@@ -269,14 +269,14 @@ def _track_hints(found: Json) -> Iterator[Hint]:
     reached, total = found["waypoints_reached"], found["waypoints"]
     if reached < total:
         head = f"The character reached {reached} of {total} waypoints."
-        yield Hint("warn", head, words("speed.circles"))
+        yield Hint("warn", head, parts.words("speed.circles"))
     drawn, predicted = found["largest_turn_degrees"], found["predicted_turn_degrees"]
     if drawn > FLIP_DEGREES:
         head = f"A joint turned by {drawn:.0f} degrees in one frame."
-        yield Hint("warn", head, words("speed.flipped"))
+        yield Hint("warn", head, parts.words("speed.flipped"))
     elif predicted > FLIP_DEGREES:
         head = f"The network predicted a turn of a joint by {predicted:.0f} degrees in one frame."
-        yield Hint("note", head, words("speed.flips", drawn=f"{drawn:.0f}"))
+        yield Hint("note", head, parts.words("speed.flips", drawn=f"{drawn:.0f}"))
 
 
 # The lines of time over size: whose times, in which phase mode, of what, and over which count of weights and
@@ -473,7 +473,7 @@ def lap_boxes(compared: Compared) -> Chart:
         theirs = compared["published"]["laps"] if mode == "constant" else {}
         options[f"{mode} phase"] = ours_and_published(names, ours, theirs, boxpoints="all")
     layout = {"yaxis": TIME_AXIS, "showlegend": False}
-    return chart("compare-laps", layout=layout, choose="Phase mode", options=options)
+    return parts.chart("compare-laps", layout=layout, choose="Phase mode", options=options)
 
 
 def fit_chart(compared: Compared) -> Chart:
@@ -491,4 +491,4 @@ def fit_chart(compared: Compared) -> Chart:
             values = [fit["intercept"] + fit["slope"] * x for x in ends]
             traces.append(parts.line_trace(f"{label}, straight fit", ends, values, colour, width=1.4))
     x = parts.axis("parameters of one frame", tickformat="~s", rangemode="tozero")
-    return chart("compare-fit", traces, {"xaxis": x, "yaxis": TIME_AXIS})
+    return parts.chart("compare-fit", traces, {"xaxis": x, "yaxis": TIME_AXIS})

@@ -13,7 +13,6 @@ from hobble.measures import measure
 from hobble.measures.accuracy import COLOURS, NAMES
 from hobble.measures.compare import ComparisonAddition, ConfigurationResults
 from hobble.measures.measure import SPLITS, Row
-from hobble.measures.shown import chart
 from hobble.report import parts
 from hobble.report.parts import SPLITS as SPLIT_LABELS
 from hobble.report.parts import Chart, Compared, PageSection, SectionPart, Trace
@@ -49,7 +48,7 @@ def section(found: Json, material: ReportMaterial) -> PageSection:
         for trace in _error_line(name, found.get("lengths", ()), split, COLOURS[split])
     ]
     sample = measure.sample_in_words(found)
-    shown = chart("rollouts", traces, _layout(traces), more=["sample"] if sample else (), sample=sample)
+    shown = parts.chart("rollouts", traces, _layout(traces), more=["sample"] if sample else (), sample=sample)
     return PageSection("accuracy", [SectionPart(50, shown)])
 
 
@@ -106,7 +105,7 @@ def compared_chart(compared: Compared) -> Chart:
             if line := _error_line(name, rows, split, colour):
                 options[label] = options.get(label, []) + line
     layout = _layout(trace for traces in options.values() for trace in traces)
-    return chart("compare-rollouts", layout=layout, choose="Clips", options=options)
+    return parts.chart("compare-rollouts", layout=layout, choose="Clips", options=options)
 
 
 def _error_line(name: str, entries: Iterable[Json], split: str, colour: str) -> list[Trace]:

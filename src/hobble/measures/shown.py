@@ -13,11 +13,7 @@ import numpy as np
 from hobble.channels.shown import shown_names
 from hobble.core.files import Json
 from hobble.core.quat import Array
-from hobble.report.parts import Chart, Records, Trace, line_trace, marker_trace
-from hobble.report.parts import chart as chart
-from hobble.report.parts import in_words as in_words
-from hobble.report.parts import table as table
-from hobble.report.parts import words as words
+from hobble.report.parts import Chart, Records, Trace, chart, line_trace, marker_trace
 
 STRIP_WIDTH, STRIP_HEIGHT = 110.0, 205.0  # cm between the figures of a strip
 
