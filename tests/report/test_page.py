@@ -99,6 +99,10 @@ def test_a_network_without_channels_has_a_page_and_measurements_without_results_
     assert ids == SECTIONS - {"play", "gallery", "engine", "accuracy", "injury", "speed"}
 
 
+def test_commands_in_findings_are_code() -> None:
+    assert templates.with_code("<b> `hobble x`") == "&lt;b&gt; <code>hobble x</code>"
+
+
 def test_scripts_that_would_end_their_element_are_refused(material: ReportMaterial) -> None:
     with pytest.raises(ValueError, match="bundle"):
         render_report(material, bundle="'</SCRIPT>'")

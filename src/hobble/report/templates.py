@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import base64
 import hashlib
+import re
 import zlib
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined, Template, select_autoescape
-from markupsafe import Markup
+from markupsafe import Markup, escape
 
 from hobble.report.gather import ReportMaterial
 from hobble.report.parts import (
@@ -38,8 +39,13 @@ def load_template(name: str) -> Template:
         lstrip_blocks=True,
     )
     environment.filters.update(duration=format_duration, size=format_bytes, number=format_number)
-    environment.filters["hash_source"] = hash_source
+    environment.filters.update(hash_source=hash_source, code=with_code)
     return environment.get_template(name)
+
+
+def with_code(text: str) -> Markup:
+    """A text of which the parts between backticks are shown as code."""
+    return Markup(re.sub("`([^`]*)`", r"<code>\1</code>", str(escape(text))))
 
 
 def render_page(template: str, for_scripts: Mapping[str, Any], bundle: str, **values: Any) -> str:
