@@ -59,7 +59,7 @@ def shared_fields(skeleton: Skeleton, local_phases: int = 0) -> dict[str, Any]:
         "x_mean": x_mean, "x_std": x_std, "y_mean": y, "y_std": spread, "layout": layout,
         "skeleton": skeleton, "limits": limits,
         "channels": {"injury": links, "mood": ("happy", "sad", "angry"), "guarding": ("guarding",)},
-        "training_facts": facts,
+        "training_facts": facts, "meta": {"exponents": {"injury": 0.42}},
     }  # fmt: skip
 
 

@@ -14,7 +14,7 @@ from hobble.measures.rollouts_run import RollOutInputs, inputs_of_clip, measure_
 from hobble.measures.walks import in_root_coordinates
 from hobble.models.network import Network
 from hobble.rows.clip_rows import ClipRows
-from hobble.rows.layout import RowLayout
+from hobble.rows.layout import RowLayout, channel_inputs
 from hobble.runtime.animation import ProceduralAnimation
 from tests.measures.made_up import made_up_inputs, random_rows
 from tests.measures.whole_roll_outs import clip_roll_outs, roll_out
@@ -94,7 +94,8 @@ def test_after_one_frame_a_pose_is_the_mean_of_prediction_and_extrapolation(hurt
     rows = clip_rows(hurtable, 40, 2)
     inputs = inputs_of_clip(rows, np.arange(40), rows.layout)
     layout = hurtable.layout
-    np.testing.assert_array_equal(inputs.x[:, layout.x_channel("injury")], rows.channels["injury"])
+    read = channel_inputs("injury", rows.channels["injury"])
+    np.testing.assert_array_equal(inputs.x[:, layout.x_channel("injury")], read)
     y = hurtable.predictor().predict(inputs.x, inputs.phase)
     made, _ = roll_out(hurtable.predictor(), inputs, np.arange(1, 40), 1)
     before = inputs.x[1:, layout.x_joint_position].reshape(39, 31, 3).astype(float)

@@ -61,7 +61,8 @@ class Channel(ABC):
     whether values above 0 make the body slower. If so, `hobble.channels.speed_limits` learns from the
     database how fast such a body goes. manner: whether each column is a way of walking that
     lasts for a whole clip, such as a mood. If so, `hobble.measures.manners` measures whether a recogniser
-    finds it in generated walks. targets: folders of results/<configuration>/ that
+    finds it in generated walks. exponent: of the curve through which a network reads the values, see
+    `read_through_curve`. targets: folders of results/<configuration>/ that
     only a configuration with this channel can have.
     """
 
@@ -75,6 +76,7 @@ class Channel(ABC):
     Options: type[Section] | None = None
     slows: bool = False
     manner: bool = False
+    exponent: float = 1.0
     targets: Sequence[str] = ()
 
     @abstractmethod
@@ -176,6 +178,15 @@ class ClipChannel(Channel):
         warnings = [f"nothing says the {self.name} of {source.clip}; it counts as neutral."]
         row = np.zeros(len(self.columns(clip.skeleton)), np.float32) if values is None else values
         return np.tile(np.asarray(row, np.float32), (len(clip), 1)), warnings * (values is None)
+
+
+def read_through_curve(values: Any, highest: Any, exponent: Any) -> Any:
+    """What a network reads of values from 0 to `highest`: highest * (value / highest) ** exponent.
+
+    An effect that grows with this power of the value is a straight line for the network. It learns a line
+    from few clips, but a curve only from many.
+    """
+    return highest * (values / highest) ** exponent
 
 
 SILENCING_STD = 1e10  # divisor of an input that must have no effect

@@ -18,7 +18,14 @@ from hobble.core.declared import ArrayOf, check_arrays
 from hobble.core.files import load_npz
 from hobble.core.quat import Array
 from hobble.rows.clip_rows import ClipRows
-from hobble.rows.layout import TERRAIN, RowLayout, blocks_without_terrain, body_layout, lower_joints
+from hobble.rows.layout import (
+    TERRAIN,
+    RowLayout,
+    blocks_without_terrain,
+    body_layout,
+    channel_inputs,
+    lower_joints,
+)
 
 UNSEEN = 1e-10  # input weight of a joint that the network shall not see, as in Holden et al. (2017)
 LEAST_STD = 1e-30  # of a column in a file of statistics; rows are divided by it
@@ -123,7 +130,10 @@ def clip_moments(rows: ClipRows, layout: RowLayout) -> tuple[Moments, Moments]:
         heights = Moments.of_rows(rows.heights[part_fits], weight)
         x_frame = _moments_of_lowered(rows.x[part], body.x_joint_position, row_mean, spread)
         parts = {name: x_frame.columns(block) for name, block in blocks_without_terrain(body).items()}
-        parts |= {name: Moments.of_rows(rows.channels[name][part]) for name, _ in layout.channels}
+        parts |= {
+            name: Moments.of_rows(channel_inputs(name, rows.channels[name][part]))
+            for name, _ in layout.channels
+        }
         parts[TERRAIN] = heights
         x = x + _join_columns(*[parts[name] for name in layout.blocks("x")])
         y = y + _moments_of_lowered(rows.y[part], layout.y_joint_position, row_mean, spread)

@@ -30,7 +30,7 @@ from hobble.runtime.controller import FPS
 from hobble.runtime.feet import foot_parts, leg_joints, rest_facing, sole_heights
 from hobble.runtime.options import Runtime
 
-MAGIC, VERSION, ORDER_MARK = b"HOBBLE\r\n", 3, 0x01020304
+MAGIC, VERSION, ORDER_MARK = b"HOBBLE\r\n", 4, 0x01020304
 HEADER, ENTRY, ALIGNMENT = 64, 40, 64
 TYPES = {"int32": 1, "float32": 2, "float64": 3, "int16": 4, "uint8": 5}
 # Standardised inputs are multiplied by 1 / standard deviation. With a smaller factor an input has no effect,
@@ -161,6 +161,7 @@ def _channel_sections(network: Network, runtime: Runtime) -> Sections:
     joined = {key: np.concatenate([np.zeros(0), *values]).astype(float) for key, values in of_column.items()}
     return {
         **joined,
+        "exponents": network.channel_curves[1],
         "channel_of": joined["channel_of"].astype(np.int32),
         "slows": np.array([channel(name).slows for name in network.channels], np.uint8),
         "limit_levels": levels,

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from hobble.channels.injury import CHANNEL
 from hobble.channels.speed_limits import SUM_NORM
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
@@ -70,10 +71,9 @@ def path_up(skeleton: Skeleton, joint: int, below: int = -1) -> list[int]:
 
 
 HIGHEST_SEVERITY = 10.0
-# strength = (severity / 10) ** STRENGTH_POWER: .63 at 3, .77 at 5, .87 at 7. So an injury of 3 already shows.
-# At 3 and 5 a network shows about .65 of what its training clips show.
-STRENGTH_POWER = 0.38
-# The strength of the change of speed, which a network shows in full: .46 at 3, .64 at 5, .79 at 7.
+# strength = (severity / 10) ** STRENGTH_POWER, as a network reads it. So an injury of 3 already shows.
+STRENGTH_POWER = CHANNEL.exponent
+# The strength of the change of speed: .46 at 3, .64 at 5, .79 at 7.
 SPEED_POWER = 0.65
 # A person guards an injury with the whole body. GUARD_CHANGES grow with guarding ** GUARD_POWER.
 GUARD_POWER = 1.8

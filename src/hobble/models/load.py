@@ -69,6 +69,7 @@ class Meta(BaseModel):
     skeleton: dict[str, Any] | None = None
     gaits: Annotated[Names, AfterValidator(_are_the_gaits)] = GAITS
     channels: dict[str, Names] = {}
+    exponents: dict[str, Annotated[float, Field(ge=0.1, le=10)]] = {}
     limits: dict[str, dict[str, Any]] = {}
     terrain_side: Annotated[float, Field(strict=True, gt=0, le=LARGEST_SIDE)] = TERRAIN_SIDE
 

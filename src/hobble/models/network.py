@@ -14,6 +14,7 @@ from typing import Any, ClassVar, Protocol, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from hobble.channels import channel
 from hobble.channels.speed_limits import Limits
 from hobble.core.errors import HobbleError
 from hobble.core.quat import Array
@@ -207,6 +208,17 @@ class Network(ABC):
         labels = self.channels.get(channel, ())
         means = self.x_mean[self.layout.x_channel(channel)] if labels else ()
         return tuple(label for label, mean in zip(labels, means, strict=True) if mean > 0) or labels
+
+    @property
+    def channel_curves(self) -> tuple[Array, Array]:
+        """The arguments `highest` and `exponent` (K,) of `read_through_curve` for the K columns of channels.
+
+        A file without exponents has the exponent 1.
+        """
+        names = [name for name, columns in self.layout.channels for _ in range(columns)]
+        exponents = self.meta.get("exponents", {})
+        highest = np.array([channel(name).highest for name in names], float)
+        return highest, np.array([exponents.get(name, 1.0) for name in names], float)
 
     @property
     def memory_size(self) -> int:

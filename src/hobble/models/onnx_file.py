@@ -193,7 +193,7 @@ def check(path: str | Path, network: OnnxNetwork, mode: str) -> float:
 
 def _metadata(network: OnnxNetwork, mode: str) -> dict[str, Any]:
     """The metadata: what a program that reads the file needs to use the columns."""
-    keys = ("configuration", "contacts", "limits", "units")
+    keys = ("configuration", "contacts", "exponents", "limits", "units")
     return {
         "mode": mode,
         "layout": network.layout.to_dict(),

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from hobble.channels import channel
+from hobble.channels.channel import read_through_curve
 from hobble.core.errors import HobbleError, InputError
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
@@ -253,9 +254,17 @@ def joint_heights(joints: slice) -> slice:
 def frame_inputs(layout: RowLayout, body: Array, channels: Mapping[str, Array]) -> Array:
     """X without its terrain columns, (n, columns), in the order of the layout.
 
-    body: (n, columns) X without terrain and channels. channels: channel -> values (n, columns).
+    body: (n, columns) X without terrain and channels. channels: channel -> values (n, columns), which X holds
+    as `read_through_curve` gives them.
     """
-    return np.concatenate([body, *(channels[name] for name, _ in layout.channels)], axis=1)
+    values = [channel_inputs(name, channels[name]) for name, _ in layout.channels]
+    return np.concatenate([body, *values], axis=1)
+
+
+def channel_inputs(name: str, values: Array) -> Array:
+    """The columns of X (n, columns) of the channel `name` with these values (n, columns)."""
+    read: Array = read_through_curve(values, channel(name).highest, channel(name).exponent)
+    return read
 
 
 def blocks_without_terrain(layout: RowLayout) -> dict[str, slice]:

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from numba.extending import register_jitable
 
+from hobble.channels.channel import read_through_curve
 from hobble.core.compiled import njit
 from hobble.core.quat import Array
 from hobble.models.network import Predictor
@@ -230,9 +231,10 @@ class Controller:
         # x and z of the points left of the path, on it and right of it where the ground is looked up.
         self._points = np.zeros((count, layout.samples, 3, 2))
         blocks = layout.blocks("x")
-        body_starts = np.array([blocks[name].start for name in BODY], np.int64)
+        self._x_starts = np.array([blocks[name].start for name in BODY], np.int64)
         channel_columns = [np.arange(layout.x_size)[layout.x_channel(name)] for name, _ in layout.channels]
-        self._x_columns = (body_starts, np.concatenate([np.zeros(0, np.int64), *channel_columns]))
+        self._x_channels = np.concatenate([np.zeros(0, np.int64), *channel_columns])
+        self._channel_curves = network.channel_curves
         # The largest change of each channel value in a frame.
         channel_steps = [np.full(columns, rates[name] / FPS) for name, columns in layout.channels]
         self._channel_steps = np.concatenate([np.zeros(0), *channel_steps])
@@ -336,10 +338,11 @@ class Controller:
     def _input(self) -> None:
         c = self.character
         network_rows.write_inputs(
-            self._path, c.ground, c.root_height, self._joints, c.channel_values, self._x_columns,
-            self.layout.step, self.x,
-        )  # fmt: skip
-        self.x[:, self._x_columns[1]] *= self.shown[:, None]
+            self._path, c.ground, c.root_height, self._joints, self._x_starts, self.layout.step, self.x
+        )
+        self.x[:, self._x_channels] = read_through_curve(
+            c.channel_values * self.shown[:, None], *self._channel_curves
+        )
 
     def _output(self, ground: Ground | None) -> None:
         c = self.character

@@ -154,22 +154,19 @@ def write_inputs(
     ground: Any,
     height: Any,
     pose: Joints,
-    channel_values: Any,
-    columns: tuple[Any, Any],
+    first: Any,
     step: int,
     x: Any,
 ) -> None:
-    """Write the state into the network's input rows x (C, X), not standardised.
+    """Write the state, without channels, into the network's input rows x (C, X), not standardised.
 
     ground: (C, samples, 3) ground heights left of the path, on it and right of it. height: (C,) mean ground
-    height along the path. channel_values: (C, K). columns: two arrays of columns of x. The first has the
-    first column of each block of `hobble.rows.layout.BODY`. The second has the column of each channel value.
-    step: frames between two samples of the trajectory.
+    height along the path. first: first column of each block of `hobble.rows.layout.BODY`: position 0,
+    direction 1, gait 2, joint_position 3, joint_velocity 4 and terrain 5. step: frames between two samples of
+    the trajectory.
     """
     position, direction, gait = path
     joints, velocities, _ = pose
-    # first: of the blocks position 0, direction 1, gait 2, joint_position 3, joint_velocity 4 and terrain 5.
-    first, channel_columns = columns
     middle, samples = position.shape[1] // 2, ground.shape[1]
     for c in range(x.shape[0]):
         # The trajectory is relative to the present root.
@@ -200,8 +197,6 @@ def write_inputs(
             dx, dz = velocities[c, j, 0], velocities[c, j, 2]
             k = first[4] + 3 * j
             x[c, k], x[c, k + 1], x[c, k + 2] = dx * cos - dz * sin, velocities[c, j, 1], dx * sin + dz * cos
-        for k in range(channel_values.shape[1]):
-            x[c, channel_columns[k]] = channel_values[c, k]
 
 
 @njit

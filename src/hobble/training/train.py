@@ -243,6 +243,7 @@ def network_metadata(
             "gaits": list(GAITS),
             "contacts": list(CONTACTS),
             "channels": {c.name: c.columns(skeleton) for c in channels},
+            "exponents": {c.name: c.exponent for c in channels},
             "limits": database.manifest.limits,
             "units": "; ".join([UNITS, *(f"{c.value_word} 0 to {c.highest:g}" for c in channels)]),
             **network.file_metadata,

@@ -44,6 +44,8 @@ class Injury(Channel):
     rate = 10.0  # severity per second: from healthy to the highest severity in one second
     suffix = "_injuries.txt"
     slows = True
+    # The effects of an injury grow with this power of the severity: to .60 at 3, .75 at 5, .86 at 7.
+    exponent = 0.42
     targets = ("questionnaire",)  # a page on which people watch films of the character and tick what hurts
 
     def columns(self, rig: HasLinks) -> tuple[str, ...]:

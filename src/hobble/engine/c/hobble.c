@@ -167,7 +167,7 @@ typedef struct { /* a character file, read only */
     const uint8_t *parts, *slows; /* slows: for each channel, whether its values make a body limp */
     const char *names; /* each ends with a 0 */
     const float *x_mean, *x_inverse, *x_low, *x_high, *y_low, *y_high;
-    const double *offsets, *sole, *ahead, *rates, *scales, *highest, *defaults;
+    const double *offsets, *sole, *ahead, *rates, *scales, *highest, *defaults, *exponents;
     const double *start_path, *start_direction, *start_gait, *start_joints, *start_velocities,
         *start_rotations;
     channel channels[MOST_CHANNELS];
@@ -439,7 +439,8 @@ static void read_channels(reader *r, model *m) {
     m->channel_of = indices(r, "channel_of", columns, 0, (int64_t)channels - 1);
     m->rates = doubles(r, "rates", columns, 0, 1e9);
     m->scales = doubles(r, "scales", columns, 1e-9, 1e9);
-    m->highest = doubles(r, "highest", columns, 0, 1e6);
+    m->highest = doubles(r, "highest", columns, 1e-9, 1e6);
+    m->exponents = doubles(r, "exponents", columns, 0.1, 10);
     m->defaults = doubles(r, "defaults", columns, 0, 1e6);
     m->slows = small(r, "slows", channels, 1);
     const int32_t *levels = indices(r, "limit_levels", channels, 0, MOST_LEVELS);
@@ -1472,7 +1473,10 @@ static void write_inputs(const model *m, const character *c, float *x) {
         velocity[1] = (float)c->joint_velocity[j][1];
         velocity[2] = (float)(dx * sine + dz * cosine);
     }
-    for (int k = 0; k < m->size[COLUMNS]; k++) x[m->x_channels[k]] = (float)((float)c->values[k] * c->shown);
+    for (int k = 0; k < m->size[COLUMNS]; k++) { /* see read_through_curve in channel.py */
+        double share = c->values[k] * c->shown / m->highest[k];
+        x[m->x_channels[k]] = (float)(m->highest[k] * pow(share, m->exponents[k]));
+    }
 }
 
 /* Limits a row to the range of the training data. An unsound number becomes the middle of its range. */
