@@ -172,6 +172,7 @@ def advance_columns(layout: RowLayout) -> np.ndarray:
 
 STEPS = ("prepare", "input", "insert", "predict", "output", "update")
 FPS = 60
+FEET_AHEAD = 4.0  # frames: a foot in the air is kept above the ground that it reaches in this time
 HIGHEST_GROUND = 1e7  # cm, 100 km above or below 0; at larger heights, floats are imprecise
 
 # In each frame the runtime checks that these arrays of the state are finite and not too large. The other
@@ -356,8 +357,13 @@ class Controller:
             toes = at[:, [1, 3]][..., ::2]
             away = c.foot_lock[..., None] * (c.foot_hold - toes)
             at[:, :4, ::2] += np.repeat(away, 2, axis=1)
-            at = at.reshape(-1, 3)
-            self._ground_heights[:] = _heights(ground, at[:, 0], at[:, 2]).reshape(self._ground_heights.shape)
+            # A foot in the air rises in time for the ground that it will be over.
+            free = np.repeat(1.0 - c.foot_lock, 2, axis=1)[..., None]
+            ahead = at[:, :4] + FEET_AHEAD * free * c.joint_velocity[:, self._ground_joints[:4]]
+            points = np.concatenate([at, ahead], axis=1).reshape(-1, 3)
+            heights = _heights(ground, points[:, 0], points[:, 2]).reshape(len(at), 9)
+            self._ground_heights[:] = heights[:, :5]
+            self._ground_heights[:, :4] = np.maximum(heights[:, :4], heights[:, 5:])
         else:
             self._ground_heights[:] = 0.0
         feet.carry_body(

@@ -70,6 +70,7 @@ enum {
 #define STEP_FRAMES 10
 #define STEP_HEIGHT 5.0
 #define HEIGHT_MIX 0.5
+#define FEET_AHEAD 4.0
 #define FASTEST_LIFT 8.0
 #define STRETCH 0.99
 #define BEHIND 10.0
@@ -2100,22 +2101,26 @@ static int place(hobble *h, const hobble_ground *ground) {
         const int32_t *l = m->legs;
         const int under[5] = {l[HEEL], l[TOE], l[4 + HEEL], l[4 + TOE], m->size[HIPS]};
         write_pose(m, c, h->y + (size_t)i * (size_t)m->size[Y_SIZE]);
-        for (int k = 0; k < 5; k++) {
-            h->points[10 * i + 2 * k] = c->pose_position[under[k]][0];
-            h->points[10 * i + 2 * k + 1] = c->pose_position[under[k]][2];
-        }
-        for (int k = 0; k < 4; k++) { /* a held foot is where it is held, not where the network predicts it */
-            const double *toe = c->pose_position[under[k | 1]];
-            h->points[10 * i + 2 * k] += c->foot_lock[k / 2] * (c->foot_hold[k / 2][0] - toe[0]);
-            h->points[10 * i + 2 * k + 1] += c->foot_lock[k / 2] * (c->foot_hold[k / 2][1] - toe[2]);
-        }
+        double (*points)[2] = (double (*)[2])(h->points + 18 * i);
+        for (int k = 0; k < 5; k++)
+            for (int a = 0; a < 2; a++) points[k][a] = c->pose_position[under[k]][2 * a];
+        for (int k = 0; k < 4; k++)
+            for (int a = 0; a < 2; a++) {
+                /* a held foot is where it is held, not where the network predicts it */
+                double lock = c->foot_lock[k / 2];
+                points[k][a] += lock * (c->foot_hold[k / 2][a] - c->pose_position[under[k | 1]][2 * a]);
+                /* a foot in the air rises in time for the ground that it will be over */
+                points[5 + k][a] = points[k][a] + FEET_AHEAD * (1 - lock) * c->joint_velocity[under[k]][2 * a];
+            }
     }
-    int error = look_up(h, ground, 5 * h->characters);
+    int error = look_up(h, ground, 9 * h->characters);
     for (int i = 0; !error && i < h->characters; i++) {
         character *c = &h->state[i];
         float *contacts = h->y + (size_t)i * (size_t)m->size[Y_SIZE] + m->y_contacts;
-        carry_body(m, c, contacts, h->heights + 5 * i);
-        for (int f = 0; f < 2; f++) place_foot(m, c, f, contacts, h->heights + 5 * i);
+        double *heights = h->heights + 9 * i;
+        for (int k = 0; k < 4; k++) heights[k] = larger(heights[k], heights[5 + k]);
+        carry_body(m, c, contacts, heights);
+        for (int f = 0; f < 2; f++) place_foot(m, c, f, contacts, heights);
         for (int k = 0; k < 4; k++) c->report[2 + k] = clamp(contacts[k], 0, 1);
     }
     return error;
@@ -2231,7 +2236,7 @@ static size_t widest_layer(const stack *s) {
 static void distribute(hobble *h, arena *a) {
     const model *m = &h->model;
     uint64_t count = (uint64_t)h->characters,
-             look_ups = (uint64_t)m->samples * 3 > 5 ? (uint64_t)m->samples * 3 : 5;
+             look_ups = (uint64_t)m->samples * 3 > 9 ? (uint64_t)m->samples * 3 : 9;
     uint64_t blocks = ((uint64_t)m->size[ROWS] + BLOCK - 1) / BLOCK * (uint64_t)m->size[FEATURES];
     const stack *const stacks[4] = {&m->network, &m->gate, &m->stepper, &m->projector};
     int plays = m->size[FORM] >= RECORDED, learned = m->size[FORM] == LEARNED;
