@@ -63,7 +63,7 @@ MIXES: dict[str, dict[str, float]] = {
     "foot": {"antalgic": 0.65, "steppage": 0.35},
 }
 # Part -> factor on the mixed curves of trunk, pelvis and shoulders.
-CURVE_FACTOR: dict[str, float] = {"pelvis": 1.6, "hip": 2.3, "thigh": 1.25, "shank": 1.5, "foot": 0.9}
+CURVE_FACTOR: dict[str, float] = {"pelvis": 1.6, "hip": 1.8, "thigh": 1.25, "shank": 1.5, "foot": 0.9}
 # Part -> changes that the recordings do not show.
 # - Ratios to the healthy clip: speed; stride (time); lift (height of the swinging foot); push and strike
 #   (pitch of the foot while the heel is up and while the toe is up); arms (swing of both arms); back and head
@@ -80,19 +80,19 @@ ADDED_CHANGES: dict[str, dict[str, float]] = {
     },
     "hip": {
         "speed": 0.66, "stride": 1.2, "turn": 0.8, "push": 0.7, "vault": 0.9, "lift": 0.75,
-        "lift_sound": 0.3, "push_sound": 0.4, "forward": 2.0, "out": 0.02, "crouch_sound": 4.0,
+        "lift_sound": 0.3, "push_sound": 0.4, "forward": 2.0, "out": 0.02,
     },
     "thigh": {
-        "speed": 0.58, "stride": 1.05, "turn": 0.8, "push": 0.4, "vault": 1.0, "lift": 0.1,
+        "speed": 0.58, "stride": 1.08, "turn": 0.8, "push": 0.4, "vault": 1.0, "lift": 0.1,
         "lift_sound": 0.3, "push_sound": 0.45, "out": 0.07, "strike": 0.4, "list": 5.0, "toe_out": 8.0,
-        "vault_sound": 0.5, "crouch_sound": 3.0,
+        "vault_sound": 0.5,
     },
     "shank": {
-        "speed": 0.62, "stride": 1.02, "turn": 0.8, "push": 0.55, "lift": 0.4, "lift_sound": 0.3,
+        "speed": 0.62, "stride": 1.06, "turn": 0.8, "push": 0.55, "lift": 0.4, "lift_sound": 0.3,
         "push_sound": 0.45, "strike": 0.0, "crouch": 19.0, "list": 2.0,
     },
     "foot": {
-        "speed": 0.66, "stride": 1.03, "turn": 0.8, "push": 0.15, "lift": 0.6, "lift_sound": 0.3,
+        "speed": 0.66, "stride": 1.06, "turn": 0.8, "push": 0.15, "lift": 0.6, "lift_sound": 0.3,
         "push_sound": 0.62, "strike": 1.0, "side": 2.5, "toe_out": 18.0,
     },
     "back": {
@@ -110,7 +110,7 @@ ADDED_CHANGES: dict[str, dict[str, float]] = {
 # degrees (`dip`) as the hurt foot bears weight, elbows bent by 40 to 77 degrees (`guard`), both knees
 # bent, eyes on the ground.
 GUARD_CHANGES: dict[str, float] = {
-    "forward": 17.0, "nod": 10.0, "dip": 14.0, "crouch": 10.0, "crouch_sound": 10.0, "guard": 0.95,
+    "forward": 22.0, "nod": 10.0, "dip": 16.0, "crouch": 10.0, "crouch_sound": 6.0, "guard": 0.95,
     "guard_sound": 0.75,
 }  # fmt: skip
 # The changes that are ratios.

@@ -16,7 +16,7 @@ X, Y, Z = np.eye(3)
 PELVIS_LEAN = 0.35  # the pelvis tilts forward by this share of the trunk's lean
 PELVIS_STIFFNESS = 0.7  # the pelvis loses this times as much of its movement as a stiff back loses
 POSTURE_SECONDS = 0.5  # sigma of the Gaussian over time that gives a joint's mean posture
-TRUNK_DIP = 0.35  # the trunk leans by this share of the head's nod
+TRUNK_DIP = 0.35  # the trunk leans by this share of the head's nod, forward and over the hurt foot
 LOOK_AHEAD = 0.85  # share of the trunk's lean that the head undoes, to look ahead
 ARM_STILL = 0.93  # a held arm loses up to this share of its movement
 # How firmly an arm is held grows with (strength of the injury) ** HOLD_POWER. So a mildly hurt arm swings
@@ -28,12 +28,12 @@ HOLD_POWER = 1.9
 # clip Injured_Jog_LLA by Ferre et al., a jog with a hurt forearm. `upper`, for a hurt upper arm or shoulder:
 # the upper arm is closer to the body, and the forearm points more forward. `carry`, for a hurt hand: the
 # forearm is only raised in front of the body. `guard`, for a guarded leg or back: the
-# elbow is bent by some 80 degrees, and the upper arm is a little behind the body.
+# elbow is bent by 50 degrees and away from the body, and the hand is in front of the thigh.
 HELD_ARMS = {
     "upper": ((0.10, 0.16, -0.98), (0.80, -0.58, 0.10)),
     "fore": ((0.28, 0.17, -0.85), (0.26, -0.86, -0.41)),
     "carry": ((0.10, 0.14, -0.98), (0.92, -0.25, 0.30)),
-    "guard": ((-0.12, 0.22, -0.97), (0.82, -0.30, -0.10)),
+    "guard": ((0.05, 0.34, -0.94), (0.62, -0.20, -0.72)),
 }
 CARRY_STRENGTH = 0.75  # an arm with a hurt hand (`carry`) is held less firmly, by this factor
 
@@ -119,7 +119,8 @@ def _added_rotations(source: HealthyClip, effects: Effects) -> tuple[Array, Arra
     turn, shoulders = turn + less * _turning(source, "hip"), shoulders + less * _turning(source, "shoulder")
     side, raised = effects.changes["side"], effects.changes["list"] * source.swing_curve
     # As a hurt foot bears weight, which is while the other foot swings, the head nods and the trunk follows.
-    dip = np.sum(effects.changes["dip"] * source.swing_curve[:, ::-1], axis=1)
+    dips = effects.changes["dip"] * source.swing_curve[:, ::-1]
+    dip, side = dips.sum(axis=1), side + TRUNK_DIP * dips
     forward = forward + effects.changes["forward"] + TRUNK_DIP * dip
     left = left + side[:, LEFT] - side[:, RIGHT]
     left_up = left_up + raised[:, LEFT] - raised[:, RIGHT]

@@ -47,7 +47,9 @@ def _stand(seconds: float = 2.0) -> Segment:
 # Arguments of each segment: speed, turn, seconds, heading; see `Segment`. The inner tuples only keep several
 # segments on one line.
 RECIPES: dict[str, tuple[Segment, ...]] = {
-    "walk-straight": (_walk(130, 0, 4), _walk(150, 8, 3), _walk(105, -8, 3), _walk(130, 0, 3)),
+    "walk-straight": (
+        *(_walk(130, 0, 4), _walk(150, 8, 2.5), _walk(55, 0, 2.5), _walk(105, -8, 2.5), _walk(80, 0, 2.5)),
+    ),
     "walk": (
         *(_walk(130, 0, 3), _walk(150, 90, 3), _walk(105, -100, 3), _walk(70, 20, 2.6), _walk(180, 0, 2.6)),
         *(_walk(120, 90, 1.2), _walk(130, 0, 1.4), _walk(95, -180, 2), _walk(60, 0, 2.4), _walk(130, 0, 1.4)),

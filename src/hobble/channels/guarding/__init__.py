@@ -26,10 +26,11 @@ GOLDEN = (math.sqrt(5) - 1) / 2
 def guarding_of_clip(name: str) -> float:
     """How much the body guards in a clip, if its entry does not say so: the same in all its frames.
 
-    The values of clips with different names are spread evenly over 0 to 1. A clip and its mirror have the
-    same value.
+    The values of clips with different names are spread over 0 to 1, half of them within .15 of an end,
+    because a network learns most from these. A clip and its mirror have the same value.
     """
-    return math.modf(zlib.crc32(name.removesuffix(MIRROR_SUFFIX).encode()) * GOLDEN)[0]
+    even = math.modf(zlib.crc32(name.removesuffix(MIRROR_SUFFIX).encode()) * GOLDEN)[0]
+    return 0.5 - 0.5 * math.cos(math.pi * even)
 
 
 class Guarding(ClipChannel):
