@@ -172,14 +172,16 @@ def leg_joints(skeleton: Skeleton) -> np.ndarray:
 
 
 def sole_heights(network: Network, legs: np.ndarray) -> np.ndarray:
-    """(2,) heel and toe height below which a foot is in the ground, cm: SOLE, or less for a smaller foot.
+    """(2,) heel and toe height below which a foot is in the ground, cm.
 
-    The network's mean pose gives the mean heights of heel and toe. They are larger than in a standing foot,
-    because feet are in the air half of the time. 60% of them is less than in any standing foot.
+    They are those of the pose in which a character starts, or SOLE if the file has none. The network's mean
+    pose gives the mean heights of heel and toe. They are larger than in a standing foot, because feet are in
+    the air half of the time. 60% of them is less than in any standing foot, so it is the most.
     """
-    layout = network.layout
-    height = network.y_mean[layout.y_joint_position].reshape(-1, 3)[:, 1]
-    return np.minimum(SOLE, 0.6 * height[legs[:, 2:]].mean(axis=0).astype(float))
+    joints, facts = network.layout.y_joint_position, network.training_facts
+    mean = network.y_mean[joints].reshape(-1, 3)[legs[:, 2:], 1].mean(axis=0)
+    at_start = None if facts is None else facts.start_y[joints].reshape(-1, 3)[legs[:, 2:], 1].min(axis=0)
+    return np.minimum(SOLE if at_start is None else at_start, 0.6 * mean).astype(float)
 
 
 def rest_facing(skeleton: Skeleton) -> np.ndarray:
