@@ -133,9 +133,9 @@ def effects_of_severities(
     strength = gaussian(
         (np.clip(severity, 0, HIGHEST_SEVERITY) / HIGHEST_SEVERITY) ** STRENGTH_POWER, SETTLING_SECONDS * fps
     )
-    sums = {name: _Sum(np.zeros(frames)) for name in WHOLE_BODY}
-    sums |= {name: _Sum(np.zeros((frames, 2))) for name in SIDED}
-    curves = _Sum(np.zeros((frames, 5, 5)))
+    terms = {name: [np.zeros(frames)] for name in WHOLE_BODY}
+    terms |= {name: [np.zeros((frames, 2))] for name in SIDED}
+    curves = [np.zeros((frames, 5, 5))]
     parts: dict[tuple[str, int | None], Array] = {}
     for link, column in zip(skeleton.links, strength.T, strict=True):
         body_part = part_of_link(skeleton, link)
@@ -145,9 +145,9 @@ def effects_of_severities(
     guarded = np.broadcast_to(np.clip(guarding, 0.0, 1.0) ** GUARD_POWER, frames)
 
     def add(name: str, values: Array, side: int | None) -> None:
-        """Add values (F,) of a change to its sum. side: the hurt side."""
+        """Add values (F,) to the terms of a change. side: the hurt side."""
         if name in WHOLE_BODY:
-            sums[name].add(values)
+            terms[name].append(values)
             return
         both = np.zeros((frames, 2))
         if name == "arms":  # the change "arm" of both sides
@@ -155,14 +155,14 @@ def effects_of_severities(
         else:
             hurt = RIGHT if side is None else side  # a part on the midline changes both sides alike
             both[:, 1 - hurt if name.endswith(SOUND_SUFFIX) else hurt] = values
-        sums[name.removesuffix(SOUND_SUFFIX)].add(both)
+        terms[name.removesuffix(SOUND_SUFFIX)].append(both)
 
     for (part, side), part_strength in parts.items():
         if not part_strength.any():
             continue
         for name, amount in changes_of_hurt_part(part).items():
             if name == "curves":
-                curves.add(part_strength[:, None, None] * _curves_of_side(np.asarray(amount), side))
+                curves.append(part_strength[:, None, None] * _curves_of_side(np.asarray(amount), side))
             elif name == "speed":
                 add(name, part_strength ** (SPEED_POWER / STRENGTH_POWER) * amount, side)
             else:
@@ -181,7 +181,7 @@ def effects_of_severities(
             add(HELD_ARM_OF_PART[part], part_strength, side)
     shown = np.round(HIGHEST_SEVERITY * np.clip(strength, 0.0, 1.0) ** (1 / STRENGTH_POWER), 3)
     shown = np.where(shown < LEAST_SEVERITY, 0.0, shown)
-    return Effects({name: total.value() for name, total in sums.items()}, curves.value(), shown)
+    return Effects({name: _together(each) for name, each in terms.items()}, _together(curves), shown)
 
 
 def _curves_of_side(curves: Array, side: int | None) -> Array:
@@ -193,15 +193,10 @@ def _curves_of_side(curves: Array, side: int | None) -> Array:
     return curves * MIRROR_SIGNS[:, None] * HALF_CYCLE_SIGNS if side == LEFT else curves
 
 
-class _Sum:
+def _together(terms: list[Array]) -> Array:
     """A sum in which large terms count most: p-norm of the positive minus p-norm of the negative terms."""
-
-    def __init__(self, zero: Array) -> None:
-        self.positive, self.negative = zero.copy(), zero.copy()
-
-    def add(self, term: Array) -> None:
-        self.positive += np.maximum(term, 0.0) ** SUM_NORM
-        self.negative += np.maximum(-term, 0.0) ** SUM_NORM
-
-    def value(self) -> Array:
-        return self.positive ** (1 / SUM_NORM) - self.negative ** (1 / SUM_NORM)
+    up, down = (
+        np.sum([np.maximum(sign * term, 0.0) ** SUM_NORM for term in terms], axis=0) ** (1 / SUM_NORM)
+        for sign in (1.0, -1.0)
+    )
+    return np.asarray(up - down)

@@ -163,20 +163,18 @@ def _hold_arm(source: HealthyClip, effects: Effects, world: Array, side: int) ->
     # How much the arm is held in each way, (F,) from 0 to 1.
     weights = {name: np.clip(effects.changes[name][:, side], 0.0, 1.0) ** HOLD_POWER for name in HELD_ARMS}
     weights["carry"] = CARRY_STRENGTH * weights["carry"]
-    held = ARM_STILL * np.max(list(weights.values()), axis=0)
+    held = ARM_STILL * np.max([*weights.values()], axis=0)
     if not held.any():
         return
-    total = np.sum(list(weights.values()), axis=0)
-    # Where the arm is not held, a direction is needed to avoid a division by 0. It has no effect there.
-    weights["carry"] = np.where(total > 1e-9, weights["carry"], 1.0)
-    total = np.maximum(total, 1e-9) + (total <= 1e-9)
+    # Where the arm is not held, it needs a direction, too. It has no effect there.
+    weights["carry"] = weights["carry"] + 1e-9
     mirror = np.array([1.0 if side == LEFT else -1.0, 1.0, 1.0])
     shoulder, elbow, wrist = (skeleton.role(f"{SIDES[side]}_{r}") for r in ("shoulder", "elbow", "wrist"))
     for bone, (joint, end) in enumerate(((shoulder, elbow), (elbow, wrist))):
         direction: Array = np.zeros((len(source), 3))  # x is left, y is up, z is forward
         for name, directions in HELD_ARMS.items():
             forward, left, up = directions[bone]
-            direction += (weights[name] / total)[:, None] * np.array([left, up, forward]) * mirror
+            direction += weights[name][:, None] * np.array([left, up, forward]) * mirror
         direction = quat.rotate(source.heading, direction)
         rest_bone = skeleton.offsets[end]
         fully_held = aim_bone(world[:, joint], np.broadcast_to(rest_bone, direction.shape), direction)
