@@ -88,7 +88,7 @@ ADDED_CHANGES: dict[str, dict[str, float]] = {
         "vault_sound": 0.5,
     },
     "shank": {
-        "speed": 0.62, "stride": 1.06, "turn": 0.8, "push": 0.55, "lift": 0.4, "lift_sound": 0.3,
+        "speed": 0.62, "stride": 1.04, "turn": 0.8, "push": 0.55, "lift": 0.4, "lift_sound": 0.3,
         "push_sound": 0.45, "strike": 0.0, "crouch": 19.0, "list": 2.0,
     },
     "foot": {
@@ -110,7 +110,7 @@ ADDED_CHANGES: dict[str, dict[str, float]] = {
 # degrees (`dip`) as the hurt foot bears weight, elbows bent by 40 to 77 degrees (`guard`), both knees
 # bent, eyes on the ground.
 GUARD_CHANGES: dict[str, float] = {
-    "forward": 22.0, "nod": 10.0, "dip": 16.0, "crouch": 10.0, "crouch_sound": 6.0, "guard": 0.95,
+    "forward": 27.0, "nod": 10.0, "dip": 16.0, "crouch": 10.0, "crouch_sound": 6.0, "guard": 0.95,
     "guard_sound": 0.75,
 }  # fmt: skip
 # The changes that are ratios.

@@ -76,7 +76,7 @@ STRENGTH_POWER = CHANNEL.exponent
 # The strength of the change of speed: .46 at 3, .64 at 5, .79 at 7.
 SPEED_POWER = 0.65
 # A person guards an injury with the whole body. GUARD_CHANGES grow with guarding ** GUARD_POWER.
-GUARD_POWER = 2.2
+GUARD_POWER = 2.6
 LEG_PARTS = ("hip", "thigh", "shank", "foot")
 GUARDED_PARTS = ("pelvis", *LEG_PARTS, "back")
 JOIN_FROM, JOIN_AT = 5.0, 7.0  # `join` grows from 0 to 1 between these severities of a part of the leg
