@@ -133,9 +133,9 @@ def effects_of_severities(
     strength = gaussian(
         (np.clip(severity, 0, HIGHEST_SEVERITY) / HIGHEST_SEVERITY) ** STRENGTH_POWER, SETTLING_SECONDS * fps
     )
-    terms = {name: [np.zeros(frames)] for name in WHOLE_BODY}
+    terms: dict[str, list[Array]] = {name: [np.zeros(frames)] for name in WHOLE_BODY}
     terms |= {name: [np.zeros((frames, 2))] for name in SIDED}
-    curves = [np.zeros((frames, 5, 5))]
+    curves: list[Array] = [np.zeros((frames, 5, 5))]
     parts: dict[tuple[str, int | None], Array] = {}
     for link, column in zip(skeleton.links, strength.T, strict=True):
         body_part = part_of_link(skeleton, link)
