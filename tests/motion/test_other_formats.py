@@ -156,6 +156,8 @@ def test_the_longest_of_several_animations_is_read_or_the_named_one(tmp_path, wa
     ("name", "content", "problem"),
     [
         ("text.glb", b"not a model", "not a readable glTF file"),
+        ("far.glb", b"version https://git-lfs.github.com/spec/v1\n", "a pointer of Git LFS"),
+        ("far.bvh", b"version https://git-lfs.github.com/spec/v1\n", "a pointer of Git LFS"),
         ("empty.gltf", b'{"asset": {"version": "2.0"}}', "a glTF file without an animation"),
         ("cut.fbx", b"Kaydara FBX Binary", "Blender"),
     ],

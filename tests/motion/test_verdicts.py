@@ -107,7 +107,7 @@ def test_legs_of_unequal_length_bend_no_knee_and_stand_level(walk, bvh, make, sh
 
 @pytest.mark.parametrize(
     ("frames", "words"),
-    [(4, "only 4 frames of 60 a second"), (40, "only one pose, held all the time, such as")],
+    [(4, "only 7 frames, which are 4 at 60 a second"), (40, "only one pose, held all the time, such as")],
 )
 def test_a_clip_without_motion_is_refused_or_accepted_as_a_doubt(walk, bvh, make, frames, words):
     clip = walk.part(slice(0, 7))

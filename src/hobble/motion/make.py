@@ -142,7 +142,7 @@ def _no_motion_problem(file: Bvh, options: MotionOptions) -> Problem | None:
         return None
     seen = "one pose, held all the time, such as a T-pose or the zero pose"
     if moves:
-        seen = f"{frames} frames of {options.fps:g} a second"
+        seen = f"{len(file)} frames, which are {frames} at {options.fps:g} a second"
     return Problem(f"there is no motion in it, only {seen}", "Export the clip with its motion.")
 
 

@@ -121,6 +121,7 @@ def _clean_text(path: Path, data: bytes) -> bytes:
     """
     if not data.strip():
         raise InputError(path, "the file is empty", fix=EXPORT)
+    refuse_pointer(path, data)
     if data.startswith(b"Kaydara FBX"):
         raise InputError(path, "this is an FBX file, not BVH", fix="Export the clip as BVH.")
     if data[:2] in (b"\xff\xfe", b"\xfe\xff") or data[:2] in (b"H\0", b"\0H"):
@@ -135,6 +136,14 @@ def _clean_text(path: Path, data: bytes) -> bytes:
         problem = "this is not a BVH file, because it does not begin with HIERARCHY"
         raise InputError(path, problem, line=1, fix="Export the clip as BVH.")
     return data
+
+
+def refuse_pointer(path: Path, data: bytes) -> None:
+    """Raise InputError for what stands for a file in a repository that was cloned without Git LFS."""
+    if data.startswith(b"version https://git-lfs"):
+        raise InputError(
+            path, "this is a pointer of Git LFS, not the file", fix="Fetch it with `git lfs pull`."
+        )
 
 
 def _find_motion(path: Path, data: bytes) -> int:
