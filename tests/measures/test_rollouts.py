@@ -127,6 +127,7 @@ def test_results_of_splits_are_means_of_their_clips_and_reproducible(tmp_path: P
             assert entry["train"][key] == pytest.approx(both)
             assert entry["held_out"][key] == c[key]
         assert none["mean"] is None
+        assert c["ended"] == {1: 38, 30: 1}[entry["length"]]
     rows = roll_out_rows(result)
     assert (len(rows), rows[0]["clip"]) == (2 * (2 + 4), None)
     json.dumps(result, allow_nan=False)
