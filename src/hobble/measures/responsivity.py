@@ -68,6 +68,10 @@ OFF_TRACK = 100.0  # cm from the line between two waypoints; places farther away
 TIME_AXIS = parts.axis("ms per frame", rangemode="tozero")
 FEWEST_STEPS = 10  # if the character takes fewer steps, the mean foot slide is not shown
 FRAME_BUDGET_MS = 1000 / 60  # the time that a frame may take at 60 Hz
+# What the table of laps shows of a lap, besides times.
+OF_LAP: tuple[str, ...] = ("lap", "finished", "waypoints_reached", "seconds", "frames")
+OF_LAP += ("path_distance_cm", "path_overshoot_cm", "steps", "foot_slide_cm")
+OF_LAP += ("predicted_turn_degrees", "largest_turn_degrees", "turns_held_back")
 FLIP_DEGREES = 60  # if a joint turns by more than this in one frame, it flips visibly
 
 
@@ -178,7 +182,7 @@ def track_chart(found: Json) -> Chart:
 def lap_table(found: Json, name: str) -> parts.Table:
     """A row per lap: how it went, the mean time of each step of a frame, and the median time of a frame."""
     records = [
-        {key: value for key, value in lap.items() if key != "milliseconds"}
+        {key: lap[key] for key in OF_LAP}
         | ({"foot_slide_cm": None} if lap["steps"] < FEWEST_STEPS else {})
         | {f"{step}, mean ms": lap["milliseconds"][step] for step in STEPS}
         | {"whole frame, median ms": median_time(lap)}
