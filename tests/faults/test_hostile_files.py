@@ -63,6 +63,8 @@ HEADER = "HIERARCHY\nROOT Hips\n{\nOFFSET 0 0 0\nCHANNELS 1 Xposition\n"
 BODY = HEADER + "}\nMOTION\nFrames: 9\nFrame Time: 0.0083\n"
 END = "}\nMOTION\nFrames: %d\nFrame Time: 0.0083\n" + "1\n"
 
+TURNS = END % 20 + "70\n" * 19
+
 
 def joints(named: int, more: int = 0, deep: bool = False) -> str:
     """The first `named` joints have their own names."""
@@ -128,8 +130,7 @@ FILES: dict[str, tuple[str, str | bytes | Callable[[], str | bytes], str]] = {
     "300,000 joints": ("bvh", lambda: joints(5_000, 295_000) + END % 1, "more than 4096 joints"),
     "300,000 joints deep": ("bvh", lambda: joints(5_000, 295_000, True) + END % 1, "more than 4096 joints"),
     "the longest chain of joints": (
-        "clip", lambda: joints(MOST_JOINTS - 1, 0, True).replace("Xposition", "Zrotation") + END % 1,
-        "no motion in it"
+        "clip", lambda: joints(MOST_JOINTS - 1, 0, True).replace("Xposition", "Zrotation") + TURNS, DOUBT
     ),
     "joints without channels": (
         "bvh", lambda: joints(4000) + END % 20_000 + "1\n" * 19_999, "20000 frames of 4001 joints"
