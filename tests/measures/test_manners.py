@@ -8,6 +8,7 @@ from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
+import pandas
 import pytest
 
 from hobble.channels import channel
@@ -147,6 +148,8 @@ def test_a_network_walks_in_every_manner_and_mixture(both: Network, motion: list
         [], ["old"], ["sad"], ["old"], ["sad"], ["old", "sad"],
     ]  # fmt: skip
     assert "between" in found["generated"][-1]
+    places = (pandas.Series(place) for place in ([3.0, 1.0], [0.0, 0.0], [4.0, 0.0]))
+    assert module._position_between(*places) == 0.75, "nearer to the second"
     shown = page.section({"applies": True, "channels": [found]}, SimpleNamespace(network={"skeleton": {}}))
     assert shown.title == "Mood"
     assert len({part.content.name for part in shown.parts if not isinstance(part.content, Paragraph)}) == 6
