@@ -83,7 +83,7 @@ def test_a_group_has_its_configured_weight(holden31: Skeleton, tmp_path: Path) -
     gait = [i for i, column in enumerate(tables["columns"]) if 48 <= column < 120]
     assert not tables["feature_weights"][gait].any()
     # Severity 7 of at most 10.
-    np.testing.assert_allclose(tables["features"][FRAMES[0] :, -26], 14.0, rtol=1e-6)
+    np.testing.assert_allclose(tables["features"][FRAMES[0] :, -26], 2 * 10 * 0.7**0.42, rtol=1e-5)
 
 
 def test_rows_of_another_layout_are_refused(holden31: Skeleton, tmp_path: Path) -> None:
