@@ -48,10 +48,10 @@ def test_a_refused_file_is_listed_with_its_message(root, folder):
 
 
 def test_a_warning_of_many_clips_is_printed_once():
-    rare, common = "repaired: its floor", "The same for all."
-    clips = [ClipSummary(str(i), warnings=(common, rare)) for i in range(6)]
+    rare = "repaired: its floor"
+    clips = [ClipSummary(str(i), warnings=(f"It is {i} cm too high.", rare)) for i in range(6)]
     short, notes = shared_warnings(clips)
-    assert notes == [f"6 of 6 clips: {common}"]
+    assert notes == ["6 of 6 clips, such as 0: It is 0 cm too high."]
     assert [clip.warnings for clip in short] == [(rare,)] * 6
     assert shared_warnings(clips[:4]) == (clips[:4], [])
 

@@ -25,13 +25,17 @@ def group_messages(messages: Iterable[tuple[str, str, str]]) -> list[Group]:
     stages: dict[str, int] = {}
     for clip, stage, sentence in messages:
         stages.setdefault(stage, len(stages))
-        kind = re.sub(r"\([^()]*\)|-?[0-9][0-9.,:/-]*", "0", sentence)
-        kinds.setdefault((stage, kind), []).append((clip, sentence))
+        kinds.setdefault((stage, kind_of(sentence)), []).append((clip, sentence))
     groups = [
         Group(stage, tuple(dict.fromkeys(clip for clip, _ in found)), found[0][1])
         for (stage, _), found in kinds.items()
     ]
     return sorted(groups, key=lambda group: (stages[group.stage], -len(group.clips)))
+
+
+def kind_of(sentence: str) -> str:
+    """The sentence without numbers and what stands in parentheses: equal for messages of one kind."""
+    return re.sub(r"\([^()]*\)|-?[0-9][0-9.,:/-]*", "0", sentence)
 
 
 def in_words(group: Group) -> str:

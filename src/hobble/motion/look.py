@@ -5,7 +5,6 @@ from __future__ import annotations
 import html
 import json
 import re
-from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -16,6 +15,7 @@ import numpy as np
 from hobble.core.clip import Clip
 from hobble.core.clip_files import clips_in, unused_file_notes
 from hobble.core.errors import HobbleError, InputError
+from hobble.core.messages import group_messages, kind_of
 from hobble.core.quat import Array
 from hobble.motion.body import path_between
 from hobble.motion.duplicates import ClipDigest, clip_digest, duplicate_pairs
@@ -30,7 +30,7 @@ from hobble.motion.skeleton_file import load_skeleton
 
 # The table: one line for each clip, and notes on all of them.
 
-MANY = 5  # a warning that at least this many clips get is printed once for all of them
+MANY = 5  # a kind of warning that at least this many clips get is printed once for all of them
 # What to do with duplicates that do not have all in common. To hold a clip out is to keep it from training,
 # for tests.
 ADVICE, USUAL_ADVICE = "hold both out or neither", "one of them is enough"
@@ -93,15 +93,21 @@ def summarise_clips(
 
 
 def shared_warnings(clips: Sequence[ClipSummary]) -> tuple[list[ClipSummary], list[str]]:
-    """Take warnings that at least MANY clips share out of their summaries.
+    """Take warnings of a kind that at least MANY clips share out of their summaries.
 
-    Returns the summaries without these warnings, and a note for each of the warnings. Only a warning that
-    ends with a full stop can be shared. The others are about one clip.
+    Returns the summaries without these warnings, and a note for each kind. Only a warning that ends with a
+    full stop can be shared. The others are about one clip.
     """
-    count = Counter(warning for clip in clips for warning in clip.warnings if warning.endswith("."))
-    common = {warning: times for warning, times in count.items() if times >= MANY}
-    short = [replace(clip, warnings=tuple(w for w in clip.warnings if w not in common)) for clip in clips]
-    return short, [f"{times} of {len(clips)} clips: {warning}" for warning, times in common.items()]
+    warnings = ((clip.name, "", w) for clip in clips for w in clip.warnings if w.endswith("."))
+    groups = [group for group in group_messages(warnings) if len(group.clips) >= MANY]
+    kinds = {kind_of(group.message) for group in groups}
+    short = [
+        replace(clip, warnings=tuple(w for w in clip.warnings if kind_of(w) not in kinds)) for clip in clips
+    ]
+    return short, [
+        f"{len(group.clips)} of {len(clips)} clips, such as {group.clips[0]}: {group.message}"
+        for group in groups
+    ]
 
 
 def summary_of_report(report: Mapping[str, Any]) -> ClipSummary:
