@@ -51,7 +51,7 @@ def test_a_warning_of_many_clips_is_printed_once():
     rare = "repaired: its floor"
     clips = [ClipSummary(str(i), warnings=(f"It is {i} cm too high.", rare)) for i in range(6)]
     short, notes = shared_warnings(clips)
-    assert notes == ["6 of 6 clips, such as 0: It is 0 cm too high."]
+    assert notes == ["6 of 6 clips (0, 1, 2, 3, 4, 5), the first one: It is 0 cm too high."]
     assert [clip.warnings for clip in short] == [(rare,)] * 6
     assert shared_warnings(clips[:4]) == (clips[:4], [])
 

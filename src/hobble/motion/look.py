@@ -31,6 +31,7 @@ from hobble.motion.skeleton_file import load_skeleton
 # The table: one line for each clip, and notes on all of them.
 
 MANY = 5  # a kind of warning that at least this many clips get is printed once for all of them
+MOST_NAMED = 10  # of these clips are named
 # What to do with duplicates that do not have all in common. To hold a clip out is to keep it from training,
 # for tests.
 ADVICE, USUAL_ADVICE = "hold both out or neither", "one of them is enough"
@@ -104,10 +105,11 @@ def shared_warnings(clips: Sequence[ClipSummary]) -> tuple[list[ClipSummary], li
     short = [
         replace(clip, warnings=tuple(w for w in clip.warnings if kind_of(w) not in kinds)) for clip in clips
     ]
-    return short, [
-        f"{len(group.clips)} of {len(clips)} clips, such as {group.clips[0]}: {group.message}"
-        for group in groups
-    ]
+    notes = []
+    for group in groups:
+        names = ", ".join(group.clips[:MOST_NAMED]) + ", ..." * (len(group.clips) > MOST_NAMED)
+        notes.append(f"{len(group.clips)} of {len(clips)} clips ({names}), the first one: {group.message}")
+    return short, notes
 
 
 def summary_of_report(report: Mapping[str, Any]) -> ClipSummary:
