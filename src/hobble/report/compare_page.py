@@ -82,7 +82,7 @@ def select_fitting(
 
     Characters are taken in order. After one that does not fit, a smaller one may still fit.
 
-    >>> select_fitting({"a": {"x": 1}, "b": {"x": "long" * 9}, "c": {"x": 2}}, 20)
+    >>> select_fitting({"a": {"x": 1}, "b": {"x": "long" * 9}, "c": {"x": 2}}, 40)
     ({'a': {'x': 1}, 'c': {'x': 2}}, ['b'])
     """
     kept: dict[str, Mapping[str, Any]] = {}
