@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -25,8 +26,10 @@ from hobble.runtime.feet import (
     leg_joints,
     place_feet,
     rest_facing,
+    sole_heights,
 )
 from hobble.runtime.leg_reach import bend_leg
+from tests.engine.networks import shared_fields
 
 
 def crouched(skeleton: Skeleton, thigh: float = 0.5, knee: float = 0.9) -> tuple[np.ndarray, np.ndarray]:
@@ -289,3 +292,16 @@ def test_knee_heel_and_toe_move_no_further_in_a_frame_than_allowed(holden31: Ske
         np.testing.assert_allclose(last, feet.base[0], atol=1e-3)
     assert fastest[9.0] <= 9.0 + 1e-6
     assert fastest[1e8] > 12
+
+
+def test_a_foot_stands_as_high_as_in_the_pose_in_which_a_character_starts(holden31) -> None:
+    legs, given = leg_joints(holden31), shared_fields(holden31)
+    joints, facts = given["layout"].y_joint_position, given["training_facts"]
+    given["y_mean"] = given["y_mean"].copy()  # it is the start pose, too
+    facts.start_y[joints].reshape(-1, 3)[legs[:, 2:], 1] = [[9.0, 2.0], [7.0, 3.0]]
+    given["y_mean"][joints].reshape(-1, 3)[legs[:, 2:], 1] = 20.0
+    np.testing.assert_allclose(sole_heights(SimpleNamespace(**given), legs), [7.0, 2.0])
+    given["y_mean"][joints].reshape(-1, 3)[legs[:, 2:], 1] = 10.0  # feet that are never so high
+    np.testing.assert_allclose(sole_heights(SimpleNamespace(**given), legs), [6.0, 2.0])
+    without = {**given, "training_facts": None}
+    np.testing.assert_allclose(sole_heights(SimpleNamespace(**without), legs), [5.0, 4.0])
