@@ -166,7 +166,7 @@ typedef struct { /* a character file, read only */
         y_joints; /* first columns in Y; 0 to 3 are velocity, turn, phase */
     const int32_t *inputs, *x_first, *x_channels, *parents, *legs, *channel_of;
     const uint8_t *parts, *slows; /* slows: for each channel, whether its values make a body limp */
-    const char *names; /* each ends with a 0 */
+    const char *names;            /* each ends with a 0 */
     const float *x_mean, *x_inverse, *x_low, *x_high, *y_low, *y_high;
     const double *offsets, *sole, *ahead, *rates, *scales, *highest, *defaults, *exponents;
     const double *start_path, *start_direction, *start_gait, *start_joints, *start_velocities,
@@ -577,7 +577,8 @@ static int read_model(const void *file, size_t bytes, model *m, char *why) {
         m->gate_columns = indices(&r, "gate_columns", (uint64_t)m->size[GATE_INPUTS], 0, m->size[INPUTS] - 1);
         if (m->size[LATENT]) {
             m->start_phases = doubles(&r, "start_phases", 2 * (uint64_t)m->size[LATENT], -1e6, 1e6);
-            require(&r, m->x_first[X_TERRAIN] + 3 * m->samples + 2 * m->size[LATENT] <= m->size[X_SIZE], "x_first");
+            require(&r, m->x_first[X_TERRAIN] + 3 * m->samples + 2 * m->size[LATENT] <= m->size[X_SIZE],
+                    "x_first");
         }
         read_stack(&r, &m->gate, gate, m->size[GATE_INPUTS], m->size[SETS]);
     }
@@ -635,15 +636,22 @@ enum { DEPTH = 256, AHEAD_IN_MEMORY = 48, TILE_ROWS = 6 };
 
 #if defined(__GNUC__) || defined(__clang__)
 #define ALWAYS_INLINE static inline __attribute__((always_inline))
-typedef float vector __attribute__((vector_size(32), aligned(4), may_alias));
+#ifdef __AVX512F__
+#define PIECE 16 /* numbers in a vector, and vectors in a panel's row */
+#else
+#define PIECE 8
+#endif
+#define PIECES (WIDTH / PIECE)
+typedef float vector __attribute__((vector_size(4 * PIECE), aligned(4), may_alias));
 typedef float v4 __attribute__((vector_size(16)));
-typedef int32_t whole __attribute__((vector_size(32), aligned(4), may_alias));
-typedef int16_t half __attribute__((vector_size(16), aligned(2), may_alias));
+typedef int32_t whole __attribute__((vector_size(4 * PIECE), aligned(4), may_alias));
+typedef int16_t half __attribute__((vector_size(2 * PIECE), aligned(2), may_alias));
 
 #ifdef __wasm__
 #include <wasm_simd128.h>
 #define FETCH(place) ((void)0)
-/* Clang converts a vector of short integers one by one; `asm` hides from it that these integers were short. */
+/* Clang converts a vector of short integers one by one; `asm` hides from it that these integers were short.
+ */
 static inline vector floats_of(const int16_t *w) {
     v128_t low = wasm_i32x4_load16x4(w), high = wasm_i32x4_load16x4(w + 4);
     __asm__("" : "+r"(low), "+r"(high));
@@ -663,33 +671,27 @@ static inline vector floats_of(const int16_t *w) {
 ALWAYS_INLINE void tile(const int rows, const int panels, const int storage, const void *weights,
                         size_t w_step, const float *x, size_t x_step, int depth, float *sums,
                         const size_t *slots) {
-    vector sum[TILE_ROWS][8];
+    vector sum[TILE_ROWS][4 * PIECES];
     for (int r = 0; r < rows; r++)
-        for (int p = 0; p < 2 * panels; p++) sum[r][p] = *(const vector *)(sums + slots[r] + 8 * p);
+        for (int p = 0; p < PIECES * panels; p++) sum[r][p] = *(const vector *)(sums + slots[r] + PIECE * p);
     for (int k = 0; k < depth; k++) {
         for (int p = 0; p < panels; p++) {
             size_t at = w_step * (size_t)p + WIDTH * (size_t)k;
-            vector low, high;
-            if (storage == INT16) {
-                const int16_t *w = (const int16_t *)weights + at;
-                if (rows == 1) FETCH(w + WIDTH * AHEAD_IN_MEMORY);
-                low = FLOATS(w);
-                high = FLOATS(w + 8);
-            } else {
-                const float *w = (const float *)weights + at;
-                if (rows == 1) FETCH(w + WIDTH * AHEAD_IN_MEMORY);
-                low = *(const vector *)w;
-                high = *(const vector *)(w + 8);
-            }
+            const int16_t *shorts = (const int16_t *)weights + at;
+            const float *floats = (const float *)weights + at;
+            if (rows == 1 && storage == INT16) FETCH(shorts + WIDTH * AHEAD_IN_MEMORY);
+            if (rows == 1 && storage != INT16) FETCH(floats + WIDTH * AHEAD_IN_MEMORY);
+            vector w[PIECES];
+            for (int q = 0; q < PIECES; q++)
+                w[q] = storage == INT16 ? FLOATS(shorts + PIECE * q) : *(const vector *)(floats + PIECE * q);
             for (int r = 0; r < rows; r++) {
                 float input = x[x_step * (size_t)r + (size_t)k];
-                sum[r][2 * p] += input * low;
-                sum[r][2 * p + 1] += input * high;
+                for (int q = 0; q < PIECES; q++) sum[r][PIECES * p + q] += input * w[q];
             }
         }
     }
     for (int r = 0; r < rows; r++)
-        for (int p = 0; p < 2 * panels; p++) *(vector *)(sums + slots[r] + 8 * p) = sum[r][p];
+        for (int p = 0; p < PIECES * panels; p++) *(vector *)(sums + slots[r] + PIECE * p) = sum[r][p];
 }
 #else /* a compiler without vectors */
 #define ALWAYS_INLINE static
@@ -872,8 +874,8 @@ static void softmax(float *logits, int count) {
     }
 }
 
-/* Local phases: each foot and hand has a phase of its own, a vector, which the network predicts with the pose.
-   memory: ROW, which is 1 once the character was shown, then the vectors (LATENT, 2).
+/* Local phases: each foot and hand has a phase of its own, a vector, which the network predicts with the
+   pose. memory: ROW, which is 1 once the character was shown, then the vectors (LATENT, 2).
    models/local/predictor.py explains it. Writes the vectors into the input row x. */
 static void write_phases(const model *m, double *memory, float *x) {
     float *at = x + m->x_first[X_TERRAIN] + 3 * m->samples;
@@ -1172,7 +1174,8 @@ enum { NEW, SHOWN, JUMPING }; /* values of memory[ROW] in learned motion matchin
    with JUMPING. Returns whether any character jumps. */
 static int search_states(hobble *h, float *states, float *found, float *wishes) {
     const model *m = &h->model;
-    size_t n = (size_t)m->size[FEATURES], size = n + (size_t)m->size[LATENT], x_size = (size_t)m->size[X_SIZE];
+    size_t n = (size_t)m->size[FEATURES], size = n + (size_t)m->size[LATENT],
+           x_size = (size_t)m->size[X_SIZE];
     int jumps = 0, due = 0;
     for (int c = 0; c < h->characters; c++) due |= h->state[c].memory[SINCE] == 0;
     if (!due) return 0;
@@ -1200,7 +1203,8 @@ static void predict_learned(hobble *h) {
     size_t count = (size_t)h->characters, n = (size_t)m->size[FEATURES], size = n + (size_t)m->size[LATENT],
            width = (size_t)m->size[Y_SIZE], shown_width = width + 2;
     float *states = h->states, *following = states + count * size, *found = following + count * size,
-          *wishes = found + count * size, *shown = wishes + count * n, *expected = shown + count * shown_width;
+          *wishes = found + count * size, *shown = wishes + count * n,
+          *expected = shown + count * shown_width;
     for (size_t c = 0; c < count; c++) {
         double *memory = h->state[c].memory;
         int due = memory[ROW] != SHOWN || !(memory[SINCE] + 1 < m->size[EVERY]);
@@ -1296,7 +1300,8 @@ static void limit_target(const model *m, const double *values, goal *target) {
         }
     double highest = total > 0 ? hurry * weighted / larger(total, 1e-9) : INFINITY;
     /* A target below the usual speed is slowed by the same share as the usual speed would be. */
-    double asked = length2(target->velocity[0], target->velocity[1]), usual_speed = usual / larger(total, 1e-9);
+    double asked = length2(target->velocity[0], target->velocity[1]),
+           usual_speed = usual / larger(total, 1e-9);
     double held = smaller(1, highest / larger(larger(asked, usual_speed), 1e-9));
     target->velocity[0] *= held;
     target->velocity[1] *= held;
@@ -1999,8 +2004,8 @@ static double step_noise(uint32_t seed, uint32_t step, uint32_t stream) {
     return (total - 510.0) / 147.8;
 }
 
-/* Makes each step of a character take a little more or less time and way: see variation.py, which has the same
-   numbers. Streams of random numbers: 0 time, 1 length, 2 how much an injury shows, 3 the person. */
+/* Makes each step of a character take a little more or less time and way: see variation.py, which has the
+   same numbers. Streams of random numbers: 0 time, 1 length, 2 how much an injury shows, 3 the person. */
 static void vary(const model *m, character *c, goal *target) {
     static const double healthy[3] = {0.035, 0.03, 0.0}, hurt[3] = {0.11, 0.08, 0.12}, sides_differ = 0.015;
     double most = 0, factors[3];
@@ -2008,7 +2013,8 @@ static void vary(const model *m, character *c, goal *target) {
     if (!(c->variation > 0)) return;
     c->step += half != c->step % 2;
     for (int k = 0; k < m->size[COLUMNS]; k++)
-        if (m->slows[m->channel_of[k]] && m->highest[k] > 0) most = larger(most, c->values[k] / m->highest[k]);
+        if (m->slows[m->channel_of[k]] && m->highest[k] > 0)
+            most = larger(most, c->values[k] / m->highest[k]);
     most = smaller(most, 1);
     for (uint32_t s = 0; s < 3; s++) {
         double spread = healthy[s] + most * (hurt[s] - healthy[s]);
@@ -2248,7 +2254,7 @@ static void distribute(hobble *h, arena *a) {
         size_t widest = widest_layer(stacks[i]);
         h->widest = widest > h->widest ? widest : h->widest;
     }
-    h->memory_size = plays                  ? OFFSETS + (int)state + OFFSETS_PER_JOINT * m->size[JOINTS]
+    h->memory_size = plays ? OFFSETS + (int)state + OFFSETS_PER_JOINT * m->size[JOINTS]
                      : m->size[FORM] == GATED && m->size[LATENT] ? ROW + 1 + 2 * m->size[LATENT]
                                                                  : 0;
     h->number_count = lay_out(h, &one, NULL);
