@@ -83,8 +83,11 @@ def test_a_character_starts_in_the_start_frame(make_network) -> None:
 def test_the_hips_keep_their_height_when_the_ground_is_switched(make_network, with_facts: bool) -> None:
     """The ground under a walking character jumps up and down by a metre, or becomes a slope."""
     network = make_network(scale=0.2)
-    if with_facts:
-        network = replace(network, training_facts=walked(network))
+    if with_facts:  # in training the hips were as low as in a crouch, once
+        facts, column = walked(network), network.layout.y_joint_position.start + 1
+        low = facts.y_low.copy()
+        low[column] = 0.3 * network.y_mean[column]
+        network = replace(network, training_facts=replace(facts, y_low=low))
     character, hips, heights = ProceduralAnimation(network), network.skeleton.role("hips"), []
     grounds = [lambda x, z, g=g: g[0] + g[1] * z for g in ((0, 0), (100, 0), (-100, 0), (0, 0.4), (30, 0))]
     for frame in range(300):
@@ -92,7 +95,7 @@ def test_the_hips_keep_their_height_when_the_ground_is_switched(make_network, wi
         x, y, z = character.next_pose((0, 2.5), terrain=ground).positions[hips]
         heights.append(y - ground(x, z))
     mean = network.y_mean[network.layout.y_joint_position].reshape(-1, 3)[hips, 1]
-    assert 0.65 * mean - 1e-3 <= min(heights) <= max(heights) <= 1.175 * mean + 1e-3
+    assert 0.67 * mean - 1e-3 <= min(heights) <= max(heights) <= 1.175 * mean + 1e-3
 
 
 @pytest.mark.parametrize(

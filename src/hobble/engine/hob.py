@@ -63,7 +63,7 @@ def character_bytes(network: Network, runtime: Runtime, storage: str | None = No
     facts = network.training_facts
     numbers = (
         network.terrain_side, runtime.steering, runtime.foot_locking, bounds.fastest, *bounds.hips,
-        0.0 if facts is None else facts.start_phase, getattr(network, "halflife", 1.0),
+        0.0 if facts is None else facts.start_phase, getattr(network, "halflife", 1.0), bounds.upright,
     )  # fmt: skip
     sections |= {
         "sizes": np.array([sizes.get(name, 0) for name in SIZES], np.int32),

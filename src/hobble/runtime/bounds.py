@@ -25,7 +25,7 @@ DEFAULT_DEVIATIONS = 15.0
 DEFAULT_MARGIN = 50.0  # in the unit of each column: cm for positions
 # Then the hips stay within these multiples of their mean height above the ground. Without such limits, a
 # character whose ground is switched under it folds up or hangs in the air until the body has followed.
-DEFAULT_HIPS = (0.65, 1.175)
+DEFAULT_HIPS = (0.67, 1.175)
 SPEED_MARGIN = 1.5  # largest joint speed, as a multiple of the fastest joint in training
 # A larger number is called unsound, like one that is not finite. A working character never has such values.
 LARGEST_SOUND = 1e8
@@ -37,7 +37,7 @@ class Bounds:
 
     The values are float32 and not standardised. fastest: largest movement of a joint, cm a frame. hips:
     lowest and highest height of the hips in training, cm above the ground; or DEFAULT_HIPS times the mean
-    height.
+    height. upright: a body that does not crouch keeps its hips above this height, cm.
     """
 
     x_low: Array = field(repr=False)
@@ -46,6 +46,7 @@ class Bounds:
     y_high: Array = field(repr=False)
     fastest: float
     hips: tuple[float, float]
+    upright: float
 
     @classmethod
     def of(cls, network: Network) -> Bounds:
@@ -53,12 +54,14 @@ class Bounds:
         layout, facts = network.layout, network.training_facts
         assert network.skeleton is not None
         hips_height = layout.y_joint_position.start + 3 * network.skeleton.role("hips") + 1
+        low, high = (float(share * network.y_mean[hips_height]) for share in DEFAULT_HIPS)
         if facts is None:
-            low, high = (float(share * network.y_mean[hips_height]) for share in DEFAULT_HIPS)
             spread = DEFAULT_DEVIATIONS * network.y_std + DEFAULT_MARGIN
             x = np.full(layout.x_size, LARGEST_SOUND, np.float32)
             spread[layout.y_joint_rotation] = 2 * np.pi  # angles of joints stay within a full turn
-            return cls(-x, x, network.y_mean - spread, network.y_mean + spread, LARGEST_SOUND, (low, high))
+            return cls(
+                -x, x, network.y_mean - spread, network.y_mean + spread, LARGEST_SOUND, (low, high), low
+            )
         x_margin = MARGIN_SHARE * (facts.x_high - facts.x_low)
         y_margin = MARGIN_SHARE * (facts.y_high - facts.y_low)
         x_low, x_high = facts.x_low - x_margin, facts.x_high + x_margin
@@ -68,7 +71,8 @@ class Bounds:
         # The phase may run backwards only as fast as it did in training.
         y_low[phase_change] = np.maximum(y_low[phase_change], np.minimum(facts.y_low[phase_change], 0.0))
         hips = float(facts.y_low[hips_height]), float(facts.y_high[hips_height])
-        return cls(x_low, x_high, y_low, facts.y_high + y_margin, SPEED_MARGIN * facts.fastest, hips)
+        fastest = SPEED_MARGIN * facts.fastest
+        return cls(x_low, x_high, y_low, facts.y_high + y_margin, fastest, hips, max(low, hips[0]))
 
 
 @njit

@@ -130,7 +130,7 @@ enum {
     SIZES
 };
 /* The values of the section "numbers". */
-enum { SIDE, STEERING, LOCKING, FASTEST, HIPS_LOW, HIPS_HIGH, START_PHASE, HALFLIFE, NUMBERS };
+enum { SIDE, STEERING, LOCKING, FASTEST, HIPS_LOW, HIPS_HIGH, START_PHASE, HALFLIFE, UPRIGHT, NUMBERS };
 /* Where a prediction comes from. PHASED: sets of weights, of which those around the phase are blended. FIXED:
    one set. GATED: sets that a second network, the gate, blends. RECORDED: frames of clips. LEARNED: three
    networks that stand for such frames. See part 4. */
@@ -394,6 +394,7 @@ static void read_sizes(reader *r, model *m) {
             "numbers");
     require(r, n[HIPS_LOW] >= -LARGEST_SOUND && n[HIPS_LOW] <= n[HIPS_HIGH] && n[HIPS_HIGH] <= LARGEST_SOUND,
             "numbers");
+    require(r, n[UPRIGHT] >= n[HIPS_LOW] && n[UPRIGHT] <= LARGEST_SOUND, "numbers");
     require(r, n[START_PHASE] >= 0 && n[START_PHASE] <= 1 && n[HALFLIFE] > 0 && n[HALFLIFE] <= 1e6,
             "numbers");
 }
@@ -1901,7 +1902,9 @@ static void carry_body(const model *m, character *c, const float *contacts, cons
     }
     if (weight > BODY_MIN_CONTACT) c->body_lift += BODY_MIX * (rises / weight - c->body_lift);
     double above = c->pose_position[m->size[HIPS]][1] - ground[4];
-    c->body_lift = clamp(c->body_lift, m->number[HIPS_LOW] - above, m->number[HIPS_HIGH] - above);
+    double predicted = c->pose_position[m->size[HIPS]][1] - c->root_height;
+    double lowest = larger(m->number[HIPS_LOW], smaller(m->number[UPRIGHT], predicted));
+    c->body_lift = clamp(c->body_lift, lowest - above, m->number[HIPS_HIGH] - above);
     for (int j = 0; j < m->size[JOINTS]; j++) c->pose_position[j][1] += c->body_lift;
 }
 
