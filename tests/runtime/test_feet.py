@@ -201,8 +201,10 @@ def test_standing_feet_raise_and_lower_the_body(holden31: Skeleton) -> None:
         for _ in range(80):
             position = base[None].copy()
             both = legs, foot_parts(holden31, legs), sole, rest_facing(holden31), far
-            hips_range, root = (low, high, low), np.zeros(1)
-            carry_body(np.array([contacts], np.float32), ground, hips, hips_range, root, both, lift, position)
+            hips_range, predicted = (low, high, low), np.zeros(1)
+            carry_body(
+                np.array([contacts], np.float32), ground, hips, hips_range, predicted, both, lift, position
+            )
         moved = position[0] - base
         np.testing.assert_allclose(moved[:, 1], moved[0, 1], atol=1e-12)
         np.testing.assert_array_equal(moved[:, ::2], 0)

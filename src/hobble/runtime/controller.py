@@ -368,7 +368,7 @@ class Controller:
             self._ground_heights[:] = 0.0
         feet.carry_body(
             self._contacts, self._ground_heights, self._hips, (*self.bounds.hips, self.bounds.upright),
-            self.root[:, 1], self._legs, c.body_lift, self.pose_position,
+            self.y[:, self._y_joints + 3 * self._hips + 1], self._legs, c.body_lift, self.pose_position,
         )  # fmt: skip
         feet.place_feet(
             self._contacts, self._ground_heights, self.foot_locking, self._legs, self._feet,

@@ -308,7 +308,7 @@ def carry_body(
     ground: Any,
     hips: int,
     hips_range: tuple[float, float, float],
-    root: Any,
+    predicted: Any,
     legs: Legs,
     lift: Any,
     position: Any,
@@ -324,7 +324,7 @@ def carry_body(
     contacts: see `place_feet`. ground: (C, 5) heights under the feet as in `place_feet`, then under the hips.
     hips: index of the hips joint. hips_range: lowest and highest height of this joint, cm above the ground,
     and the height above which it stays unless the network predicts a lower one, as when it crouches.
-    root: (C,) height above which the network has predicted the pose, cm.
+    predicted: (C,) the predicted height of this joint, cm above the mean ground.
     lift: (C,) the body lift, cm, kept between frames.
     """
     joints, _, sole, _, _ = legs
@@ -340,7 +340,7 @@ def carry_body(
         if weight > BODY_MIN_CONTACT:
             lift[c] += BODY_MIX * (rises / weight - lift[c])
         above = position[c, hips, 1] - ground[c, 4]
-        lowest = max(hips_range[0], min(hips_range[2], position[c, hips, 1] - root[c]))
+        lowest = max(hips_range[0], min(hips_range[2], predicted[c]))
         lift[c] = min(max(lift[c], lowest - above), hips_range[1] - above)
         for j in range(position.shape[1]):
             position[c, j, 1] += lift[c]

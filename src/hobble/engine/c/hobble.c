@@ -1891,8 +1891,9 @@ static double sole_depth(const model *m, const character *c, int f, const double
 }
 
 /* Raises or lowers the whole body, so that it stands on the ground under its feet. ground: (5) heights under
-   left heel, left toe, right heel, right toe and hips. */
-static void carry_body(const model *m, character *c, const float *contacts, const double *ground) {
+   left heel, left toe, right heel, right toe and hips. y: the prediction. */
+static void carry_body(const model *m, character *c, const float *y, const double *ground) {
+    const float *contacts = y + m->y_contacts;
     double rises = 0, weight = 0;
     for (int f = 0; f < 2; f++) {
         double rise = sole_depth(m, c, f, ground + 2 * f);
@@ -1902,7 +1903,7 @@ static void carry_body(const model *m, character *c, const float *contacts, cons
     }
     if (weight > BODY_MIN_CONTACT) c->body_lift += BODY_MIX * (rises / weight - c->body_lift);
     double above = c->pose_position[m->size[HIPS]][1] - ground[4];
-    double predicted = c->pose_position[m->size[HIPS]][1] - c->root_height;
+    double predicted = y[m->y_joints + 3 * m->size[HIPS] + 1];
     double lowest = larger(m->number[HIPS_LOW], smaller(m->number[UPRIGHT], predicted));
     c->body_lift = clamp(c->body_lift, lowest - above, m->number[HIPS_HIGH] - above);
     for (int j = 0; j < m->size[JOINTS]; j++) c->pose_position[j][1] += c->body_lift;
@@ -2125,10 +2126,10 @@ static int place(hobble *h, const hobble_ground *ground) {
     int error = look_up(h, ground, 9 * h->characters);
     for (int i = 0; !error && i < h->characters; i++) {
         character *c = &h->state[i];
-        float *contacts = h->y + (size_t)i * (size_t)m->size[Y_SIZE] + m->y_contacts;
+        float *y = h->y + (size_t)i * (size_t)m->size[Y_SIZE], *contacts = y + m->y_contacts;
         double *heights = h->heights + 9 * i;
         for (int k = 0; k < 4; k++) heights[k] = larger(heights[k], heights[5 + k]);
-        carry_body(m, c, contacts, heights);
+        carry_body(m, c, y, heights);
         for (int f = 0; f < 2; f++) place_foot(m, c, f, contacts, heights);
         for (int k = 0; k < 4; k++) c->report[2 + k] = clamp(contacts[k], 0, 1);
     }
