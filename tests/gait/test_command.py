@@ -69,7 +69,8 @@ def test_the_command_prints_a_result_for_each_clip(walker, file, capsys):
 def test_a_clip_without_a_step_is_named_and_refused(holden31, walker, file, capsys):
     rotations = np.zeros((90, len(holden31.joints), 4))
     rotations[..., 0] = 1
-    still = Clip("standing", holden31, 60.0, rotations, np.tile([0, 93.0, 0], (90, 1)))
+    sway = 2 * np.sin(np.arange(90) / 15)
+    still = Clip("standing", holden31, 60.0, rotations, np.stack([sway, 93 + 0 * sway, 0 * sway], axis=1))
     assert main(["gait", file(still), "--healthy", file(walker(125))]) == 1
     said = capsys.readouterr().err
     assert "standing.bvh" in said
