@@ -102,7 +102,7 @@ def test_a_loop_is_written_as_pictures_and_bvh(
     x_mean[network.layout.x_channel("injury")][network.channels["injury"].index("LeftFoot-LeftToeBase")] = 0.5
     network = replace(network, x_mean=x_mean)  # a network that learnt from a hurt left foot, and nothing else
     stimuli.write_stimuli(network, tmp_path / "a", runtime, size=64)
-    names = ["healthy", "left-foot", "preset-bad-back", "guarding-guarding"]
+    names = ["healthy", "left-foot", "preset-bad-back", "guarding"]
     assert {p.name for p in (tmp_path / "a").iterdir()} == {"stimuli.json"} | {
         f"{n}.{kind}" for n in names for kind in ("webp", "bvh")
     }

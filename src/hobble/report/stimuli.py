@@ -86,8 +86,9 @@ def write_stimuli(
 def all_loops(network: Network) -> list[tuple[str, str, SampleWalk]]:
     """(name of the files, channel, walk) of each loop, as `ChannelDisplay.loops` lists them.
 
-    The names of the first channel are used as they are. Names of later channels begin with "<channel>-", and
-    their neutral walk is left out, because the first channel has it.
+    The names of the first channel are used as they are. Names of later channels begin with "<channel>-", or
+    are just "guarding" where channel and column have the same name. Their neutral walk is left out, because
+    the first channel has it.
     """
     assert network.skeleton is not None
     out: list[tuple[str, str, SampleWalk]] = []
@@ -96,7 +97,7 @@ def all_loops(network: Network) -> list[tuple[str, str, SampleWalk]]:
             if not out or out[0][1] == name:  # the first channel that has loops
                 out.append((loop.name, name, loop))
             elif loop.values:
-                out.append((f"{name}-{loop.name}", name, loop))
+                out.append((name if loop.name == name else f"{name}-{loop.name}", name, loop))
     return out
 
 
