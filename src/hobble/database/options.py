@@ -17,7 +17,6 @@ class RowOptions(Section):
     )
     step: Positive = Field(10, description="frames between trajectory samples")
     facing_sigma: PositiveFloat = Field(20.0, description="smoothing of the facing direction, frames")
-
     local_phases: bool = Field(
         False,
         description="add a phase of its own for each foot and hand, which networks of the kind `local` need "

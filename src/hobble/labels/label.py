@@ -21,7 +21,6 @@ from hobble.labels.options import LabelOptions as Options
 from hobble.labels.phase import (
     MARGINS,
     dropped_frames,
-    fill_between,
     find_cycles,
     footsteps_of_phase,
     mirrored_footsteps,
@@ -67,9 +66,7 @@ def label_clip(
         shares = overwrite_crouch(shares, clip)
     known &= ~dropped_frames(footsteps, len(clip))
     zero = options.phase_zero
-    cycles, dropped = find_cycles(footsteps, len(clip), zero, options.margins)
-    if options.between:
-        cycles, dropped = fill_between(cycles, len(clip), options.margins), 0
+    cycles, dropped = find_cycles(footsteps, len(clip), zero, options.margins, options.between)
     if not len(cycles):
         margin, where = MARGINS[options.margins], ""
         if options.margins == "drop":
@@ -104,9 +101,7 @@ def mirror_labels(labels: Labels, report: LabelReport, clip: Clip) -> tuple[Labe
     original.
     """
     footsteps = mirrored_footsteps(labels.footsteps)
-    cycles, dropped = find_cycles(footsteps, len(labels), report.phase_zero, report.margins)
-    if report.between:
-        cycles, dropped = fill_between(cycles, len(labels), report.margins), 0
+    cycles, dropped = find_cycles(footsteps, len(labels), report.phase_zero, report.margins, report.between)
     contacts, phase = labels.contacts[:, [2, 3, 0, 1]], (labels.phase + 0.5) % 1.0
     mirrored = replace(labels, contacts=contacts, phase=phase, footsteps=footsteps, cycles=cycles)
     return mirrored, replace(report, clip=clip.name, cycles_dropped=dropped)

@@ -106,14 +106,17 @@ def rows_of_landings(events: list[tuple[float, int]]) -> Array:
     return np.array(rows, float).reshape(-1, 3)
 
 
-def find_cycles(footsteps: Array, frames: int, zero: str, margins: str) -> tuple[np.ndarray, int]:
+def find_cycles(
+    footsteps: Array, frames: int, zero: str, margins: str, fill: bool = False
+) -> tuple[np.ndarray, int]:
     """First and last frame (C, 2) of each of the C cycles that are used, and the number of cycles left out.
 
     A cycle is the time between two successive landings of the foot `zero` ("right" or "left"), with a landing
     of the other foot between them. If the row of its first or of its last landing is marked, the cycle is
     left out, as in Holden et al. (2017). A cycle that is too near an end of the clip is left out, too.
     margins: a key of MARGINS. With "drop", the clip must have 60 frames before the cycle and 61 frames after
-    it, as in Holden et al. (2017). With "extend", one frame before and two frames after are enough.
+    it, as in Holden et al. (2017). With "extend", one frame before and two frames after are enough. fill:
+    whether `fill_between` adds the frames between the cycles; then no cycle counts as left out.
     """
     margin = MARGINS[margins]
     column = 0 if zero == "right" else 1
@@ -127,7 +130,8 @@ def find_cycles(footsteps: Array, frames: int, zero: str, margins: str) -> tuple
             left_out += 1
         else:
             used.append((first, last))
-    return np.array(used, int).reshape(-1, 2), left_out
+    cycles = np.array(used, int).reshape(-1, 2)
+    return (fill_between(cycles, frames, margins), 0) if fill else (cycles, left_out)
 
 
 def fill_between(cycles: np.ndarray, frames: int, margins: str) -> np.ndarray:

@@ -27,8 +27,8 @@ GAITS = ("stand", "walk", "jog", "crouch", "jump", "bump")
 CONTACTS = ("left_heel", "left_toe", "right_heel", "right_toe")
 MOST_COLUMNS = 1 << 16  # of X or Y
 SIDES = ("left", "centre", "right")  # where X has ground heights: left of the path, on it, right of it
-# Keys of `RowLayout.to_dict` that are one number each.
-NUMBERS = ("joints", "window", "step", "local_phases")
+# Keys of `RowLayout.to_dict` that are one number each -> the least number.
+NUMBERS = {"joints": 1, "window": 1, "step": 1, "local_phases": 0}
 LOCAL = "local_phase"  # name of the block of local phases in X and Y
 # The blocks of X that every network has, in the order of Holden et al. (2017).
 BODY = ("position", "direction", "gait", "joint_position", "joint_velocity", "terrain")
@@ -81,9 +81,9 @@ class RowLayout:
             raise ValueError(f"there is no such key: {min(unknown)}")
         numbers = {key: data[key] for key in NUMBERS if key in data}
         channels = dict(data.get("channels", {}))
-        for of_numbers, values in ((True, numbers), (False, channels)):
+        for least_of, values in ((NUMBERS, numbers), (dict.fromkeys(channels, 0), channels)):
             for key, value in values.items():
-                least = 1 if of_numbers and key != "local_phases" else 0
+                least = least_of[key]
                 if type(value) is not int or not least <= value <= MOST_COLUMNS:
                     raise ValueError(
                         f"{key} is {value!r:.40}, not a whole number from {least} to {MOST_COLUMNS}"

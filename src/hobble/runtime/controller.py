@@ -251,6 +251,7 @@ class Controller:
             self.bounds.fastest,
         )
         self._hips = network.skeleton.role("hips")
+        self._hips_range = (*self.bounds.hips, self.bounds.upright)
         # The joints under which the ground is looked up (heels, toes, hips), and the ground heights there.
         self._ground_joints = np.append(legs[:, 2:].reshape(-1), self._hips)
         self._ground_heights = np.zeros((count, len(self._ground_joints)))
@@ -269,6 +270,7 @@ class Controller:
             *(c.foot_lift, c.foot_added, c.leg_shown, c.root_height, c.body_lift),
         )
         self._contacts = self.y[:, self.layout.y_contacts]
+        self._predicted_hips = self.y[:, self._y_joints + 3 * self._hips + 1]
         self._checked = tuple(getattr(c, name).reshape(len(c.phase), -1) for name in CHECKED)
 
     def advance_frame(self, target: trajectory.Target, ground: Ground | None) -> None:
@@ -367,8 +369,8 @@ class Controller:
         else:
             self._ground_heights[:] = 0.0
         feet.carry_body(
-            self._contacts, self._ground_heights, self._hips, (*self.bounds.hips, self.bounds.upright),
-            self.y[:, self._y_joints + 3 * self._hips + 1], self._legs, c.body_lift, self.pose_position,
+            self._contacts, self._ground_heights, self._hips, self._hips_range,
+            self._predicted_hips, self._legs, c.body_lift, self.pose_position,
         )  # fmt: skip
         feet.place_feet(
             self._contacts, self._ground_heights, self.foot_locking, self._legs, self._feet,

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 from hobble.labels.local_phase import PARTS
-from hobble.models.mann import Mann, MannOptions, TrainableMann
-from hobble.rows.layout import GAITS, RowLayout
+from hobble.models.mann import GOAL_INPUTS, Mann, MannOptions, TrainableMann, goal_columns
+from hobble.rows.layout import RowLayout
 
 if TYPE_CHECKING:
     from hobble.models.local.predictor import LocalPredictor
@@ -30,7 +30,7 @@ class LocalOptions(MannOptions):
     """
 
     kind: Literal["local"] = "local"  # type: ignore[assignment]
-    gate_inputs: ClassVar[int] = 2 * len(PARTS) + 2 * len(GAITS) + 2
+    gate_inputs: ClassVar[int] = 2 * len(PARTS) + GOAL_INPUTS
     uses_local_phases: ClassVar[bool] = True
 
     @classmethod
@@ -45,8 +45,8 @@ class LocalOptions(MannOptions):
 
     def gate_columns(self, layout: RowLayout, skeleton: Skeleton) -> tuple[int, ...]:
         """The local phases, the gait now and at the end of the trajectory, and the trajectory's end."""
-        goal = super().gate_columns(layout, skeleton)[-(2 * len(GAITS) + 2) :]
-        return (*range(layout.x_local_phase.start, layout.x_local_phase.stop), *goal)
+        phases = range(layout.x_local_phase.start, layout.x_local_phase.stop)
+        return *phases, *goal_columns(layout)
 
 
 OPTIONS = LocalOptions

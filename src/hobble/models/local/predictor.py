@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 
 from hobble.core.quat import Array
-from hobble.models.network import inverse_or_0
 from hobble.models.predict import BlendPredictor
 
 SHOWN = 0  # index in a character's memory: 1 once it was shown. Its local phases follow.
@@ -28,8 +27,7 @@ class LocalPredictor(BlendPredictor):
         new = ~((memory[:, SHOWN] == 1) & np.isfinite(memory).all(axis=1))
         memory[new, 1:] = network.start
         before = memory[:, 1:]
-        inverse = inverse_or_0(network.x_std[at]).astype(np.float32)
-        z[:, at] = (before.astype(np.float32) - network.x_mean[at]) * inverse
+        z[:, at] = (before.astype(np.float32) - self._x_mean[at]) * self._x_inverse[at]
         super().evaluate(z, phase, out)
         memory[:, 1:] = next_phases(before, out[:, layout.y_local_phase], out[:, layout.y_local_change])
         memory[:, SHOWN] = 1

@@ -30,7 +30,21 @@ if TYPE_CHECKING:
     from hobble.models.predict import Shares
 
 FEET = ("left_heel", "left_toe", "right_heel", "right_toe")  # roles of the joints
-GATE_INPUTS = 3 * len(FEET) + 2 * len(GAITS) + 2  # number of the columns that the gate gets
+GOAL_INPUTS = 2 * len(GAITS) + 2  # number of `goal_columns`
+GATE_INPUTS = 3 * len(FEET) + GOAL_INPUTS  # number of the columns that the gate gets
+
+
+def goal_columns(layout: RowLayout) -> tuple[int, ...]:
+    """The columns of X for the gait now and at the end of the trajectory, and the position of this end.
+
+    The position depends on the target velocity.
+    """
+    samples, now, last = layout.samples, layout.samples // 2, layout.samples - 1
+    return (
+        *(layout.x_gait.start + gait * samples + at for at in (now, last) for gait in range(len(GAITS))),
+        layout.x_position.start + last,
+        layout.x_position.start + samples + last,
+    )
 
 
 class MannOptions(BlendedOptions):
@@ -61,20 +75,9 @@ class MannOptions(BlendedOptions):
         return self.trainable_class(flat, sizes, self.experts, gate, columns)
 
     def gate_columns(self, layout: RowLayout, skeleton: Skeleton) -> tuple[int, ...]:
-        """The columns of X that the gate gets.
-
-        These are the velocities of heels and toes, the gait now and at the end of the trajectory, and the
-        position of the end of the trajectory, which depends on the target velocity.
-        """
-        samples, now, last = layout.samples, layout.samples // 2, layout.samples - 1
+        """The columns of X that the gate gets: the velocities of heels and toes, and `goal_columns`."""
         feet = [3 * skeleton.role(role) + axis for role in FEET for axis in range(3)]
-        gaits = [gait * samples + sample for sample in (now, last) for gait in range(len(GAITS))]
-        return (
-            *(layout.x_joint_velocity.start + column for column in feet),
-            *(layout.x_gait.start + column for column in gaits),
-            layout.x_position.start + last,
-            layout.x_position.start + samples + last,
-        )
+        return *(layout.x_joint_velocity.start + column for column in feet), *goal_columns(layout)
 
 
 OPTIONS = MannOptions
