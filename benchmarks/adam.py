@@ -6,8 +6,6 @@ Both take turns, and the fastest call of each counts, because other work disturb
 says by how much a whole training step would take longer with PyTorch's.
 """
 
-from __future__ import annotations
-
 import argparse
 from collections.abc import Callable, Mapping
 from time import perf_counter, thread_time

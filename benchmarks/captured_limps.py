@@ -6,8 +6,6 @@ Each clip needs a status file beside it, CLIP_injuries.txt, with the same severi
 healthy walk of the same performer is known, so the clip is compared with people's mean healthy walk.
 """
 
-from __future__ import annotations
-
 import argparse
 from pathlib import Path
 

@@ -6,8 +6,6 @@ Snakemake itself: start, planning, and one process for each of two jobs a clip. 
 fast one process reads the same files.
 """
 
-from __future__ import annotations
-
 import argparse
 import os
 import resource

@@ -7,8 +7,6 @@ collapsed into one of their ends, those first that change the surface least (qua
 1997). Run it after derive_body.py.
 """
 
-from __future__ import annotations
-
 import argparse
 import heapq
 from collections import defaultdict

@@ -10,8 +10,6 @@ that of random reading to .npy files with one block each. On a busy machine, the
 (random order) are more reliable.
 """
 
-from __future__ import annotations
-
 import argparse
 import shutil
 import tempfile

@@ -10,8 +10,6 @@ of them equally. The script prints the median of the ratios of the stretches' me
 with and without a search of motion matching.
 """
 
-from __future__ import annotations
-
 import argparse
 from pathlib import Path
 from time import perf_counter

@@ -8,8 +8,6 @@ cache is dropped. If possible, reading runs in a memory cgroup of `memory-mb` pl
 which limits the page cache too.
 """
 
-from __future__ import annotations
-
 import argparse
 import os
 import resource

@@ -7,8 +7,6 @@ request: its memory (with Snakemake's own) and its seconds. Exits with status 1 
 requested.
 """
 
-from __future__ import annotations
-
 import argparse
 import re
 import subprocess

@@ -10,8 +10,6 @@ holden31 with arms and legs a little spread, reduced to the given number of tria
 reduces it, unwraps it and computes how much light reaches it.
 """
 
-from __future__ import annotations
-
 import argparse
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field

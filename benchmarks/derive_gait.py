@@ -12,8 +12,6 @@ curves, and from one window of 4 seconds to another. The motion was obtained fro
 funded by NSF EIA-0196217.
 """
 
-from __future__ import annotations
-
 import argparse
 from collections.abc import Iterable, Iterator
 from pathlib import Path

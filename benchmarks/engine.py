@@ -8,8 +8,6 @@ fastest round of each counts, because other work on the machine only ever makes 
 processor times.
 """
 
-from __future__ import annotations
-
 import argparse
 import importlib.util
 import json

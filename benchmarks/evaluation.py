@@ -5,8 +5,6 @@
 Without a file, a random network of the published size with 30 severities is used: the times are the same.
 """
 
-from __future__ import annotations
-
 import argparse
 from collections.abc import Callable
 from pathlib import Path

@@ -13,8 +13,6 @@ recipe it prints:
   may still get stuck on the track.
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 import tempfile

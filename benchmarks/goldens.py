@@ -9,8 +9,6 @@ function of the package, so both checkouts can look quite different. `compare` e
 differs and says by how much.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import re

@@ -8,8 +8,6 @@ feet in contact from their ground, over a clip (goal: 1 cm) and over a single fi
 deepest foot is below the ground (goal: 1 cm); and each clip that misses a goal.
 """
 
-from __future__ import annotations
-
 import argparse
 import tempfile
 from collections.abc import Iterator

@@ -9,8 +9,6 @@ clips, waypoints of the track, ten minutes of walks, jogs, crouches and turns, a
 trainings. The last column is the first network's value divided by the second's.
 """
 
-from __future__ import annotations
-
 import argparse
 import csv
 from pathlib import Path

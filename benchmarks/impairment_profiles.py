@@ -3,8 +3,6 @@
 python benchmarks/impairment_profiles.py IMPAIRED_WALKS.npz
 """
 
-from __future__ import annotations
-
 import argparse
 from pathlib import Path
 from typing import Any

@@ -5,8 +5,6 @@
 Without a folder, one synthetic minute of a limping walk is labelled.
 """
 
-from __future__ import annotations
-
 import argparse
 import tempfile
 import time

@@ -8,8 +8,6 @@ captured limps than the healthy walks are, and how large the limps of hurt versi
 --sizes only that.
 """
 
-from __future__ import annotations
-
 import argparse
 import itertools
 from collections import Counter

@@ -4,8 +4,6 @@ Run `python benchmarks/motion.py` for a file made here, `python benchmarks/motio
 file in a folder of yours, `python benchmarks/motion.py --megabytes 100` for a large one.
 """
 
-from __future__ import annotations
-
 import argparse
 import resource
 import tempfile

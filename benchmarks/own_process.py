@@ -1,7 +1,5 @@
 """Tasks of a benchmark in processes of their own: cold page cache, limited memory, memory that was used."""
 
-from __future__ import annotations
-
 import argparse
 import contextlib
 import os

@@ -4,8 +4,6 @@ Run `python benchmarks/planning.py --clips 2500 --mirror`. It makes a data set o
 temporary copy of the rules and plans `results/many/report.html`, from nothing.
 """
 
-from __future__ import annotations
-
 import argparse
 import os
 import resource

@@ -8,8 +8,6 @@ recipe. Accuracy is measured as in the evaluation, on rows that are not rounded.
 it is larger than that between seeds.
 """
 
-from __future__ import annotations
-
 import argparse
 import tempfile
 from pathlib import Path

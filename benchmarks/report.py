@@ -8,8 +8,6 @@ frame of the same network, if `--python` names its folder. The time until the fi
 given as processor time of the page's main thread, which depends less on other work on the machine.
 """
 
-from __future__ import annotations
-
 import argparse
 import importlib.util
 import tempfile

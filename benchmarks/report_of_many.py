@@ -8,8 +8,6 @@ folder. Then it renders the page twice: with the clips as they are, and with `--
 stay as they are, since accuracy and roll-outs of a large data set are measured on a sample.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import resource

@@ -10,8 +10,6 @@ onnxruntime (if installed) on one thread, with Hobble's export. Times are proces
 NUMBA_CPU_NAME=znver3 simulates a processor without AVX-512 (but not for onnxruntime).
 """
 
-from __future__ import annotations
-
 import argparse
 from collections.abc import Callable
 from dataclasses import replace

@@ -8,8 +8,6 @@ which include measuring and checkpoints. CPU seconds of the process are printed 
 on other work on the machine.
 """
 
-from __future__ import annotations
-
 import argparse
 import logging
 import tempfile

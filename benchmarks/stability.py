@@ -7,8 +7,6 @@ joint turns more than 60 degrees in a frame, feet slide 2 cm a step or more on a
 finite.
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 from collections.abc import Iterator

@@ -6,8 +6,6 @@ Units are centimetres, degrees and frames; both get the same targets. The result
 of the machine.
 """
 
-from __future__ import annotations
-
 import argparse
 
 import numpy as np

@@ -3,8 +3,6 @@
 Run `python benchmarks/synthetic.py`.
 """
 
-from __future__ import annotations
-
 import tempfile
 import time
 from pathlib import Path

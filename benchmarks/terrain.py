@@ -8,8 +8,6 @@ The last line repeats the clips until they have as many cycles as the released d
 measures the drawing of the patches and all fits, as done by jobs on two cores.
 """
 
-from __future__ import annotations
-
 import argparse
 import os
 import tempfile

@@ -15,8 +15,6 @@ floor is the time of the matrix products alone, at their best, with the same fac
 There is no benchmark for GPUs.
 """
 
-from __future__ import annotations
-
 import argparse
 import time
 from collections.abc import Callable

@@ -7,8 +7,6 @@ checkpoints, as in a whole run. The script prints the peak resident memory from 
 the first batch: Python, PyTorch and compiled loops.
 """
 
-from __future__ import annotations
-
 import argparse
 import contextlib
 import json

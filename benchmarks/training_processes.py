@@ -9,8 +9,6 @@ measured: a ring all-reduce sends 2 (n - 1) / n of the gradient through the slow
 messages.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import os

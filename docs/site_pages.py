@@ -1,7 +1,5 @@
 """The pages of the documentation site that are other files of the checkout, and the loops of the gallery."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """A copy of the checkout in which tests run the commands of the README, and may change everything."""
 
-from __future__ import annotations
-
 import os
 import re
 import shutil

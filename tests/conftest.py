@@ -1,7 +1,5 @@
 """Fixtures that every stage's tests may use."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import subprocess

@@ -1,7 +1,5 @@
 """The shape of the house: a room imports only from rooms before it, and modules do not import in circles."""
 
-from __future__ import annotations
-
 import ast
 from collections.abc import Iterator, Mapping, Set
 from graphlib import CycleError, TopologicalSorter

@@ -3,8 +3,6 @@
 With `snakemake -p` it prints all records, in Snakemake's form.
 """
 
-from __future__ import annotations
-
 import logging
 import re
 import shutil

@@ -1,7 +1,5 @@
 """Speed limits: interpolation, several values at once, and learning from made-up cycles."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Manners: moods by the names of clips, diagnoses by a table, both also by the entries of clips."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The name of a channel may occur only in its own folder, and in what asks for this channel."""
 
-from __future__ import annotations
-
 import ast
 import functools
 import re

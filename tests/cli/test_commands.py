@@ -1,7 +1,5 @@
 """The command `hobble`, called as on a command line."""
 
-from __future__ import annotations
-
 import json
 import re
 import shlex

@@ -1,7 +1,5 @@
 """Checks that two networks learnt the same apart from rounding: near.py WEIGHTS WEIGHTS"""
 
-from __future__ import annotations
-
 import json
 import sys
 from typing import Any

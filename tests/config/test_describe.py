@@ -1,7 +1,5 @@
 """config/README.md and the JSON schemas are those of the models."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

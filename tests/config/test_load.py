@@ -1,7 +1,5 @@
 """Layers, validation, and errors that name the file, the key and the allowed values."""
 
-from __future__ import annotations
-
 from collections import Counter
 from pathlib import Path
 

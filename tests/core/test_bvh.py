@@ -1,7 +1,5 @@
 """A clip written as BVH is read back as the same motion."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

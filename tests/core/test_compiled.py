@@ -1,7 +1,5 @@
 """Compiled functions run without a cache: read-only folders, damaged files, a full disk."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """Files are written completely or not at all, equal values give equal bytes, and errors say what to do."""
 
-from __future__ import annotations
-
 import contextlib
 import errno
 import subprocess

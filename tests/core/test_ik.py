@@ -1,7 +1,5 @@
 """Two bones reach the target if they can, bend towards the pole, and keep their lengths."""
 
-from __future__ import annotations
-
 import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st

@@ -1,7 +1,5 @@
 """Importing a module of a package hides a function of the package with the same name."""
 
-from __future__ import annotations
-
 import ast
 from pathlib import Path
 

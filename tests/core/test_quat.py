@@ -1,7 +1,5 @@
 """Rotations compared with SciPy's, and properties that hold for all rotations."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given, settings

@@ -1,7 +1,5 @@
 """Skeletons: their files, their sides, and where their joints are."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Made-up rows, few enough to compare all of them."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

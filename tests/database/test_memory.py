@@ -1,7 +1,5 @@
 """A reader stays within the configured memory, on a database ten times as large."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

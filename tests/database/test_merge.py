@@ -1,7 +1,5 @@
 """Merging: reproducible, complete or absent, small, in limited memory."""
 
-from __future__ import annotations
-
 import errno
 import gc
 import os

@@ -1,7 +1,5 @@
 """Reading: each pair once in a pass, well mixed, in limited memory, with checksums."""
 
-from __future__ import annotations
-
 import json
 import os
 from collections import Counter

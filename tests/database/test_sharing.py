@@ -1,7 +1,5 @@
 """How processes share a section: each sample comes once, in batches that depend only on the stretches."""
 
-from __future__ import annotations
-
 from itertools import chain
 
 from hypothesis import given, settings

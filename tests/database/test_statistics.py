@@ -1,7 +1,5 @@
 """Statistics compared with plain numpy on all pairs, and the original's groups of columns."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Small networks of every kind whose figure walks badly, but uses every part of the runtime."""
 
-from __future__ import annotations
-
 from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any

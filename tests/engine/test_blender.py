@@ -1,7 +1,5 @@
 """The add-on for Blender bakes the walk of the runtime."""
 
-from __future__ import annotations
-
 import importlib.util
 import json
 import os

@@ -1,7 +1,5 @@
 """The runtime in C moves characters as the one in Python does, and refuses what it cannot use."""
 
-from __future__ import annotations
-
 import importlib.util
 import os
 import re

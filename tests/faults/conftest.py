@@ -1,7 +1,5 @@
 """What the tests of strangers' files share: a short BVH file, and a read that must be refused."""
 
-from __future__ import annotations
-
 import os
 import resource
 from collections.abc import Callable

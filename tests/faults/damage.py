@@ -1,7 +1,5 @@
 """Damage to files: bytes as on a disk or in a crash, words of a text, and wrong values in valid files."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable, Iterator
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Compares artefacts without times; `python -m tests.faults.same FOLDER FOLDER` those of two runs."""
 
-from __future__ import annotations
-
 import csv
 import json
 import re

@@ -1,7 +1,5 @@
 """Files from strangers are refused in limited memory and time: text, BVH, arrays, images, YAML and JSON."""
 
-from __future__ import annotations
-
 import io
 import json
 import os

@@ -1,7 +1,5 @@
 """Names and paths from strangers stay in their folders and run no code; closed files are named."""
 
-from __future__ import annotations
-
 import json
 import os
 import tempfile

@@ -3,8 +3,6 @@
 `make faults N=200 SEED=7` throws 200 random ones at the jobs of results/test/report.html, and prints a list.
 """
 
-from __future__ import annotations
-
 import os
 import secrets
 import tempfile

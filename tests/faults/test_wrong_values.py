@@ -1,7 +1,5 @@
 """Artefacts with a wrong value in them, with right checksums, are refused by name, or nothing becomes NaN."""
 
-from __future__ import annotations
-
 import json
 import shutil
 import warnings

@@ -1,7 +1,5 @@
 """Faults in single jobs: each function throws one kind at a job, and returns what happened."""
 
-from __future__ import annotations
-
 import contextlib
 import os
 import shutil

@@ -1,7 +1,5 @@
 """The page's npm packages, for tests that open our files with other programs."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

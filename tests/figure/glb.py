@@ -1,7 +1,5 @@
 """Reads glTF files."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

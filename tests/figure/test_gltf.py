@@ -1,7 +1,5 @@
 """The glTF file has no error in the Khronos validator, is loaded by three.js, and moves as it should."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The body is closed, smooth and of an adult's size. Only its bones move it."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Walkers made joint by joint, so that their measures are known exactly."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The commands of hobble.gait, and the walker of the data set `synthetic`."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 

@@ -1,7 +1,5 @@
 """Cycles and their numbers, on walkers whose steps, stances and angles are known exactly."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

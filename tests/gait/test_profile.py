@@ -1,7 +1,5 @@
 """The numbers of a walk, and those of its mirror image."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

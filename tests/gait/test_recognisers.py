@@ -1,7 +1,5 @@
 """The classifier of strong limps and the recogniser of mild limps, on left-out people and captured walks."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

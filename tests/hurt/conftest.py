@@ -1,7 +1,5 @@
 """Healthy clips, generated and captured, with their labels."""
 
-from __future__ import annotations
-
 import functools
 from collections.abc import Callable
 from pathlib import Path

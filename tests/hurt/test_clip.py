@@ -1,7 +1,5 @@
 """A hurt clip has the same body and its feet on the ground. Without an injury nothing changes."""
 
-from __future__ import annotations
-
 import itertools
 
 import numpy as np

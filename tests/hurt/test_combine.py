@@ -1,7 +1,5 @@
 """The arms of one captured clip with the legs of another."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Each injury has the size measured on people: every severity, both sides, generated and captured clips."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Hurt versions: which links hurt when, severities that match the motion, and cycles that are left out."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

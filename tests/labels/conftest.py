@@ -1,7 +1,5 @@
 """Clips whose footfalls are known because they were made here."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 

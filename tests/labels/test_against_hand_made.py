@@ -1,7 +1,5 @@
 """Automatic labels compared with hand-made ones, and file labels with the original's own rows."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path

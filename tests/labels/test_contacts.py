@@ -1,7 +1,5 @@
 """Contacts of generated walks, whose stances are known to the frame, and of bodies of other sizes."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

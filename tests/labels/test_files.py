@@ -1,7 +1,5 @@
 """The meaning of hand-made label files. Wrong files are refused with file and line."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

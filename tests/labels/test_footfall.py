@@ -1,7 +1,5 @@
 """Landings found from the motion alone: exact on generated walks, and no extra ones on limps and pauses."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Gaits of clips without gait files, and crouching in flat clips."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

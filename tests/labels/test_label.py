@@ -1,7 +1,5 @@
 """All labels of a clip: files have priority over motion, mirrors, reports, and the original's own numbers."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 

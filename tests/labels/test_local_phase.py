@@ -1,7 +1,5 @@
 """Local phases of feet and hands, the frames between gait cycles, and what a network makes of both."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

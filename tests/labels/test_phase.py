@@ -1,7 +1,5 @@
 """Phase, footsteps and cycles: exact if given, and the same in both directions of conversion."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given, settings

@@ -1,7 +1,5 @@
 """Automatic labels written as files and read again: the same steps, gaits and phase."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

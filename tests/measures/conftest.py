@@ -1,5 +1,3 @@
 """Uses the small networks of the runtime's tests."""
 
-from __future__ import annotations
-
 from tests.runtime.conftest import hurtable, make_network, network, steady  # noqa: F401

@@ -1,7 +1,5 @@
 """Made-up motion for several tests: captured walks, rows of random values, and a network that fits them."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Collection, Mapping
 from itertools import pairwise

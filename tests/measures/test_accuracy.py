@@ -1,7 +1,5 @@
 """Accuracy of the published network on the published rows, and the formula on made-up rows."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 

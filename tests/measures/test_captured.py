@@ -1,7 +1,5 @@
 """Rows converted back to motion have the path, accelerations and heights of the original motion."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Comparison of configurations: eq. 3.2, fitted lines, published counts, different data sets."""
 
-from __future__ import annotations
-
 import csv
 import json
 from pathlib import Path

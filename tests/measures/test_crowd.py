@@ -1,7 +1,5 @@
 """Each figure of a crowd walks as it would alone."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from hobble.measures.walks import CrowdTarget, channel_values, generate_walks

@@ -1,7 +1,5 @@
 """The measurement `field`: paths and response of a figure known exactly; captured motion as itself."""
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 from typing import Any
 

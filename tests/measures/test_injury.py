@@ -1,7 +1,5 @@
 """The response to injury: sweeps, their numbers, and networks without an effect."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from typing import Any

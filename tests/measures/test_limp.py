@@ -1,7 +1,5 @@
 """Sizes of limps: of a known limp, of none, and of one on the wrong side."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Sequence
 from dataclasses import replace

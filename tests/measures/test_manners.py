@@ -1,7 +1,5 @@
 """Recognising moods and diagnoses: whole people left out, values of two channels at once, what is shown."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from types import SimpleNamespace

@@ -1,7 +1,5 @@
 """Measures of motion, on motions whose measures are known."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Naming what hurts: the discriminant on known classes, the features of a figure, windows, and the tables."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from typing import Any

@@ -1,7 +1,5 @@
 """The descriptions of all measurements, and how their options become one section."""
 
-from __future__ import annotations
-
 import inspect
 import subprocess
 import sys

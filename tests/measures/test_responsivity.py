@@ -1,7 +1,5 @@
 """Laps end at the last waypoint or after `lap_seconds`. Only the measured times differ from run to run."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Tables of results as data frames, and the notebook that uses them."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

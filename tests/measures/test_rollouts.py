@@ -1,7 +1,5 @@
 """Roll-outs give the same frames as the runtime, cover every frame, and report the right errors."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from pathlib import Path

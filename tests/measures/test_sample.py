@@ -1,7 +1,5 @@
 """Estimates from a sample of clips, and their confidence intervals."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

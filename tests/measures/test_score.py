@@ -1,7 +1,5 @@
 """`hobble score` and the formulas behind it: exact values, planted faults, equal folders."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Ten minutes of the released network stay within the limits that the docs promise."""
 
-from __future__ import annotations
-
 import importlib.util
 import sys
 from dataclasses import replace

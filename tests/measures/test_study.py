@@ -1,7 +1,5 @@
 """The questionnaire's films, and the tables of answers beside those of the published study."""
 
-from __future__ import annotations
-
 import csv
 import json
 from collections import Counter

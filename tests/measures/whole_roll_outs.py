@@ -1,7 +1,5 @@
 """Roll-outs of one clip alone, for tests: the errors of all, or all poses of those of a stretch."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

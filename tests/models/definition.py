@@ -2,8 +2,6 @@
 autograd finds the gradient. Also small networks of each kind.
 """
 
-from __future__ import annotations
-
 from math import prod
 from typing import Any
 

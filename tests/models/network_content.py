@@ -1,7 +1,5 @@
 """The content of a network's file, and changes that make it malformed."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from itertools import pairwise
 from typing import Any

@@ -1,7 +1,5 @@
 """Learned motion matching: it learns the clips, goes on by itself, and jumps smoothly."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Reading networks: valid files are read, all others are refused with a message that names the file."""
 
-from __future__ import annotations
-
 import json
 import os
 from pathlib import Path

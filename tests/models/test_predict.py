@@ -1,7 +1,5 @@
 """Products of a few rows are right, and a row has the same bits next to any other rows."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from numba import njit

@@ -1,7 +1,5 @@
 """The training steps compute the loss and the gradient of the definition."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

@@ -1,7 +1,5 @@
 """A small made-up walk, exact enough to measure sliding feet, and functions that write it to files."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path

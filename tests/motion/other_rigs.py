@@ -4,8 +4,6 @@ A rig is a text with a line `name|parent|joint` for each joint. The joint is one
 `+x,y,z` moves it by so many centimetres in that joint's own axes.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

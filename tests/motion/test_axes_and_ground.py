@@ -1,7 +1,5 @@
 """Which way is up, where the figure faces, how high its floor is, and whether the world is tilted."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Broken frames are found, named and repaired; clips without defects stay the same."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

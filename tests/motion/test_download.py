@@ -1,7 +1,5 @@
 """Downloads from a server on the loopback address that fails like real servers."""
 
-from __future__ import annotations
-
 import contextlib
 import hashlib
 import signal

@@ -1,7 +1,5 @@
 """Clips with the same motion are found under any name, and cannot be in both parts of the split."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Frame rates of files, and resampling to the rate of clips."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """The lines about the clips of a folder."""
 
-from __future__ import annotations
-
 import re
 import shutil
 

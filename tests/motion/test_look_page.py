@@ -1,7 +1,5 @@
 """The page about the clips of a data set."""
 
-from __future__ import annotations
-
 import json
 import re
 from typing import Any

@@ -1,7 +1,5 @@
 """Repeated short cycles go on in one direction, without a jerk at the seams."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

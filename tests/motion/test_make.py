@@ -1,7 +1,5 @@
 """From files to clips: units, skeletons, frame counts."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import replace
 

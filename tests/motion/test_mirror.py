@@ -1,7 +1,5 @@
 """The mirror swaps left and right; mirrored twice, a clip is the same again."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

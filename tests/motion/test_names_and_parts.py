@@ -1,7 +1,5 @@
 """What names and offsets of joints tell: sides (if they do not, the user has to), fingers, the spine."""
 
-from __future__ import annotations
-
 import re
 from itertools import pairwise
 

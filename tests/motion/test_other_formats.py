@@ -1,7 +1,5 @@
 """A clip written as glTF is read as the same motion; FBX is read by way of Blender, or asks for it."""
 
-from __future__ import annotations
-
 import base64
 import importlib.util
 import subprocess

@@ -1,7 +1,5 @@
 """Clips on rigs of other programs give the same result as the original clip, or are refused."""
 
-from __future__ import annotations
-
 import re
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Files whose numbers contradict each other: units, radians, no rotations, walking in place."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import replace
 

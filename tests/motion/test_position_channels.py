@@ -1,7 +1,5 @@
 """Position channels of joints below the hips."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

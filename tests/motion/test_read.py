@@ -1,7 +1,5 @@
 """Files of many programs are read; broken files are refused with file and line."""
 
-from __future__ import annotations
-
 import contextlib
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The root frame, compared with the original's rows and with exact cases."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Rig files written by hand: each mistake is refused with the file, and with its line if it has one."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Real rigs without a skeleton file, and rigs whose zero pose nobody could stand in."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

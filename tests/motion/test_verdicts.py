@@ -1,7 +1,5 @@
 """Every file of shared/wild and shared/mocap comes out right, or is refused for the right reason."""
 
-from __future__ import annotations
-
 import os
 from dataclasses import replace
 from pathlib import Path

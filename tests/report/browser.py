@@ -1,7 +1,5 @@
 """A headless chromium to test pages with, controlled over the DevTools protocol."""
 
-from __future__ import annotations
-
 import fcntl
 import json
 import os

@@ -1,7 +1,5 @@
 """The page of the finished run of `test`, open in a browser, and what it was made of."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any

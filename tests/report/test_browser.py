@@ -1,7 +1,5 @@
 """The report in a real browser: what a reader can do, and what the page does by itself."""
 
-from __future__ import annotations
-
 import itertools
 from pathlib import Path
 

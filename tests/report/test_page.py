@@ -1,7 +1,5 @@
 """The page as HTML: its parts, its policy, and markup in names, which has no effect."""
 
-from __future__ import annotations
-
 import base64
 import json
 import re

@@ -1,7 +1,5 @@
 """The summary of a run's costs: times of jobs, sizes of files, and what was left from earlier starts."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

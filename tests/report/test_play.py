@@ -1,7 +1,5 @@
 """Play in the page: it moves characters as Python does, and keys, clicks, links and the camera work."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from pathlib import Path

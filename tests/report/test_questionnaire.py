@@ -1,7 +1,5 @@
 """The questionnaire in a browser: each film once, in random order, and answers that can be counted."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterator
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """The recogniser in C, which the page runs, finds the same cycles, numbers and answers as in Python."""
 
-from __future__ import annotations
-
 import base64
 import ctypes
 import itertools

@@ -1,7 +1,5 @@
 """What stands in the sections: parts, tables, hints, key figures, and the injury that the page opens with."""
 
-from __future__ import annotations
-
 import json
 import re
 import shutil

@@ -1,7 +1,5 @@
 """Loops drawn without a browser: no seam, injuries coloured on request, readable by other programs."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from pathlib import Path

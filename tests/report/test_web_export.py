@@ -1,7 +1,5 @@
 """The character for other pages: the module moves as Python does and refuses bad arguments."""
 
-from __future__ import annotations
-
 import json
 import re
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The mirror of rows is that of the motion."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

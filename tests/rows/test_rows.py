@@ -1,7 +1,5 @@
 """Rows compared with the original database, and with exact values for simple motions."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 from typing import Any

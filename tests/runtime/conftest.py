@@ -1,7 +1,5 @@
 """Small networks that need no data: one with random weights, one with a constant prediction."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """The character: what goes into the network, what comes out, and how it follows its targets."""
 
-from __future__ import annotations
-
 import copy
 import pickle
 import subprocess

@@ -1,7 +1,5 @@
 """Bounds: wild predictions do not break the character, and a state that is not finite restarts."""
 
-from __future__ import annotations
-
 import warnings
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """The caller's axes, units and ground."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """The error calculator: truth, prediction and error of recorded rows, frame by frame."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

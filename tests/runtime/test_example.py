@@ -1,7 +1,5 @@
 """The game loop in examples/ runs."""
 
-from __future__ import annotations
-
 import json
 import runpy
 import sys

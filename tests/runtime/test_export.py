@@ -1,7 +1,5 @@
 """Generated motion as BVH, and the scripted scenarios."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

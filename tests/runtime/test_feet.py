@@ -1,7 +1,5 @@
 """Feet stay where they landed and on the ground; legs reach them without moving too fast."""
 
-from __future__ import annotations
-
 import itertools
 from types import SimpleNamespace
 

@@ -1,7 +1,5 @@
 """Other animation on top of a pose: a wave, a look, a frame of a clip; the network goes on undisturbed."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Speed limits: a target speed above the limit is lowered to it, and a body that cannot jog walks."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

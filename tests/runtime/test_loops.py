@@ -1,7 +1,5 @@
 """Loops of the character's gaits, and the glTF file that has them."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The network: its spline, its phase modes, its files."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The network as ONNX gives the same numbers in another program."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The Python in README and docs runs as it stands, and the three names of a link are one."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A character drives other rigs: AVA's 191 joints, Mixamo's, and those of strangers' files."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The trajectory: targets bend it, predictions move it, and left is the mirror of right."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given, settings

@@ -1,7 +1,5 @@
 """Steps that differ: the same seed gives the same walk, and the spreads are as documented."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

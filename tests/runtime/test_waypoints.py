@@ -1,7 +1,5 @@
 """Waypoints: the track, how the character follows it, and when it has arrived."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

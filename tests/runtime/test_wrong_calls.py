@@ -1,7 +1,5 @@
 """Wrong arguments of `next_pose` are refused, and a failed call changes nothing."""
 
-from __future__ import annotations
-
 import copy
 from dataclasses import replace
 from pathlib import Path

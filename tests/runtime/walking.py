@@ -1,7 +1,5 @@
 """A walk, a ground and a comparison that tests of the character share."""
 
-from __future__ import annotations
-
 from dataclasses import fields
 
 import numpy as np

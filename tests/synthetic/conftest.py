@@ -1,7 +1,5 @@
 """Measures the walker from its files."""
 
-from __future__ import annotations
-
 import functools
 import itertools
 from collections.abc import Callable

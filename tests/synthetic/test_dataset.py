@@ -1,7 +1,5 @@
 """The synthetic data sets are complete and balanced, and held-out clips have similar ones in training."""
 
-from __future__ import annotations
-
 import pytest
 import yaml
 

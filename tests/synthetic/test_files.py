@@ -1,7 +1,5 @@
 """The text files beside the BVH files match the motion, in the form of a user's files."""
 
-from __future__ import annotations
-
 import itertools
 
 import numpy as np

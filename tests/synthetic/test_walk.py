@@ -1,7 +1,5 @@
 """Healthy motion, measured from the BVH: ranges of motion, support, arms, smoothness, the ground."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

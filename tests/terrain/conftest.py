@@ -1,7 +1,5 @@
 """A figure with feet at exactly given positions, and patches of every generated kind."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from types import SimpleNamespace

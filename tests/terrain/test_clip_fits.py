@@ -1,7 +1,5 @@
 """Whole clips, the order of heights, flat floors, and the surface that is added to meet the feet."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from types import SimpleNamespace
 

@@ -1,7 +1,5 @@
 """Heightmaps from files and generators."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

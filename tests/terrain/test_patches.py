@@ -1,7 +1,5 @@
 """Patches: views of heightmaps, the rule of 50 cm, and the search for the patches with the lowest errors."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -4,8 +4,6 @@ So sums in another order differ by 1e-16 of themselves, and other batches by muc
 the moments and the losses of the sections for each.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import sys

@@ -1,7 +1,5 @@
 """A network that is built without training writes the same three files."""
 
-from __future__ import annotations
-
 import csv
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Artefacts of the database and of the training that were changed without breaking a checksum are refused."""
 
-from __future__ import annotations
-
 import shutil
 from collections.abc import Callable
 from pathlib import Path

@@ -1,7 +1,5 @@
 """`keep: best` and `patience`."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from pathlib import Path

@@ -1,7 +1,5 @@
 """A training that is killed goes on and ends with the same bits."""
 
-from __future__ import annotations
-
 import json
 import signal
 import subprocess

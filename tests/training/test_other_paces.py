@@ -1,7 +1,5 @@
 """Motion that is played at other paces along smooth paths."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Input poses that are moved towards those of clips with other channel values."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The weight of the phase in the loss, and channels whose inputs are divided."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Several processes take the steps of one, on loopback; after one dies, the next run resumes."""
 
-from __future__ import annotations
-
 import json
 import os
 import shutil

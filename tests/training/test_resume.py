@@ -1,7 +1,5 @@
 """A training that is interrupted, prolonged or continued ends with the same bits as an undisturbed one."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

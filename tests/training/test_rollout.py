@@ -1,7 +1,5 @@
 """Roll-outs in training: the poses have the errors that a running character would have."""
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The learning rate follows the configured schedule."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """A network that is kept symmetric gives mirrored outputs for mirrored inputs."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Training learns, logs, is reproducible, and stops when it diverges."""
 
-from __future__ import annotations
-
 import csv
 from collections.abc import Callable
 from pathlib import Path

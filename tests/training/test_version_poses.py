@@ -1,7 +1,5 @@
 """Input poses that are moved between a clip and its hurt versions."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """weights.npz: the network, the meaning of its columns, and the ranges of its training data."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

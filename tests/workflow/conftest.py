@@ -1,7 +1,5 @@
 """A user's clips, and small projects with them."""
 
-from __future__ import annotations
-
 import shutil
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """A new measurement needs two files, a network a folder, a channel a folder and its name in the list."""
 
-from __future__ import annotations
-
 import csv
 import json
 import re

@@ -1,7 +1,5 @@
 """Every advice to delete something damaged is followed, and the same command makes the same results again."""
 
-from __future__ import annotations
-
 import re
 import shutil
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Which clips share a job, and that a job makes only what is missing, changed or damaged."""
 
-from __future__ import annotations
-
 import json
 import logging
 import os

@@ -1,7 +1,5 @@
 """Wrong data sets, targets and continuations are reported before anything runs."""
 
-from __future__ import annotations
-
 import contextlib
 from pathlib import Path
 

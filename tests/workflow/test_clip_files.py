@@ -1,7 +1,5 @@
 """The files of clips in a user's folder: which are found, left out or refused."""
 
-from __future__ import annotations
-
 import os
 import re
 import shutil

@@ -1,7 +1,5 @@
 """Requests to a cluster: number of jobs, memory and time of each. How long a training takes is told first."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Clips that are not in the user's folder, through the workflow, from a server on the loopback address."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Data sets that are downloaded: addresses and checksums."""
 
-from __future__ import annotations
-
 import hashlib
 from pathlib import Path
 

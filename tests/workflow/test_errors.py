@@ -1,7 +1,5 @@
 """Bad input in the real workflow gives one message with file and place. Finished files stay."""
 
-from __future__ import annotations
-
 import os
 import re
 import subprocess

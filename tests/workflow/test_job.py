@@ -1,7 +1,5 @@
 """The context of a job's script: its log, what a user sees when it fails, and that it ends with its run."""
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess

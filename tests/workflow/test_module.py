@@ -1,7 +1,5 @@
 """Another workflow imports this one as a module; `snakemake --report`. (`make check` runs `--lint`.)"""
 
-from __future__ import annotations
-
 import subprocess
 
 import pytest

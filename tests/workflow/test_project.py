@@ -1,7 +1,5 @@
 """Which clips a configuration gets, in which part of the split, and what is compared."""
 
-from __future__ import annotations
-
 import json
 import re
 from pathlib import Path

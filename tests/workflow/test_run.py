@@ -1,7 +1,5 @@
 """The whole workflow on tiny synthetic data: it finishes, is reproducible, and re-runs the right jobs."""
 
-from __future__ import annotations
-
 import json
 import struct
 import zipfile

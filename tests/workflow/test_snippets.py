@@ -1,7 +1,5 @@
 """The commands and configurations in README and docs work as they stand."""
 
-from __future__ import annotations
-
 import re
 import shlex
 import shutil

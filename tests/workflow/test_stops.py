@@ -1,7 +1,5 @@
 """Runs stopped by Ctrl-C, by a signal to Snakemake alone, or by SIGKILL. The same command continues."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import signal

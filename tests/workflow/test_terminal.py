@@ -1,7 +1,5 @@
 """The terminal output of a run: one line of progress, each failure once, a summary at the end."""
 
-from __future__ import annotations
-
 import io
 import logging
 from pathlib import Path

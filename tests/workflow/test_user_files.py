@@ -1,7 +1,5 @@
 """A change in the content of a user's file is seen, whatever its time, and only its clip is made again."""
 
-from __future__ import annotations
-
 import os
 import re
 import time

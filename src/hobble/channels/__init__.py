@@ -1,7 +1,5 @@
 """Channels. A channel is an input of the network besides motion and ground, such as an injury."""
 
-from __future__ import annotations
-
 import functools
 import importlib
 import importlib.util

@@ -3,8 +3,6 @@
 In each frame of a clip, a channel has a value in each of its columns. Values are 0 or more. 0 has no effect.
 """
 
-from __future__ import annotations
-
 import itertools
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence

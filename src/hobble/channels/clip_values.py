@@ -3,8 +3,6 @@
 Below, F is the number of frames of the clip, and C the number of columns of the channel.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any

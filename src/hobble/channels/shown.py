@@ -9,8 +9,6 @@ A channel may have a module channels/<name>/shown.py with its own function `disp
 measurements depend on these modules.
 """
 
-from __future__ import annotations
-
 import importlib
 import importlib.util
 from collections.abc import Callable, Collection, Mapping, Sequence

@@ -1,7 +1,5 @@
 """The command `hobble`. `hobble --help` lists its subcommands."""
 
-from __future__ import annotations
-
 import argparse
 import os
 import signal

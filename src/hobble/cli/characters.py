@@ -1,7 +1,5 @@
 """The subcommands of `hobble` for a trained character: play, export, study."""
 
-from __future__ import annotations
-
 import argparse
 import webbrowser
 from pathlib import Path

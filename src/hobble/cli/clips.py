@@ -1,7 +1,5 @@
 """The subcommands of `hobble` for BVH files: look, rig, motion, labels, hurt, combine, injury."""
 
-from __future__ import annotations
-
 import argparse
 import re
 import sys

@@ -1,7 +1,5 @@
 """What the subcommands of `hobble` have in common: options for reading BVH files, JSON, a bar of progress."""
 
-from __future__ import annotations
-
 import argparse
 import inspect
 import json

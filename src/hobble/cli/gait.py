@@ -1,7 +1,5 @@
 """The subcommand `hobble gait`: recognises a limp and measures its effects."""
 
-from __future__ import annotations
-
 import argparse
 from collections.abc import Mapping
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Writes config/README.md with every key, and JSON schemas for editors: python -m hobble.config.describe"""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterator, Mapping
 from functools import reduce

@@ -3,8 +3,6 @@
 Values from the command line override those of a configuration. Errors name the file and the key.
 """
 
-from __future__ import annotations
-
 import copy
 import re
 from collections.abc import Mapping

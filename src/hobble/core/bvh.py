@@ -1,7 +1,5 @@
 """Writes BVH files. The module that reads them is `hobble.motion.read`."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

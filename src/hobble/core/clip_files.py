@@ -4,8 +4,6 @@ A clip has the name of its BVH file, without the suffix. Files with the same nam
 beside it: labels (footsteps, gait, phase), and where the person is hurt.
 """
 
-from __future__ import annotations
-
 import contextlib
 import os
 import re

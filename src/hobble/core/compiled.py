@@ -6,8 +6,6 @@ error at the first call. In these cases the `njit` of this module only warns, on
 then compiles the functions again.
 """
 
-from __future__ import annotations
-
 import functools
 import warnings
 from collections.abc import Callable

@@ -3,8 +3,6 @@
 Arrays are declared by shape, type and range. JSON is declared by a class: a dataclass or a pydantic model.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from functools import lru_cache

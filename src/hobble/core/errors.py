@@ -1,7 +1,5 @@
 """Errors that a user can mend. The message names the file, the place in it, and what to do."""
 
-from __future__ import annotations
-
 import sys
 import tempfile
 import traceback

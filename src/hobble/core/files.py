@@ -3,8 +3,6 @@
 A file is written under a temporary name and then renamed.
 """
 
-from __future__ import annotations
-
 import base64
 import contextlib
 import csv

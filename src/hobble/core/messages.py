@@ -1,7 +1,5 @@
 """Words for messages: many of them in groups by kind, so that one that matters is not lost, and durations."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterable
 from typing import NamedTuple

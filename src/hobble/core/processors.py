@@ -1,7 +1,5 @@
 """This machine's processor: its name, its number of cores, and whether it multiplies bfloat16 in hardware."""
 
-from __future__ import annotations
-
 import os
 import platform
 from collections.abc import Mapping

@@ -1,7 +1,5 @@
 """Rotations as unit quaternions: arrays (..., 4) of w, x, y, z. The leading axes may be any."""
 
-from __future__ import annotations
-
 import warnings
 
 import numpy as np

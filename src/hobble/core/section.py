@@ -1,7 +1,5 @@
 """Base class and value types of the sections of a YAML configuration file."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated, Literal
 

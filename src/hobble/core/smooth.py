@@ -4,8 +4,6 @@ Before the first frame and after the last one, the first and the last value are 
 NumPy only, because importing SciPy would slow the start of every job.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from hobble.core.quat import Array

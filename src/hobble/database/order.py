@@ -12,8 +12,6 @@ flat ground has only one fit, which comes in every layer. All visits of a pass, 
 into sections of nearly equal length. With `visits` sections, each section is a layer.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
 

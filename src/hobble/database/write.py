@@ -5,8 +5,6 @@ motion). Chunks are files with some of the rows. Buckets are temporary files in 
 sorted before chunks are written.
 """
 
-from __future__ import annotations
-
 import contextlib
 import hashlib
 import os

@@ -1,7 +1,5 @@
 """Compiles the runtime in C with zig, a compiler that is a Python package, so that every machine has one."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from collections.abc import Sequence

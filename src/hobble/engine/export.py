@@ -1,7 +1,5 @@
 """Writes results/<configuration>/export/engine/: what a game needs to run the character in its own engine."""
 
-from __future__ import annotations
-
 import shutil
 import zipfile
 from pathlib import Path

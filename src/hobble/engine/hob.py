@@ -8,8 +8,6 @@ number of values. The sections follow, each at a multiple of 64 bytes. All numbe
 there.
 """
 
-from __future__ import annotations
-
 import struct
 import zlib
 from collections.abc import Mapping

@@ -10,8 +10,6 @@ phase, contacts (4), positions (J, 3), rotations (J, 4). Units and axes are thos
 character starts at the origin, facing +Z.
 """
 
-from __future__ import annotations
-
 import struct
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """A body, its skeleton and its motion as one glTF 2.0 file (.glb) in metres, for game engines."""
 
-from __future__ import annotations
-
 import json
 import struct
 from collections.abc import Iterable

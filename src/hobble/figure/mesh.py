@@ -3,8 +3,6 @@
 benchmarks/derive_body.py sculpts the figure. Its arms and legs are a little spread, as in `modelled_pose`.
 """
 
-from __future__ import annotations
-
 import functools
 import hashlib
 import json

@@ -3,8 +3,6 @@
 Also finds the links that move with each bone. A link is a pair of joints between which a body can be hurt.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The bones of a body in files for other programs."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 
 import numpy as np

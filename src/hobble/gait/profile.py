@@ -7,8 +7,6 @@ Kinect v2 and gated recurrent neural networks", IEEE Access 8. Their profiles ar
 `benchmarks/derive_gait.py` writes.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from functools import cache
 from pathlib import Path

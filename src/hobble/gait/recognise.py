@@ -11,8 +11,6 @@ are modelled by a Gaussian distribution. Its mean is s times the mean over peopl
 the covariance over people, plus the covariance of healthy walks.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache, cached_property

@@ -8,8 +8,6 @@ Ten people each walked normally and imitated five impairments of the right leg. 
 these people.
 """
 
-from __future__ import annotations
-
 import functools
 from pathlib import Path
 from typing import Any

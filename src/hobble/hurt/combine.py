@@ -5,8 +5,6 @@ So a clip of a hurt arm and a clip of a hurt leg give a clip of both, which nobo
 the first.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

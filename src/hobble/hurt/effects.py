@@ -1,7 +1,5 @@
 """Turns the severities of the links into the changes of each frame of a clip."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Measures the healthy clip (the source) before it is changed: stances, heading, path, lengths of cycles."""
 
-from __future__ import annotations
-
 import itertools
 from dataclasses import dataclass, field
 

@@ -1,7 +1,5 @@
 """Makes the hurt version of a healthy clip: the motion of a person with hurt parts of the body."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 
 import numpy as np

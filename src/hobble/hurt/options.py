@@ -1,7 +1,5 @@
 """The keys of a data set's `hurt` section."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
 from pydantic import Field

@@ -5,8 +5,6 @@ of the cycle. New frames are the frames of the hurt clip.
 The labels move with the frames.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 
 import numpy as np

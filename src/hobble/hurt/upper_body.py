@@ -1,7 +1,5 @@
 """Changes trunk, pelvis, head and arms: adds the leaning of impaired people, and holds a hurt arm still."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from hobble.core import quat

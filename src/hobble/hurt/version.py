@@ -4,8 +4,6 @@ A link is the bone between two joints. The links are dealt like cards from a dec
 with large effects are in it several times.
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 import zlib

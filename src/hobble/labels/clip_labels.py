@@ -1,7 +1,5 @@
 """The labels of one clip, their file, and their picture for a page."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any

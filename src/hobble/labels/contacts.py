@@ -1,7 +1,5 @@
 """Finds which heels and toes are on the ground, from the motion of the feet alone."""
 
-from __future__ import annotations
-
 import itertools
 from typing import NamedTuple
 

@@ -5,8 +5,6 @@ and `toe_speed`, and on how fast the foot swings. So it suits a slow shuffle, a 
 quite rest, and a dragged leg.
 """
 
-from __future__ import annotations
-
 import itertools
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Finds the gait of each frame from the motion, for clips without gait files. Also a rule for crouching."""
 
-from __future__ import annotations
-
 import itertools
 
 import numpy as np

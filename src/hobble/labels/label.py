@@ -1,7 +1,5 @@
 """Labels a clip: finds its contacts from the motion, and its phase and gait from files or from the motion."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, replace
 from pathlib import Path

@@ -4,8 +4,6 @@ In these files, frames are counted from 1, at the frame rate of the clip's BVH f
 has 60 frames a second, and its frames are counted from 0. Errors name the label file and the line.
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Iterator

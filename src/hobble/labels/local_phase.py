@@ -5,8 +5,6 @@ A local phase is a vector (amplitude times cosine and sine of the angle). It shr
 body rests, so that there no angle has to be known.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from hobble.core.clip import Clip

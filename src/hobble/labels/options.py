@@ -1,7 +1,5 @@
 """The keys of a data set's `labels` section."""
 
-from __future__ import annotations
-
 from typing import Literal
 
 from pydantic import Field

@@ -9,8 +9,6 @@ landing of the next row must not be used, else 0. An unknown landing is nan. A r
 bout of walking. In a bout, the feet land in turn, without a long rest.
 """
 
-from __future__ import annotations
-
 import itertools
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Compares any number of configurations with each other and with published results."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import combinations

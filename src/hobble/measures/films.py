@@ -7,8 +7,6 @@ run.
 The looping picture at the top of the README is drawn here, too: a healthy and a hurt character side by side.
 """
 
-from __future__ import annotations
-
 import base64
 import hashlib
 import json

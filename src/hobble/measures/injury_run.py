@@ -11,8 +11,6 @@ The distance of a walk from a reference walk is the mean distance of its joints,
 the reference walk at the same phase. The spread of a walk is its distance from its own mean cycle.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import product
 from typing import Any

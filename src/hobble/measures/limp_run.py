@@ -8,8 +8,6 @@ the walk changes by only 2 %. Here the size of each effect of an injury on the w
 linear and a graded one, judge the walks. They learnt only from real people.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property

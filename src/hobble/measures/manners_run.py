@@ -4,8 +4,6 @@ The recogniser judges windows, stretches of straight walking of one second, from
 generated walks.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from itertools import combinations
 from typing import Any

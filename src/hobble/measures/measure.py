@@ -18,8 +18,6 @@ results of each configuration (`hobble.measures.compare`).
 The module `hobble.measures.<name>_run` has `run(inputs, options) -> Outcome`.
 """
 
-from __future__ import annotations
-
 import functools
 import importlib
 import pkgutil

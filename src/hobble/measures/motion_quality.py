@@ -6,8 +6,6 @@ centimetres above the ground. This is its standing height, which differs from ri
 heights above it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -6,8 +6,6 @@ the most that can be expected on generated windows. Its accuracy on generated wa
 accuracy of people who saw animated figures (Ferre 2019).
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from itertools import product

@@ -1,7 +1,5 @@
 """Tables of results as pandas data frames, for a notebook. The package `hobble` has the function, too."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pandas

@@ -1,7 +1,5 @@
 """Scores a folder of BVH files: how clean the motion is, and how near to captured motion."""
 
-from __future__ import annotations
-
 import argparse
 import json
 import math

@@ -3,8 +3,6 @@
 Titles and captions are in report/captions.yaml, each under the name of its chart.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

@@ -9,8 +9,6 @@ scores.csv, how often people ticked what hurts. It also writes tables.md, which 
 numbers stand beside ours.
 """
 
-from __future__ import annotations
-
 import argparse
 from collections import Counter
 from collections.abc import Mapping, Sequence

@@ -4,8 +4,6 @@ Centimetres, degrees, 60 frames a second. F is the number of frames, J that of j
 predicted contacts with the ground, from 0 to 1, of left heel, left toe, right heel, right toe.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any

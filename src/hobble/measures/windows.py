@@ -1,7 +1,5 @@
 """Windows: seconds of straight walking, captured or generated, in which a recogniser finds what it learnt."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any

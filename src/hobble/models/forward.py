@@ -19,8 +19,6 @@ Other modules compute the same: `predict` fast, for one character or a crowd; `s
 training; `onnx_file` and `engine/c` for other programs.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

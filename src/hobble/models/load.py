@@ -6,8 +6,6 @@ without checks. So the type, shape, count and range of everything in it are decl
 Every error names the file.
 """
 
-from __future__ import annotations
-
 import json
 import re
 from collections.abc import Mapping

@@ -13,8 +13,6 @@ group of rows and panels whose sums are kept in registers together. The number o
 changes only the speed.
 """
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from typing import Any

@@ -12,8 +12,6 @@ Blending the weights for each sample would give the same result, because sum_k c
 x, but it would take several times the memory traffic.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numba

@@ -4,8 +4,6 @@ Hobble's clips are right-handed with Y up. Their rest poses face +Z, with the le
 quaternions (4,).
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any

@@ -1,7 +1,5 @@
 """Downloads a clip and checks it. A download that fails is tried again."""
 
-from __future__ import annotations
-
 import hashlib
 import http.client
 import logging

@@ -1,7 +1,5 @@
 """Finds clips with the same motion: under another name, trimmed, shifted, turned, resampled or mirrored."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import chain

@@ -1,7 +1,5 @@
 """Changes whole clips: resamples, mirrors and repeats them, and repairs broken frames."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from itertools import pairwise

@@ -4,8 +4,6 @@ In a tilted world, the ground under the feet is tilted, and the body balances al
 equally. On a real slope only the ground is tilted, and the body still balances along Y.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

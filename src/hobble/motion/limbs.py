@@ -6,8 +6,6 @@ the arms, and they are the longer pair. Names show which side is left. Where the
 head and the direction of feet and knees show it, but this is right only in right-handed coordinates.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property

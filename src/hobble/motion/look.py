@@ -1,7 +1,5 @@
 """Summarises the clips of a folder before training, as a table, as a page, and as a picture of one clip."""
 
-from __future__ import annotations
-
 import html
 import json
 import re

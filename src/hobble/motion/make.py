@@ -5,8 +5,6 @@ the file. A known skeleton is one that has a file in `config/skeletons`. Any oth
 pose. The zero pose of a rig is the one in which all rotations are zero.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Tells from the names of joints which side and which part of the body they are."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 from functools import lru_cache

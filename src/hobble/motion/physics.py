@@ -6,8 +6,6 @@ force has two parts: one holds the body against gravity, and one accelerates it.
 accelerations in a few steps show the direction of gravity, even if the body leans or the ground slopes.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

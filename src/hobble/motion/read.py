@@ -5,8 +5,6 @@ end sites on a joint, joint names with spaces or prefixes, and braces anywhere. 
 as they are written; `decode_channels` computes rotations and positions, in the file's own unit and axes.
 """
 
-from __future__ import annotations
-
 import hashlib
 import io
 import re

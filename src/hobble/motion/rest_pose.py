@@ -10,8 +10,6 @@ The result is a frame for each joint: the constant rotation (4,) from the axes o
 +Z, with its arms out sideways) to the joint's own axes. `hobble.motion.body_sample` explains frames.
 """
 
-from __future__ import annotations
-
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise

@@ -11,8 +11,6 @@ Joints that follow no joint of the source (fingers, face, roll joints) keep thei
 joint above.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path

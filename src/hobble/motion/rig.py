@@ -4,8 +4,6 @@ A rig is the skeleton in a BVH file. A known skeleton is one that has a file in 
 is the known skeleton to which clips are retargeted. A role is the body part of a joint, such as "left_knee".
 """
 
-from __future__ import annotations
-
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
 from itertools import pairwise

@@ -5,8 +5,6 @@ the hips. Its Z axis is the facing direction, its X axis points to the character
 root" converts a world vector to root coordinates.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 
 import numpy as np

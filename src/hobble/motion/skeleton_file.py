@@ -4,8 +4,6 @@ The file lists the joints of a rig, and tells which joint has which role. A role
 Users write these files by hand, so each error names the line of the mistake.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """The report of a configuration: one HTML file to read and to play with."""
 
-from __future__ import annotations
-
 from typing import Literal
 
 from pydantic import Field

@@ -1,7 +1,5 @@
 """Uses Node to bundle the scripts of the page, and exports a character for any web page."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import tempfile

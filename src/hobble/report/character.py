@@ -1,7 +1,5 @@
 """Packs a trained network to run in a page, with what the page shows of it, and a recogniser of limps."""
 
-from __future__ import annotations
-
 import base64
 from collections.abc import Iterable, Mapping
 from typing import Any

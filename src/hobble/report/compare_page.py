@@ -1,7 +1,5 @@
 """Renders the page that compares configurations into one self-contained HTML file."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

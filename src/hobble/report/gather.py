@@ -1,7 +1,5 @@
 """Reads the files from which the report of a configuration is made."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path

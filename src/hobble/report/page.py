@@ -1,7 +1,5 @@
 """Renders the report of a configuration into one self-contained HTML file."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from typing import Any
 

@@ -3,8 +3,6 @@
 Time and memory are from Snakemake's benchmark files, disk space from the sizes of the artefacts.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import platform

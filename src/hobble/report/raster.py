@@ -4,8 +4,6 @@ The triangles are drawn by a compiled function. It releases Python's global lock
 can be drawn at once.
 """
 
-from __future__ import annotations
-
 import functools
 import io
 from collections.abc import Callable, Sequence

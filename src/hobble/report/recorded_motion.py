@@ -1,7 +1,5 @@
 """Packs motion that a page plays: captured beside predicted clips, and fitted grounds."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """The report's sections on training, data, terrain, and the time and disk space of each stage."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any

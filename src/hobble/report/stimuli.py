@@ -3,8 +3,6 @@
 They are stimuli for a questionnaire, or pictures for a README.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """What all pages share: templates that escape values, the style sheet, and what measurements show in them."""
 
-from __future__ import annotations
-
 import base64
 import hashlib
 import re

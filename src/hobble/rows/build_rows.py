@@ -6,8 +6,6 @@ The columns, and the coordinate system that moves with the root, are those of th
 Komura, Saito (2017) released.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import numpy as np

@@ -3,8 +3,6 @@
 Hobble's are right-handed, Y up, +Z forward, cm.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Literal

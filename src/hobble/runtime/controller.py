@@ -5,8 +5,6 @@ one file, because numba compiles a cached function again only if its own file ch
 a function that it calls is not noticed.
 """
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import fields

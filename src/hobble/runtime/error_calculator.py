@@ -1,7 +1,5 @@
 """Steps a character through recorded rows, frame by frame, as the ErrorCalculator of Segerstedt (2021)."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any

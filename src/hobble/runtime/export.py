@@ -1,7 +1,5 @@
 """Write generated motion as clips and BVH files for other tools."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

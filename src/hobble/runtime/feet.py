@@ -7,8 +7,6 @@ stands drags over the ground. So the runtime makes it step: the foot is lifted, 
 and lands there.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

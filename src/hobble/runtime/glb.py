@@ -1,7 +1,5 @@
 """Writes the character for artists and game engines: body, skeleton and animations in one glTF file."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 

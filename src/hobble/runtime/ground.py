@@ -1,7 +1,5 @@
 """Turns the ground that the caller gives (a function, a heightmap, an array or None) into one function."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Any

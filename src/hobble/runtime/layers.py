@@ -4,8 +4,6 @@ It changes the caller's copy of the pose. The network goes on from its own. Posi
 rotations are in the caller's axes.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any

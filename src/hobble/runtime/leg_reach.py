@@ -1,7 +1,5 @@
 """Moves the heel of a pose by bending its leg (two-bone IK), with limited turns of thigh and shank."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

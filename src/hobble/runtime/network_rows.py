@@ -1,7 +1,5 @@
 """The rows of the network: channel values and state become X; the output Y becomes a pose."""
 
-from __future__ import annotations
-
 import difflib
 from collections.abc import Iterable, Mapping
 from typing import Any

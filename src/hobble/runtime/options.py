@@ -1,7 +1,5 @@
 """The keys of a configuration's `runtime` section."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
 from pydantic import Field

@@ -4,8 +4,6 @@
 a compiled function applies this plan to poses.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path

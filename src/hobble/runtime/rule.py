@@ -4,8 +4,6 @@ The functions take numbers, numpy arrays or tensors. The runtime compiles them w
 training call them directly. The only other implementation is in the report page's JavaScript.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

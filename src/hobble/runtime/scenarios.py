@@ -4,8 +4,6 @@ In some scenarios the value of a channel's column is swept: it rises from 0 to t
 group of network inputs that tell, for example, how hurt each part of the body is.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path

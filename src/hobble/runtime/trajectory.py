@@ -5,8 +5,6 @@ C characters. Angles are yaw: 0 faces +Z, and they grow toward +X (left). The fo
 runtime of Holden et al. (2017).
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

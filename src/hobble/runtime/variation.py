@@ -6,8 +6,6 @@ strong limp (Jun et al. 2020). The random numbers come from whole numbers, so th
 the same.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from hobble.core.quat import Array

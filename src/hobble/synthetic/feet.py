@@ -3,8 +3,6 @@
 The pitch of a foot is its angle about the X axis, positive if the toe is up.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from itertools import pairwise
 

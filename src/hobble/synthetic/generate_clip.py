@@ -3,8 +3,6 @@
 The motion follows a plan: a list of segments, each with a gait, a speed, a turn and a length.
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 import pathlib

@@ -5,8 +5,6 @@ A recipe is a sequence of segments, each with a gait, a velocity, a turn and a l
 The plan of a clip is its recipe, repeated, stretched and varied at random to fill the clip.
 """
 
-from __future__ import annotations
-
 import zlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace

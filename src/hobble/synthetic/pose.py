@@ -1,7 +1,5 @@
 """Poses the figure: finds the hip positions and all joint rotations from the feet, the path and the style."""
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
 

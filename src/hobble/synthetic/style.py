@@ -5,8 +5,6 @@ Burnfield, Gait Analysis; Winter, The Biomechanics and Motor Control of Human Ga
 (1998).
 """
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 
 import numpy as np

@@ -5,8 +5,6 @@ of feet in contact above the ground. This surface is added to the ground. Then, 
 below the ground, a pit is dug: the ground is lowered to a cone around the foot.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 

@@ -1,7 +1,5 @@
 """Reads heightmaps from files, takes one from matplotlib's model of a real landscape, or generates them."""
 
-from __future__ import annotations
-
 import io
 import zlib
 from collections.abc import Callable, Sequence

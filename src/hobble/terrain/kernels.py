@@ -15,8 +15,6 @@ their callers. If they were compiled and cached separately, they could add up su
 round them differently.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from hobble.core.compiled import njit

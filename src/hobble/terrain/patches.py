@@ -5,8 +5,6 @@ those of the heightmap, and the mean of its heights, which is subtracted from th
 their cells would take 600 MB.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path

@@ -3,8 +3,6 @@
 Each way to change them is an `Augmentation`. `augmentations` makes those that a training asks for.
 """
 
-from __future__ import annotations
-
 import math
 from abc import ABC, abstractmethod
 

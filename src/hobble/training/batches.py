@@ -1,7 +1,5 @@
 """Batches of training samples, a check of their losses, and the errors on held-out clips."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Sequence
 from typing import NamedTuple, Protocol
 

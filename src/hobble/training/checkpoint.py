@@ -1,7 +1,5 @@
 """The state of a training: its history, its checkpoints, and how a training begins or resumes."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import logging

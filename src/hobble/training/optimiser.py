@@ -1,7 +1,5 @@
 """Updates the weights: Adam, the update of one or several processes, and symmetric networks."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

@@ -5,8 +5,6 @@ summed over the processes, so that all take the same step. torchrun starts the p
 does not communicate and does not start torch.distributed.
 """
 
-from __future__ import annotations
-
 import contextlib
 import os
 import zlib

@@ -6,8 +6,6 @@ body are injured. The clip from which they are made is their original. A channel
 besides motion and ground; its values are 0 or more.
 """
 
-from __future__ import annotations
-
 import functools
 import math
 import os

@@ -1,7 +1,5 @@
 """Tells the rules about a configuration: its sections, clips, measurements, and paths of inputs."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 from functools import cached_property

@@ -5,8 +5,6 @@ the user's files have their hashes as a param. A file is hashed again only if it
 changed. Nobody can set the time of its last change of any kind (ctime) back.
 """
 
-from __future__ import annotations
-
 import atexit
 import contextlib
 import hashlib

@@ -10,8 +10,6 @@ The output of a job is a folder, results/datasets/<dataset>/batches/<stage>/<bat
 folders in seconds; listing the 25,000 files in them took five times as long.
 """
 
-from __future__ import annotations
-
 import hashlib
 from collections import defaultdict
 from collections.abc import Iterable, Sequence

@@ -6,8 +6,6 @@ measured on clips of 10,000 and 40,000 frames with 31 joints. `benchmarks/demand
 with what a finished run used.
 """
 
-from __future__ import annotations
-
 import functools
 import math
 import os

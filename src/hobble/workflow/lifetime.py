@@ -5,8 +5,6 @@ and `lock` takes one that the system releases. After SIGINT or SIGTERM, Snakemak
 run ends its jobs on these signals. And each job checks regularly whether its run still exists.
 """
 
-from __future__ import annotations
-
 import contextlib
 import fcntl
 import getpass

@@ -1,7 +1,5 @@
 """Creates the objects that the Snakefile's rules use, for one checkout and one command line."""
 
-from __future__ import annotations
-
 import functools
 from collections.abc import Iterable, Mapping
 from functools import cached_property

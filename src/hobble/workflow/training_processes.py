@@ -4,8 +4,6 @@ A process is `python -m hobble.workflow.training_processes JOB.json`. JOB.json h
 `hobble.training.train.train`, the number of threads and the path of the log file, as plain data.
 """
 
-from __future__ import annotations
-
 import json
 import logging
 import os

@@ -1,7 +1,5 @@
 """Severities of a clip: ranges, rates, mirrors, and Ferre's own matrices."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The status file: valid and invalid content, and writing and reading it without loss."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """Status files from a table of clip, link, severity, from and to."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """Clips of smooth, made-up motion as files of rows, and the tables built from them."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

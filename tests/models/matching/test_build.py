@@ -1,7 +1,5 @@
 """The tables have every frame once, in runs of consecutive frames, on the mean of its terrain fits."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Transitions: no joint jumps, and the offsets decay."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Motion matching at run time: which frames are shown, when it searches. The page does the same."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from pathlib import Path

@@ -3,8 +3,6 @@
 In a patient's clip, the column of the patient's diagnosis is 1. In a healthy person's clip, all are 0.
 """
 
-from __future__ import annotations
-
 import functools
 from collections.abc import Sequence
 from pathlib import Path, PurePosixPath

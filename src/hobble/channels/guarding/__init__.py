@@ -5,8 +5,6 @@ body that does not hurt moves in the same way at every value. A network learns t
 value.
 """
 
-from __future__ import annotations
-
 import math
 import zlib
 from collections.abc import Mapping, Sequence

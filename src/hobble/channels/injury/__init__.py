@@ -3,8 +3,6 @@
 A link is a pair of neighbouring joints. A status file beside a clip says which links hurt in it, and when.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping
 from typing import Any

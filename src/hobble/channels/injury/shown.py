@@ -5,8 +5,6 @@ A link is the piece of the body between two neighbouring joints. Its label is a 
 loop is a walk for a looping picture. A sweep is a walk in which the severity of one link rises.
 """
 
-from __future__ import annotations
-
 from collections.abc import Collection, Sequence
 
 from hobble.channels.shown import ChannelDisplay, SampleWalk

@@ -13,8 +13,6 @@ as a range from 1. A range that goes past the last frame stops there. Where rang
 line counts for the links that it names.
 """
 
-from __future__ import annotations
-
 import difflib
 import re
 from collections.abc import Mapping, Sequence

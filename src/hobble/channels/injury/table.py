@@ -10,8 +10,6 @@ frame, an empty `to` the last::
     walk_03,LowerBack-Spine,3,400,
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The mood channel: for each of five moods a column with values from 0 to 1. A neutral clip has 0 in all."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from fnmatch import fnmatchcase
 from typing import Annotated, Any, Literal, get_args

@@ -4,8 +4,6 @@ cc -O3 -march=native -shared -fPIC hobble.c -o libhobble.so -lm
 python hobble_ctypes.py libhobble.so character.hob
 """
 
-from __future__ import annotations
-
 import ctypes
 import sys
 from collections.abc import Callable, Sequence

@@ -7,8 +7,6 @@ each state from its last one. The projector is trained to map disturbed features
 frame.
 """
 
-from __future__ import annotations
-
 import logging
 import time
 from collections.abc import Callable

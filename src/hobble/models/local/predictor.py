@@ -1,7 +1,5 @@
 """Runs a network gated by local phases, and carries each character's local phases from frame to frame."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

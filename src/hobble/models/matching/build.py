@@ -10,8 +10,6 @@ ahead, position and velocity of both feet, and velocity of the hips. Hobble adds
 ahead and the channel values.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
