@@ -18,7 +18,7 @@ from typing import Any, TextIO
 from snakemake.logging import DefaultFilter, DefaultFormatter
 from snakemake_interface_logger_plugins.base import LogHandlerBase
 
-from hobble.core.messages import duration
+from hobble.core.messages import format_duration
 
 TICK_SECONDS = 1.0  # between two updates of the line of progress on a terminal
 PROGRESS_SECONDS = 30.0  # between lines of progress if the output goes to a file
@@ -131,7 +131,7 @@ class Terminal:
     def _print_summary(self) -> None:
         if not (self.jobs or self.failed):
             return
-        took = duration(self.now() - self.began)
+        took = format_duration(self.now() - self.began)
         count = f"{self.done} of {self.total or len(self.jobs)} jobs done in {took}"
         if self.failed:
             self._print_line(f"{count}, {len(self.failed)} failed:")
@@ -195,7 +195,7 @@ class Terminal:
                 self.named.add(number)
                 self._print_line(f"{job.name}: its log is {job.log}")
         doing = list(dict.fromkeys(_doing(job) for job in self.running.values()))
-        took = duration(self.now() - self.began)
+        took = format_duration(self.now() - self.began)
         line = f"{self.done}/{self.total} jobs, {took}" + (f": {'; '.join(doing)}" if doing else "")
         if self.live:
             self.stream.write(f"\r\x1b[K{line[: shutil.get_terminal_size((100, 24)).columns - 1]}")

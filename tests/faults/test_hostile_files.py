@@ -21,8 +21,7 @@ from hobble.config.load_configuration import Catalogue
 from hobble.core.clip import Clip, load_clip
 from hobble.core.declared import ArrayOf
 from hobble.core.errors import InputError
-from hobble.core.files import load_npz, read_json
-from hobble.core.untrusted import read_bytes, read_yaml
+from hobble.core.files import load_npz, read_bytes, read_json, read_yaml
 from hobble.labels.label_files import SourceTime, read_gait_keys, read_phase
 from hobble.measures.study import FilmAnswer, ShownFilm, Study, read_answers, read_study
 from hobble.models.load import load_network, read_arrays

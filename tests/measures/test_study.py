@@ -12,7 +12,7 @@ import pytest
 
 from hobble.cli.__main__ import main
 from hobble.core.errors import InputError
-from hobble.core.untrusted import read_yaml
+from hobble.core.files import read_yaml
 from hobble.measures.films import CHANGE_OF_GAIT, FILMS, FPS, ONE_PART, SEVERAL_PARTS, put_side_by_side
 from hobble.measures.study import (
     ASKED,

@@ -147,9 +147,9 @@ def test_a_long_job_shows_its_share_its_errors_and_its_log_while_the_time_moves(
     assert run.lines[1:] == [
         f"training holden: its log is {log}",
         "51/65 jobs, 30 s: training",
-        "51/65 jobs, 1 min 00 s: training",
+        "51/65 jobs, 1 min: training",
         "51/65 jobs, 1 min 30 s: training holden 34 % done, 8 min left, error 0.41",
-        "51/65 jobs, 2 min 00 s: training holden 36 % done, 7 min left",
+        "51/65 jobs, 2 min: training holden 36 % done, 7 min left",
     ]
     run.finish(1, 52, 65)
     run.clock += PROGRESS_SECONDS

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from hobble.core.untrusted import read_yaml
+from hobble.core.files import read_yaml
 from hobble.synthetic.generate_clip import write_clip
 from hobble.synthetic.options import Synthetic
 from hobble.workflow.job import job

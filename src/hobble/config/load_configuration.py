@@ -13,8 +13,8 @@ from typing import Any, TypeVar
 from pydantic import BaseModel, ValidationError
 
 from hobble.config.models import Configuration, Dataset, SkeletonFile, configuration_of
-from hobble.core import untrusted
 from hobble.core.errors import HobbleError, InputError
+from hobble.core.files import read_yaml as read_plain_yaml
 from hobble.models import DEFAULT_KIND, NETWORK_KINDS
 
 Model = TypeVar("Model", bound=BaseModel)
@@ -55,7 +55,7 @@ def read_yaml(path: Path) -> dict[str, Any]:
     if not path.is_file():
         existing = ", ".join(sorted(p.stem for p in path.parent.glob("*.yaml"))) or "none"
         raise InputError(path, "no such file", fix=f"There are: {existing}.")
-    data = untrusted.read_yaml(path)
+    data = read_plain_yaml(path)
     if data is None:
         return {}
     if not isinstance(data, dict):

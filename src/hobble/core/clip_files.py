@@ -7,12 +7,12 @@ beside it: labels (footsteps, gait, phase), and where the person is hurt.
 import contextlib
 import os
 import re
-from collections.abc import Collection
+from collections.abc import Collection, Iterator
 from difflib import get_close_matches
 from pathlib import Path
 
 from hobble.core.errors import InputError
-from hobble.core.untrusted import check_regular
+from hobble.core.files import check_regular
 
 BVH_SUFFIX = ".bvh"
 # A file beside a clip is called <clip><suffix>, with one of these suffixes.
@@ -46,18 +46,15 @@ def is_valid_clip_name(clip: str) -> bool:
     return is_short and clip.isprintable() and VALID_NAME.fullmatch(clip) is not None
 
 
-def find_clips(folder: Path, suffixes: Collection[str] = (BVH_SUFFIX,)) -> dict[str, list[Path]]:
-    """The BVH files (.bvh or .BVH) in a folder and its subfolders, as clip name -> paths.
+def _files_in(folder: Path) -> Iterator[Path]:
+    """The files in a folder and its subfolders, in alphabetical order of the folders, without hidden ones.
 
-    suffixes: other suffixes to find, in lower case. A clip has several paths if files in several folders have
-    its name. Folders are searched in alphabetical order. Follows links, but enters each folder only once.
-    Skips hidden files and folders. Raises InputError if a folder cannot be read.
+    Follows links, but enters each folder only once. Raises InputError if a folder cannot be read.
     """
 
     def raise_input_error(error: OSError) -> None:
         raise InputError(error.filename or folder, f"cannot be read: {error.strerror}") from None
 
-    found: dict[str, list[Path]] = {}
     seen: set[str] = set()
     for here, folders, files in os.walk(folder, onerror=raise_input_error, followlinks=True):
         if (real := os.path.realpath(here)) in seen:
@@ -65,10 +62,19 @@ def find_clips(folder: Path, suffixes: Collection[str] = (BVH_SUFFIX,)) -> dict[
             continue
         seen.add(real)
         folders[:] = sorted(name for name in folders if not name.startswith("."))
-        for name in sorted(files):
-            stem, suffix = os.path.splitext(name)
-            if suffix.lower() in suffixes and not name.startswith("."):
-                found.setdefault(stem, []).append(Path(here, name))
+        yield from (Path(here, name) for name in sorted(files) if not name.startswith("."))
+
+
+def find_clips(folder: Path, suffixes: Collection[str] = (BVH_SUFFIX,)) -> dict[str, list[Path]]:
+    """The BVH files (.bvh or .BVH) in a folder and its subfolders, as clip name -> paths.
+
+    suffixes: other suffixes to find, in lower case. A clip has several paths if files in several folders have
+    its name. Raises InputError if a folder cannot be read.
+    """
+    found: dict[str, list[Path]] = {}
+    for path in _files_in(folder):
+        if path.suffix.lower() in suffixes:
+            found.setdefault(path.stem, []).append(path)
     return found
 
 
@@ -111,12 +117,10 @@ def unused_file_notes(folder: Path, clips: Collection[str]) -> list[str]:
     Only files with a suffix in SIDE_FILE_SUFFIXES count. clips: the names of all clips.
     """
     notes = []
-    for here, folders, files in os.walk(folder):
-        folders[:] = sorted(name for name in folders if not name.startswith("."))
-        for name in sorted(files):
-            suffix = next((suffix for suffix in SIDE_FILE_SUFFIXES if name.endswith(suffix)), None)
-            if suffix and (stem := name.removesuffix(suffix)) not in clips:
-                near = next(iter(get_close_matches(stem, clips, 1, 0.75)), None)
-                fix = f"If it belongs to {near}, rename it." if near else "Rename it or take it out."
-                notes.append(f"{Path(here, name)} belongs to no clip and is not read. {fix}")
+    for path in _files_in(folder):
+        suffix = next((suffix for suffix in SIDE_FILE_SUFFIXES if path.name.endswith(suffix)), None)
+        if suffix and (stem := path.name.removesuffix(suffix)) not in clips:
+            near = next(iter(get_close_matches(stem, clips, 1, 0.75)), None)
+            fix = f"If it belongs to {near}, rename it." if near else "Rename it or take it out."
+            notes.append(f"{path} belongs to no clip and is not read. {fix}")
     return notes

@@ -13,8 +13,7 @@ import numpy as np
 from pydantic import TypeAdapter, ValidationError
 
 from hobble.core.errors import InputError
-from hobble.core.files import DELETE_IT, Arrays, load_npz, read_json
-from hobble.core.untrusted import printable
+from hobble.core.files import DELETE_IT, Arrays, load_npz, printable, read_json
 
 Declared = TypeVar("Declared")
 

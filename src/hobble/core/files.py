@@ -1,6 +1,6 @@
-"""Writes files completely or not at all, and reads JSON, CSV, npz and npy files that may be damaged.
+"""Writes files completely or not at all, and reads text, YAML, JSON, CSV, npz and npy files with limits.
 
-A file is written under a temporary name and then renamed.
+A file is written under a temporary name and then renamed. Files that are read may be damaged or hostile.
 """
 
 import base64
@@ -13,31 +13,33 @@ import json
 import math
 import os
 import platform
+import stat
 import struct
 import zipfile
 import zlib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import IO, Any, NoReturn
+from typing import IO, Any
 
 import numpy as np
+import yaml
 
 from hobble.core.errors import HobbleError, InputError
-from hobble.core.untrusted import check_regular, printable, read_text
 
 Json = Mapping[str, Any]  # what a JSON file holds
 
+MB = 1 << 20  # bytes
+MAX_TEXT_BYTES = 64 * MB  # enough for a label file of ten minutes at 100 Hz with 1 kB for each frame
+MAX_YAML_BYTES = 4 * MB  # enough for a data set of 20,000 clips with five keys each
+MAX_YAML_DEPTH = 100  # levels of lists and mappings within each other
+MAX_YAML_VALUES = 1_000_000  # in a file; so many take about 100 MB of memory
+LONGEST_INTEGER = 40  # characters; Python refuses to print a number of more than 4,300 digits
+MAX_JSON_BYTES = 1 << 30
 # The compressed arrays of a file may together unpack to at most this. Hobble itself does not compress arrays.
 MAX_INFLATED_BYTES = 1 << 30
-MAX_JSON_BYTES = 1 << 30
 _HOST = f"{zlib.crc32(platform.node().encode()):08x}"  # this machine, in the names of temporary files
 DELETE_IT = "Delete it; the next run makes it again."
 CHECKSUMS = "checksums"  # key of a JSON file
-# Version of the npy format -> NumPy's function that reads the header of an array in this version.
-HEADER_READERS = {
-    (1, 0): np.lib.format.read_array_header_1_0,
-    (2, 0): np.lib.format.read_array_header_2_0,
-}
 # What zipfile and NumPy raise for a damaged file.
 DAMAGE_ERRORS = (
     zipfile.BadZipFile,
@@ -69,22 +71,11 @@ def atomic_path(path: str | Path) -> Iterator[Path]:
         with open(temporary, "rb") as file:
             os.fsync(file.fileno())
         os.replace(temporary, path)
-        sync_folder(path.parent)
     except OSError as error:
         raise failed_write_error(error, path) from error
     finally:
         with contextlib.suppress(OSError):
             temporary.unlink(missing_ok=True)
-
-
-def sync_folder(folder: Path) -> None:
-    """Flush a folder to disk, if the system can, so that a rename in it survives a power cut."""
-    with contextlib.suppress(OSError):
-        handle = os.open(folder, os.O_RDONLY)
-        try:
-            os.fsync(handle)
-        finally:
-            os.close(handle)
 
 
 def _remove_leftovers(path: Path) -> None:
@@ -125,6 +116,130 @@ def write_bytes(path: str | Path, content: bytes) -> None:
         temporary.write_bytes(content)
 
 
+def check_regular(path: str | Path) -> os.stat_result:
+    """The stat result of a regular file, or of the file that a link points to.
+
+    Raises InputError for a folder, a device or a pipe, because reading from a device or a pipe may never end.
+    Raises OSError if there is no such file.
+    """
+    status = os.stat(path)
+    if not stat.S_ISREG(status.st_mode):
+        raise InputError(
+            path, "not a file" if stat.S_ISDIR(status.st_mode) else "a device or a pipe, not a file"
+        )
+    return status
+
+
+def printable(text: object, most: int = 200) -> str:
+    """Untrusted text, made safe for a terminal: one line, with "?" for each control character.
+
+    After `most` characters it is cut off with "...".
+    """
+    plain = "".join(c if c.isprintable() else "?" for c in str(text)[: most + 1])
+    return plain if len(plain) <= most else f"{plain[:most]}..."
+
+
+@contextlib.contextmanager
+def reading(path: str | Path, problem: str, fix: str | None = None) -> Iterator[os.stat_result]:
+    """Turn the errors of reading a file into InputError. Yields the stat result of the file.
+
+    problem, fix: for the message about a damaged file. Raises InputError if it is missing or not regular.
+    """
+    try:
+        yield check_regular(path)
+    except FileNotFoundError as error:
+        raise InputError(path, "no such file") from error
+    except OSError as error:
+        raise InputError(path, f"cannot be read: {error.strerror or error}") from error
+    except DAMAGE_ERRORS as error:
+        raise InputError(path, f"{problem} ({printable(error)})", fix=fix) from error
+
+
+def read_bytes(path: str | Path, most: int) -> bytes:
+    """The content of a regular file of at most `most` bytes.
+
+    Raises InputError if it is missing, unreadable, too large, or not a regular file, or if its size changes
+    while it is read.
+    """
+    with reading(path, "cannot be read") as status, open(path, "rb") as file:
+        if status.st_size > most:
+            raise InputError(path, f"larger than {most / MB:g} MB, the limit for such a file")
+        # read(n) allocates n bytes, so n is not `most` but the file's size, + 1 to see if it grew.
+        data = file.read(status.st_size + 1)
+        if len(data) != status.st_size:
+            raise InputError(path, "its size changed while it was read", fix="Try again when it is complete.")
+        return data
+    raise AssertionError("not reached")
+
+
+def read_text(path: str | Path, most: int = MAX_TEXT_BYTES) -> str:
+    """The content of a UTF-8 text file, without a byte order mark.
+
+    most: largest number of bytes. Raises InputError if the file is missing, too large or not UTF-8.
+    """
+    try:
+        return read_bytes(path, most).decode("utf-8-sig")
+    except UnicodeDecodeError:
+        raise InputError(path, "not a text file in UTF-8") from None
+
+
+def read_yaml(path: str | Path) -> Any:
+    """The content of a YAML file as plain data.
+
+    Raises InputError, with the line if it is known, for invalid YAML, tags that would create Python objects,
+    aliases (`*name`, with which a small file can stand for a huge one), duplicate keys, integers of many
+    digits, nesting deeper than MAX_YAML_DEPTH, and more than MAX_YAML_VALUES values.
+    """
+    text = read_text(path, MAX_YAML_BYTES)
+    loader_class = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+    loader = loader_class(text)
+    try:
+        _check_events(path, yaml.parse(text, loader_class))
+        node = loader.get_single_node()
+        if node is None:
+            return None
+        _check_node(path, node)
+        return loader.construct_document(node)
+    except yaml.MarkedYAMLError as error:
+        line = error.problem_mark.line + 1 if error.problem_mark else None
+        raise InputError(path, f"not valid YAML: {error.problem}", line=line) from None
+    except (yaml.YAMLError, ValueError) as error:  # ValueError: a date such as 2001-99-99
+        raise InputError(path, f"not valid YAML: {printable(error)}") from None
+
+
+def _check_events(path: str | Path, events: Iterable[yaml.Event]) -> None:
+    """Check what could use up the memory, or crash libyaml, which recurses into lists and mappings."""
+    depth = 0
+    for number, event in enumerate(events):
+        line = event.start_mark.line + 1 if event.start_mark else None
+        depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
+        if depth > MAX_YAML_DEPTH:
+            raise InputError(path, f"nested deeper than {MAX_YAML_DEPTH} levels", line=line)
+        if number > MAX_YAML_VALUES:
+            raise InputError(path, f"has more than {MAX_YAML_VALUES} values")
+        if isinstance(event, yaml.AliasEvent):
+            problem, fix = f"*{event.anchor:.40} is an alias", "Write out what it stands for."
+            raise InputError(path, problem, line=line, fix=fix)
+
+
+def _check_node(path: str | Path, node: yaml.Node) -> None:
+    """Raise InputError for a duplicate key, of which YAML's loader would take the last, or a huge integer."""
+    line = node.start_mark.line + 1
+    if node.tag == "tag:yaml.org,2002:int" and len(node.value) > LONGEST_INTEGER:
+        raise InputError(path, f"an integer of {len(node.value)} characters", line=line)
+    lines: dict[tuple[str, str], int] = {}  # (type, text) of a key -> its line, from 1
+    for child in node.value if isinstance(node.value, list) else ():
+        parts = child if isinstance(child, tuple) else (child,)  # a key and its value, or an item
+        for part in parts:
+            _check_node(path, part)
+        if len(parts) == 2 and isinstance(parts[0].value, str):
+            name, line = (parts[0].tag, parts[0].value), parts[0].start_mark.line + 1
+            if name in lines:
+                problem = f"the key {name[1]:.80} is given twice, first in line {lines[name]}"
+                raise InputError(path, problem, line=line, fix="Keep one of them.")
+            lines[name] = line
+
+
 def write_json(path: str | Path, value: Any) -> None:
     """Write `value` as JSON with sorted keys, so that equal values give equal bytes.
 
@@ -146,9 +261,7 @@ def read_json(path: str | Path, fix: str = DELETE_IT) -> Any:
     changed since `write_json` wrote it.
     """
     try:
-        value = json.loads(
-            read_text(path, MAX_JSON_BYTES), parse_constant=_refuse_constant, parse_float=_finite
-        )
+        value = json.loads(read_text(path, MAX_JSON_BYTES), parse_constant=_finite, parse_float=_finite)
     except json.JSONDecodeError as error:
         raise InputError(path, f"not valid JSON: {error.msg}", line=error.lineno, fix=fix) from error
     except (RecursionError, ValueError) as error:
@@ -160,13 +273,10 @@ def read_json(path: str | Path, fix: str = DELETE_IT) -> Any:
 
 
 def _finite(word: str) -> float:
-    """The number, if it is not too large for a float."""
-    value = float(word)
-    return value if abs(value) < float("inf") else _refuse_constant(word)
-
-
-def _refuse_constant(word: str) -> NoReturn:
-    raise ValueError(f"{word} is not a number")
+    """The number; not NaN, Infinity, or one that is too large for a float."""
+    if not math.isfinite(value := float(word)):
+        raise ValueError(f"{word} is not a number")
+    return value
 
 
 def save_npz(path: str | Path, **arrays: Any) -> None:
@@ -210,47 +320,20 @@ def load_npz(path: str | Path, names: Iterable[str] | None = None) -> Arrays:
     raise AssertionError("not reached")
 
 
-@contextlib.contextmanager
-def reading(path: str | Path, problem: str, fix: str | None = None) -> Iterator[os.stat_result]:
-    """Turn the errors of reading a file into InputError. Yields the stat result of the file.
-
-    problem, fix: for the message about a damaged file. Raises InputError if it is missing or not regular.
-    """
-    try:
-        yield check_regular(path)
-    except FileNotFoundError as error:
-        raise InputError(path, "no such file") from error
-    except OSError as error:
-        raise InputError(path, f"cannot be read: {error.strerror or error}") from error
-    except DAMAGE_ERRORS as error:
-        raise InputError(path, f"{problem} ({printable(error)})", fix=fix) from error
-
-
 def check_archive(path: str | Path, archive: zipfile.ZipFile) -> None:
-    """Raise ValueError or BadZipFile if an archive's list of files is damaged or claims too much data."""
-    if _entry_count(path, archive) != len(archive.infolist()):
-        raise zipfile.BadZipFile("its list of files has lost an entry")
-    _check_sizes(path, archive)
-
-
-def _entry_count(path: str | Path, archive: zipfile.ZipFile) -> int:
-    """The number of files that the archive's end record states. zipfile does not check this number.
-
-    The end record has 22 bytes, with the number at byte 10, and then the archive's comment.
-    """
-    with open(path, "rb") as file:
-        file.seek(-22 - len(archive.comment), os.SEEK_END)
-        (count,) = struct.unpack("<10xH10x", file.read(22))
-    return count
-
-
-def _check_sizes(path: str | Path, archive: zipfile.ZipFile) -> None:
-    """Raise ValueError if the entries would need too much memory.
+    """Raise ValueError or BadZipFile if an archive's list of files is damaged or claims too much data.
 
     All entries together may not be larger than the file. They are larger if several entries share the same
     bytes. Compressed entries may not unpack to more than MAX_INFLATED_BYTES.
     """
     entries = archive.infolist()
+    with open(path, "rb") as file:
+        # The end record has 22 bytes, with the number of files at byte 10, and then the archive's comment.
+        # zipfile does not check this number.
+        file.seek(-22 - len(archive.comment), os.SEEK_END)
+        (count,) = struct.unpack("<10xH10x", file.read(22))
+    if count != len(entries):
+        raise zipfile.BadZipFile("its list of files has lost an entry")
     if any(entry.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED) for entry in entries):
         raise ValueError("compressed in a way that NumPy does not use")
     if any(entry.file_size != entry.compress_size for entry in entries if not entry.compress_type):
@@ -327,38 +410,32 @@ def check_header(file: IO[bytes], size: int) -> tuple[tuple[int, ...], bool, np.
     damaged header can raise almost any error.
     """
     try:
-        shape, by_columns, dtype = HEADER_READERS[np.lib.format.read_magic(file)](file)
+        major, minor = np.lib.format.read_magic(file)  # version of the npy format
+        shape, by_columns, dtype = getattr(np.lib.format, f"read_array_header_{major}_{minor}")(file)
     except OSError:
         raise
     except (Exception, MemoryError):  # Python raises MemoryError for a header that is nested too deeply
         raise ValueError("the header of an array cannot be understood") from None
-    count = 1
-    for length in shape:
-        count *= length
-    if dtype.hasobject or min(shape, default=0) < 0 or count * dtype.itemsize != size - file.tell():
+    size -= file.tell()
+    if dtype.hasobject or min(shape, default=0) < 0 or math.prod(shape) * dtype.itemsize != size:
         raise ValueError("an array has another size than its header says, or holds Python objects")
     return shape, by_columns, dtype
 
 
-def write_csv(path: str | Path, rows: Sequence[Mapping[str, Any]]) -> None:
-    """Write a CSV file with a header and a line for each row. Without rows, the file is empty.
-
-    Columns are in the order in which they first occur. A field is empty if its value is missing, None or NaN.
-    """
-    out = io.StringIO()
-    writer = csv.writer(out, lineterminator="\n")
-    columns = list(dict.fromkeys(key for row in rows for key in row))
-    writer.writerows([columns] if columns else [])
-    for values in ([row.get(key) for key in columns] for row in rows):
-        writer.writerow(["" if value is None or value != value else value for value in values])
-    write_text(path, out.getvalue())
-
-
 def write_tables(folder: str | Path, tables: Mapping[str, Sequence[Mapping[str, Any]]]) -> None:
-    """Write each table to <folder>/<name>.csv. Creates the folder. tables: name -> rows."""
+    """Write each table to <folder>/<name>.csv, with a header and a line for each row. Creates the folder.
+
+    tables: name -> rows. Columns are in the order in which they first occur. A field is empty if its value is
+    missing, None or NaN. Without rows, the file is empty.
+    """
     Path(folder).mkdir(parents=True, exist_ok=True)
     for name, rows in tables.items():
-        write_csv(Path(folder) / f"{name}.csv", rows)
+        out = io.StringIO()
+        writer = csv.DictWriter(out, dict.fromkeys(key for row in rows for key in row), lineterminator="\n")
+        if rows:
+            writer.writeheader()
+        writer.writerows({key: value for key, value in row.items() if value == value} for row in rows)
+        write_text(Path(folder) / f"{name}.csv", out.getvalue())
 
 
 def read_table(path: str | Path, columns: Sequence[str]) -> Iterator[tuple[int, dict[str, str]]]:

@@ -43,15 +43,18 @@ def in_words(group: Group) -> str:
     return f"{len(group.clips)} clips, such as {group.clips[0]}: {group.message}"
 
 
-def duration(seconds: float) -> str:
-    """A duration as text.
+def format_duration(seconds: float | None) -> str:
+    """A time as text in a suitable unit; a dash for None.
 
-    >>> duration(42.4), duration(754), duration(7512)
-    ('42 s', '12 min 34 s', '2 h 05 min')
+    >>> [format_duration(seconds) for seconds in (0.42, 59.4, 59.6, 93, 5400, 154800, None)]
+    ['0.42 s', '59 s', '1 min', '1 min 33 s', '1 h 30 min', '43 h', '–']
     """
-    seconds = round(seconds)
-    if seconds < 60:
-        return f"{seconds} s"
-    if seconds < 3600:
-        return f"{seconds // 60} min {seconds % 60:02d} s"
-    return f"{seconds // 3600} h {seconds % 3600 // 60:02d} min"
+    if seconds is None:
+        return "–"
+    if round(seconds) < 60:
+        return f"{seconds:.2g} s" if seconds < 10 else f"{seconds:.0f} s"
+    minutes, more_seconds = divmod(round(seconds), 60)
+    if minutes < 60:
+        return f"{minutes} min {more_seconds} s" if more_seconds else f"{minutes} min"
+    hours, minutes = divmod(minutes, 60)
+    return f"{hours} h {minutes} min" if minutes and hours < 24 else f"{hours} h"

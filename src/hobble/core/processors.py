@@ -2,6 +2,7 @@
 
 import os
 import platform
+import re
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -32,18 +33,14 @@ def multiplies_bfloat16(cpuinfo: Path = CPUINFO, environment: Mapping[str, str] 
     """
     if environment.get("ONEDNN_MAX_CPU_ISA", "").upper() in WITHOUT_BFLOAT16:
         return False
-    try:
-        flags = cpuinfo.read_text()
-    except OSError:
-        return False
-    return "avx512_bf16" in flags or "amx_bf16" in flags
+    return "avx512_bf16" in _read(cpuinfo) or "amx_bf16" in _read(cpuinfo)
 
 
 def processor_name(cpuinfo: Path = CPUINFO) -> str:
     """The name of this machine's processor model, or "unknown"."""
-    try:
-        lines = cpuinfo.read_text(encoding="utf-8", errors="replace").splitlines()
-    except OSError:
-        lines = []
-    names = [line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")]
-    return names[0] if names else platform.processor() or "unknown"
+    found = re.search(r"^model name\s*:(.*)", _read(cpuinfo), re.MULTILINE)
+    return found[1].strip() if found else platform.processor() or "unknown"
+
+
+def _read(cpuinfo: Path) -> str:
+    return cpuinfo.read_text(encoding="utf-8", errors="replace") if cpuinfo.is_file() else ""

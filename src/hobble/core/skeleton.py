@@ -23,7 +23,6 @@ SIDE_WORDS = (("Left", "Right"), ("left", "right"), ("LEFT", "RIGHT"))
 # rLeg.
 SIDE_LETTER = re.compile(r"(?<![^_. -])[LRlr](?![^_. -])|^[LRlr](?=[A-Z])")
 OTHER_LETTER = str.maketrans("LRlr", "RLrl")
-PAIRED_NAMES = "the same except for Left and Right, or L and R, as in LeftLeg, L_Leg, Leg.L, LLeg"
 
 
 def other_side(name: str) -> str:
@@ -180,13 +179,15 @@ class Skeleton:
         A joint without a counterpart has its own index. Raises HobbleError if the joints of two roles such
         as "left_knee" and "right_knee" are not counterparts by name.
         """
-        swap = np.array([self._counterpart(name) for name in self.joints])
+        others = [(name, other_side(name)) for name in self.joints]
+        swap = np.array([self.index(other if other in self.joints else name) for name, other in others])
         for role, left in self.roles.items():
             right = self.roles.get(role.replace("left_", "right_", 1))
             if right not in (None, left) and self.joints[swap[self.index(left)]] != right:
-                raise self._mirror_error(
-                    f"{left} is the {role.replace('_', ' ')} and {right} the right one, but their names do "
-                    f"not match. Name the joints of both sides {PAIRED_NAMES}."
+                raise HobbleError(
+                    f"skeleton {self.name} cannot be mirrored: {left} is the {role.replace('_', ' ')} and "
+                    f"{right} the right one, but their names do not match. Name the joints of both sides the "
+                    "same except for Left and Right, or L and R, as in LeftLeg, L_Leg, Leg.L, LLeg."
                 )
         return swap
 
@@ -201,17 +202,11 @@ class Skeleton:
         across = [tuple(self.joints[swap[self.index(joint)]] for joint in link) for link in self.links]
         for link, other in zip(self.links, across, strict=True):
             if other not in self.links:
-                raise self._mirror_error(
-                    f"its links have {'-'.join(link)} but not {'-'.join(other)}. Add the missing link."
+                raise HobbleError(
+                    f"skeleton {self.name} cannot be mirrored: its links have {'-'.join(link)} but not "
+                    f"{'-'.join(other)}. Add the missing link."
                 )
         return np.array([self.links.index(other) for other in across], int)
-
-    def _mirror_error(self, why: str) -> HobbleError:
-        return HobbleError(f"skeleton {self.name} cannot be mirrored: {why}")
-
-    def _counterpart(self, name: str) -> int:
-        other = other_side(name)
-        return self.joints.index(other if other in self.joints else name)
 
     def children(self, joint: int) -> list[int]:
         """Indices of the joints whose parent is the joint with index `joint`."""

@@ -13,9 +13,8 @@ from pathlib import Path
 import numpy as np
 
 from hobble.core.errors import InputError
-from hobble.core.files import write_text
+from hobble.core.files import MAX_TEXT_BYTES, read_text, write_text
 from hobble.core.quat import Array
-from hobble.core.untrusted import MAX_TEXT_BYTES, read_text
 from hobble.labels.clip_labels import GAITS, Labels
 
 FILE_GAITS = ("stand", "walk", "jog", "run", "crouch", "jump", "crawl", "unknown")  # columns of `.gait`

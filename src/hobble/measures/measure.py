@@ -31,9 +31,8 @@ import yaml
 from pydantic import Field, create_model
 
 from hobble.core.errors import HobbleError
-from hobble.core.files import Json, read_json
+from hobble.core.files import Json, read_json, read_yaml
 from hobble.core.section import Section
-from hobble.core.untrusted import read_yaml
 from hobble.runtime.options import Runtime
 
 Row = Mapping[str, object]  # a row of a CSV table: column -> number, text or None

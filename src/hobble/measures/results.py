@@ -5,7 +5,7 @@ from pathlib import Path
 import pandas
 
 from hobble.core.errors import HobbleError
-from hobble.core.untrusted import read_yaml
+from hobble.core.files import read_yaml
 from hobble.report.gather import PUBLISHED
 
 

@@ -21,8 +21,7 @@ from pydantic import Field
 
 from hobble.core.declared import read_declared
 from hobble.core.errors import InputError
-from hobble.core.files import Json, read_json, write_tables, write_text
-from hobble.core.untrusted import printable, read_yaml
+from hobble.core.files import Json, printable, read_json, read_yaml, write_tables, write_text
 from hobble.report.gather import PUBLISHED
 
 # Parts that people can tick: those of Ferre et al., and as an option (`report.parts: sided`) more exact ones.

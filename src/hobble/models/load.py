@@ -19,11 +19,10 @@ from hobble.channels import CHANNEL_NAMES, all_channels, channel
 from hobble.channels.speed_limits import Limits
 from hobble.core.declared import ArrayOf, check_arrays, read_declared
 from hobble.core.errors import InputError
-from hobble.core.files import load_npz
+from hobble.core.files import load_npz, read_yaml
 from hobble.core.quat import Array
 from hobble.core.section import ShortName
 from hobble.core.skeleton import NEEDED_ROLES, Skeleton, skeleton_from_data
-from hobble.core.untrusted import read_yaml
 from hobble.models import DEFAULT_KIND, NETWORK_KINDS, options_of_kind
 from hobble.models.network import FACTS, TERRAIN_SIDE, Network, TrainingFacts
 from hobble.rows.layout import GAITS, RowLayout, layout_from_data

@@ -10,8 +10,7 @@ import urllib.request
 from pathlib import Path
 
 from hobble.core.errors import InputError
-from hobble.core.files import atomic_path
-from hobble.core.untrusted import printable
+from hobble.core.files import atomic_path, printable
 from hobble.motion.read import MOST_BYTES
 
 log = logging.getLogger("hobble.download")

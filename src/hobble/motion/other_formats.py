@@ -23,8 +23,8 @@ import numpy as np
 
 from hobble.core import quat
 from hobble.core.errors import InputError
+from hobble.core.files import printable, read_bytes
 from hobble.core.quat import Array
-from hobble.core.untrusted import printable, read_bytes
 from hobble.motion.read import EXPORT, MOST_BYTES, MOST_JOINT_POSES, Bvh, frame_rate, read_bvh, refuse_pointer
 
 MOTION_SUFFIXES = (".bvh", ".glb", ".gltf", ".fbx")

@@ -19,9 +19,9 @@ import numpy as np
 from hobble.core import quat
 from hobble.core.clip import Clip
 from hobble.core.errors import InputError
+from hobble.core.files import read_bytes
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
-from hobble.core.untrusted import read_bytes
 
 # Limits. One hour at 60 Hz on the largest known rig (191 joints) has 41 million joint poses (frames times
 # joints). Their rotations take 1.3 GB of memory.

@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 
 from hobble.core.errors import InputError
+from hobble.core.files import printable, read_text, read_yaml
 from hobble.core.skeleton import Skeleton
-from hobble.core.untrusted import printable, read_text, read_yaml
 from hobble.motion.body import ARM, LEG, SIDES, TRUNK, lowest_common_ancestor, path_between, path_to_root
 from hobble.motion.names import KINDS, limb_parts, part_of, side_of
 

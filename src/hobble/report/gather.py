@@ -5,8 +5,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from hobble.core.files import Json, read_json, read_numbers
-from hobble.core.untrusted import read_yaml
+from hobble.core.files import Json, read_json, read_numbers, read_yaml
 from hobble.models.load import load_network
 from hobble.report.parts import citation
 

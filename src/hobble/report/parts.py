@@ -18,22 +18,7 @@ import numpy as np
 import yaml
 from markupsafe import Markup
 
-
-def format_duration(seconds: float | None) -> str:
-    """A time as text in a suitable unit; a dash for None.
-
-    >>> [format_duration(seconds) for seconds in (0.42, 59.4, 59.6, 93, 5400, 154800, None)]
-    ['0.42 s', '59 s', '1 min', '1 min 33 s', '1 h 30 min', '43 h', '–']
-    """
-    if seconds is None:
-        return "–"
-    if round(seconds) < 60:
-        return f"{seconds:.2g} s" if seconds < 10 else f"{seconds:.0f} s"
-    minutes, more_seconds = divmod(round(seconds), 60)
-    if minutes < 60:
-        return f"{minutes} min {more_seconds} s" if more_seconds else f"{minutes} min"
-    hours, minutes = divmod(minutes, 60)
-    return f"{hours} h {minutes} min" if minutes and hours < 24 else f"{hours} h"
+from hobble.core.messages import format_duration as format_duration
 
 
 def format_bytes(count: float | None) -> str:

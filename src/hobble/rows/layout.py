@@ -18,9 +18,9 @@ import numpy as np
 from hobble.channels import channel
 from hobble.channels.channel import read_through_curve
 from hobble.core.errors import HobbleError, InputError
+from hobble.core.files import printable
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
-from hobble.core.untrusted import printable
 from hobble.labels.local_phase import MIRRORED_PARTS
 
 GAITS = ("stand", "walk", "jog", "crouch", "jump", "bump")

@@ -9,9 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from hobble.core.errors import InputError
-from hobble.core.files import load_npy, load_npz
+from hobble.core.files import load_npy, load_npz, printable, read_text
 from hobble.core.quat import Array
-from hobble.core.untrusted import printable, read_text
 from hobble.terrain import options
 
 MAX_CELLS = 1 << 26  # largest number of cells of a map: 8192 x 8192, 512 MB, 322 x 322 m with cells of 3.9 cm

@@ -13,10 +13,9 @@ import torch
 
 from hobble.core.declared import ArrayOf, check_arrays
 from hobble.core.errors import HobbleError, InputError
-from hobble.core.files import DELETE_IT, Arrays, load_npz, write_text
+from hobble.core.files import DELETE_IT, Arrays, load_npz, printable, write_text
 from hobble.core.processors import count_cores, multiplies_bfloat16
 from hobble.core.skeleton import Skeleton
-from hobble.core.untrusted import printable
 from hobble.database.chunks import FILE
 from hobble.database.reader import Database
 from hobble.models.model import Options, Trainable, TrainedOptions, TrainingStep

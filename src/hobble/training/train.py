@@ -22,7 +22,7 @@ from torch import Tensor
 from hobble.channels import channel
 from hobble.core.errors import HobbleError
 from hobble.core.files import save_npz
-from hobble.core.messages import duration
+from hobble.core.messages import format_duration
 from hobble.core.skeleton import Skeleton
 from hobble.database.reader import Database
 from hobble.models.load import load_network
@@ -190,7 +190,7 @@ class TrainingRecorder:
         """Log the errors, the speed and the time left."""
         state, seconds = self.state, time.perf_counter() - self.began
         speed = (state.samples - self.samples_before) / seconds
-        left = duration((self.goal - state.samples) / speed)
+        left = format_duration((self.goal - state.samples) / speed)
         train_mse, held_out_mse = state.history[-1][4:6]
         errors = f"error {train_mse:.4f}, held out {held_out_mse:.4f}"
         # The terminal shows the share done and what follows it, see snakemake_logger_plugin_hobble.
@@ -289,7 +289,7 @@ def run(
         began = time.perf_counter()
         built, rows = build(data, network, clips or {})
         seconds = time.perf_counter() - began
-        log.info("%s, from %d rows in %s", built.description, rows, duration(seconds))
+        log.info("%s, from %d rows in %s", built.description, rows, format_duration(seconds))
         write(built, {"passes": 1, "samples": rows, "steps": 0})
         errors = errors_on_held_out(data, StandardisedNetwork(load_network(weights)))
         lines = [[1, 1, rows, seconds, float("nan"), *errors]]

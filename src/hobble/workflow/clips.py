@@ -31,7 +31,7 @@ from hobble.core.clip_files import (
     unused_file_notes,
 )
 from hobble.core.errors import HobbleError, InputError
-from hobble.core.untrusted import check_regular, read_text
+from hobble.core.files import check_regular, read_text
 from hobble.hurt.options import HURT_CHANNEL, Hurt
 from hobble.synthetic.options import WRITTEN_LABEL_SUFFIXES
 

@@ -19,9 +19,8 @@ INFRASTRUCTURE = {
     "hobble.config": "its values are params of the rules",
     "hobble.workflow": "tells the Snakefile which jobs there are, and runs them",
     "hobble.core.errors": "decides only the wording of errors",
-    "hobble.core.files": "reads a file back as it was written, or refuses it",
+    "hobble.core.files": "only limits what is read, and reads a file back as it was written, or refuses it",
     "hobble.core.section": "checks the configuration before any job runs",
-    "hobble.core.untrusted": "only limits what is read",
 }
 # Calls such as logger.info(...) are not hashed. LOGGERS are names of loggers, LOG_METHODS those of methods.
 LOGGERS = {"log", "logger", "logging", "warnings"}

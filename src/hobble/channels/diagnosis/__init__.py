@@ -12,9 +12,8 @@ from pydantic import Field
 
 from hobble.channels.channel import ClipChannel, ClipSource, HasLinks
 from hobble.core.errors import InputError
-from hobble.core.files import read_table
+from hobble.core.files import printable, read_table
 from hobble.core.section import RelativePath, Section
-from hobble.core.untrusted import printable
 
 # Three groups of diagnoses that Rueangsirarak et al. (2018) distinguish by gait.
 DIAGNOSES = ("joint problem", "muscle weakness", "neurological defect")

@@ -13,8 +13,8 @@ from hobble.channels.channel import Channel, ClipSource, HasLinks
 from hobble.channels.injury.status import clip_severity, parse_links
 from hobble.core.clip import Clip
 from hobble.core.errors import InputError
+from hobble.core.files import MAX_TEXT_BYTES, read_bytes
 from hobble.core.quat import Array
-from hobble.core.untrusted import MAX_TEXT_BYTES, read_bytes
 
 ZERO = re.compile(r"\s*0+(\.0*)?\s*")  # matches a severity of 0, such as "0" or "0.00"
 

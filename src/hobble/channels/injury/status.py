@@ -24,9 +24,8 @@ import numpy as np
 
 from hobble.core.clip import Clip
 from hobble.core.errors import InputError
-from hobble.core.files import write_text
+from hobble.core.files import printable, read_text, write_text
 from hobble.core.quat import Array
-from hobble.core.untrusted import printable, read_text
 
 FPS = 60.0  # frames a second of every clip, whatever the rate of its BVH file
 HIGHEST_SEVERITY = 10.0

@@ -16,9 +16,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hobble.core.errors import InputError
-from hobble.core.files import atomic_path
+from hobble.core.files import atomic_path, read_bytes
 from hobble.core.quat import Array
-from hobble.core.untrusted import read_bytes
 from hobble.models.forward import phase_shares, weights_at
 from hobble.models.load import LARGEST_WEIGHT, MOST_LAYERS, STATISTICS
 
