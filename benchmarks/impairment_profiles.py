@@ -11,7 +11,7 @@ import numpy as np
 
 from hobble.core.files import load_npz, write_json
 from hobble.core.quat import Array
-from hobble.hurt.amounts import CURVES, HARMONICS, PROFILES_FILE
+from hobble.hurt.effects import CURVES, HARMONICS, PROFILES_FILE
 
 NORMAL = "normal"  # name of the walk without an impairment
 SOURCE = "Jun et al. 2020, IEEE Access 8: means over ten people who imitated impairments of the right leg"

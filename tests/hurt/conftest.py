@@ -2,7 +2,6 @@
 
 import functools
 from collections.abc import Callable
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,6 +13,7 @@ from hobble.labels.label import label_clip
 from hobble.labels.options import LabelOptions
 from hobble.motion.make import make_clip
 from hobble.motion.options import ClipMotion
+from hobble.motion.skeleton_file import find_skeleton, skeleton_folder
 from hobble.synthetic.generate_clip import walk_from_plan
 from hobble.synthetic.plan import Segment
 
@@ -26,44 +26,36 @@ SEGMENTS = {
     "uneven": ([Segment("walk", 105, 20, 8)], "uneven"),
 }
 CAPTURED = {
-    "07_01": ("walk", "flat"),
-    "105_29": ("walk", "flat"),
-    "09_01": ("jog", "flat"),
-    "03_01": ("walk", "rocky"),
+    "cmu/07_01": ("walk", "flat"),
+    "cmu/105_29": ("walk", "flat"),
+    "cmu/09_01": ("jog", "flat"),
+    "cmu/03_01": ("walk", "rocky"),
+    "ferre/Injured_Walk_LLL_extended_converted": (None, "rocky"),
+    "ferre/Injured_Jog_LLA": (None, "rocky"),
 }
 
 
-def labelled(clip: Clip, gait: str, flat: bool) -> Healthy:
-    options = LabelOptions()
+def labelled(clip: Clip, gait: str | None, flat: bool) -> Healthy:
     report = {"source_frames": len(clip), "source_fps": clip.fps}
-    labels, _ = label_clip(clip, [], report, gait, "flat" if flat else "rocky", options)
+    labels, _ = label_clip(clip, [], report, gait, "flat" if flat else "rocky", LabelOptions())
     return clip, labels, flat
 
 
 @pytest.fixture(scope="session")
-def made(holden31: Skeleton) -> Callable[[str], Healthy]:
-    @functools.cache
-    def make(name: str) -> Healthy:
-        segments, ground = SEGMENTS[name]
-        frames = round(60 * sum(s.seconds for s in segments))
-        result = walk_from_plan(name, holden31, segments, frames, ground, 60, 1)
-        return labelled(result.clip, "jog" if name == "jog" else "walk", ground == "flat")
-
-    return make
-
-
-@pytest.fixture(scope="session")
-def captured(shared: Path, root: Path) -> Callable[[str], Healthy]:
-    skeletons = root / "config/skeletons"
+def made(holden31: Skeleton, request: pytest.FixtureRequest) -> Callable[[str], Healthy]:
+    """Generates a clip of SEGMENTS, or retargets one of CAPTURED."""
 
     @functools.cache
     def make(name: str) -> Healthy:
-        gait, ground = CAPTURED[name]
-        options = ClipMotion(ground=ground)
-        file = shared / "mocap/cmu" / f"{name}.bvh"
-        clip, _ = make_clip(
-            file, skeletons / "holden31.yaml", skeletons, clip=name, skeleton_name="holden31", options=options
-        )
+        if name in CAPTURED:
+            gait, ground = CAPTURED[name]
+            file = request.getfixturevalue("shared") / "mocap" / f"{name}.bvh"
+            options, folder = ClipMotion(ground=ground), skeleton_folder()
+            clip, _ = make_clip(file, find_skeleton("holden31"), folder, file.stem, "holden31", options)
+        else:
+            segments, ground = SEGMENTS[name]
+            frames, gait = round(60 * sum(s.seconds for s in segments)), segments[-1].gait
+            clip = walk_from_plan(name, holden31, segments, frames, ground, 60, 1).clip
         return labelled(clip, gait, ground == "flat")
 
     return make

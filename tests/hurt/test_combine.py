@@ -1,7 +1,5 @@
 """The arms of one captured clip with the legs of another."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -10,24 +8,15 @@ from hobble.core.errors import HobbleError
 from hobble.core.quat import Array
 from hobble.hurt.combine import combine_clips, joints_of_part
 from hobble.labels.clip_labels import Labels
-from hobble.labels.label import label_clip
-from hobble.labels.options import LabelOptions
-from hobble.motion.make import make_clip
-from hobble.motion.options import ClipMotion
-from hobble.motion.skeleton_file import find_skeleton, skeleton_folder
 
 Labelled = tuple[Clip, Labels]
 
 
 @pytest.fixture(scope="module")
-def clips(shared: Path) -> tuple[Labelled, Labelled]:
+def clips(made) -> tuple[Labelled, Labelled]:
     """A walk with a hurt left shank and a jog with a hurt left forearm, captured by Ferre et al."""
-    out = []
-    for name in ("Injured_Walk_LLL_extended_converted", "Injured_Jog_LLA"):
-        file, skeleton = shared / "mocap/ferre" / f"{name}.bvh", find_skeleton("holden31")
-        clip, report = make_clip(file, skeleton, skeleton_folder(), name, "holden31", ClipMotion())
-        out.append((clip, label_clip(clip, [], report, None, "rocky", LabelOptions())[0]))
-    return out[0], out[1]
+    walk, jog = (made(f"ferre/Injured_{name}") for name in ("Walk_LLL_extended_converted", "Jog_LLA"))
+    return walk[:2], jog[:2]
 
 
 def mean_poses(of: Labelled, joints: list[int]) -> Array:

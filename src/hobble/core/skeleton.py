@@ -153,6 +153,18 @@ class Skeleton:
         """Index of the joint with the role `role`."""
         return self.index(self.roles[role])
 
+    def path_up(self, joint: int, below: int = -1) -> list[int]:
+        """The joint itself, its parent, and so on: to the root, or to the joint under the joint `below`.
+
+        Empty if `below` is not an ancestor of the joint.
+        """
+        out = [joint]
+        while self.parents[out[-1]] != below:
+            if self.parents[out[-1]] < 0:
+                return []
+            out.append(self.parents[out[-1]])
+        return out
+
     @property
     def leg_length(self) -> float:
         """Length of the left thigh and shank together, cm.

@@ -15,7 +15,6 @@ from hobble.core.errors import HobbleError
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 from hobble.core.smooth import smoothstep
-from hobble.hurt.effects import path_up
 from hobble.hurt.healthy_clip import interpolate_rotations
 from hobble.labels.clip_labels import Labels
 
@@ -54,8 +53,8 @@ def joints_of_part(skeleton: Skeleton, part: str) -> list[int]:
     """Indices of the joints of a part of PARTS: all below the chest, or below the hips for the upper body."""
     above = skeleton.role("hips" if part == "upper body" else "chest")
     # The uppermost joints of the part.
-    roots = {path_up(skeleton, skeleton.role(role), above)[-1] for role in PARTS[part]}
-    return [j for j in range(len(skeleton.joints)) if roots & set(path_up(skeleton, j))]
+    roots = {skeleton.path_up(skeleton.role(role), above)[-1] for role in PARTS[part]}
+    return [j for j in range(len(skeleton.joints)) if roots & set(skeleton.path_up(j))]
 
 
 def _cycles(labels: Labels) -> Array:

@@ -1,15 +1,172 @@
-"""Turns the severities of the links into the changes of each frame of a clip."""
+"""What hurt parts of the body change in each frame of a clip, from the severities of its links.
 
+Tables say how much a hurt part changes the motion at severity 10. They come from profiles of impaired
+people: how real impaired walks differ from the same people's normal walks.
+
+`people.json` was derived with `benchmarks/impairment_profiles.py` from the recordings of Jun et al.
+2020 ("Pathological gait classification using Kinect v2 and gated recurrent neural networks", IEEE Access 8).
+Ten people each walked normally and imitated five impairments of the right leg. The file holds only means over
+these people.
+"""
+
+import functools
 from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from hobble.channels.injury import CHANNEL
 from hobble.channels.speed_limits import SUM_NORM
+from hobble.core.files import read_json
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 from hobble.core.smooth import gaussian, smoothstep
-from hobble.hurt.amounts import GUARD_CHANGES, changes_of_hurt_part
+
+PROFILES_FILE = Path(__file__).with_name("people.json")
+# Angles over a gait cycle, in degrees. A profile says how each of them changes. The names are those of
+# `hobble.gait.cycles`.
+CURVES = ("trunk_forward", "trunk_left", "pelvis_left_up", "pelvis_turn_left", "shoulders_turn_left")
+HARMONICS = 2  # a profile has the mean and this many harmonics of each curve
+
+
+@functools.cache
+def read_profiles() -> dict[str, dict[str, Any]]:
+    """The profiles in PROFILES_FILE by name: antalgic, stiff_legged, steppage, trendelenburg, lurch.
+
+    A profile is a walk with an impairment of the right leg, compared with the same people's normal walk.
+
+    Ratios of the impaired walk to the normal walk: speed; stride (time of a cycle); step_hurt, step_sound
+    (length of the step onto the hurt and onto the sound foot); knee (range of the hurt knee's flexion);
+    arm_hurt, arm_sound (how far the arm of the hurt and of the sound side swings).
+
+    Differences: strike: cycles by which the sound foot lands later. stance_hurt, stance_sound: cycles by
+    which a stance is longer. width: leg lengths by which steps are wider. curves: name of CURVES -> 5 numbers
+    in degrees: the change of the curve's mean, then the changes of the factors of cosine and sine of each
+    harmonic. The curve begins when the hurt foot lands. Its time is warped so that the sound foot lands half
+    a cycle later.
+    """
+    profiles: dict[str, dict[str, Any]] = read_json(PROFILES_FILE)["profiles"]
+    return profiles
+
+
+# How much a hurt part of the body changes the motion at severity 10.
+#
+# Two tables decide this. MIXES mixes impairment profiles, which were derived from recordings of people.
+# ADDED_CHANGES has the changes that the recordings do not show, because their feet and toes are inaccurate,
+# and arms, shoulders, neck and back were not hurt. With a hurt back, the body leans and bends its knees
+# (`forward`, `crouch`) about as in clip 105_26 of CMU, which counts as severity 7. Values of one side are for
+# a part that is hurt on the right. Names that end with `_sound` are changes of the other side.
+
+# Part -> impairment profiles and their weights. Parts that are not here have only ADDED_CHANGES.
+MIXES: dict[str, dict[str, float]] = {
+    "pelvis": {"trendelenburg": 0.55, "lurch": 0.25, "antalgic": 0.2},
+    "hip": {"trendelenburg": 0.75, "antalgic": 0.25},
+    "thigh": {"antalgic": 0.6, "stiff_legged": 0.4},
+    "shank": {"antalgic": 0.8, "stiff_legged": 0.15, "steppage": 0.05},
+    "foot": {"antalgic": 0.65, "steppage": 0.35},
+}
+# Part -> factor on the mixed curves of trunk, pelvis and shoulders.
+CURVE_FACTOR: dict[str, float] = {"pelvis": 1.6, "hip": 1.8, "thigh": 1.25, "shank": 1.5, "foot": 0.9}
+# Part -> changes that the recordings do not show.
+# - Ratios to the healthy clip: speed; stride (time); lift (height of the swinging foot); push and strike
+#   (pitch of the foot while the heel is up and while the toe is up); arm (its swing); back and head
+#   (movement of the joints of back and neck). With a smaller push than these, the heel stays on the ground
+#   for so long that the hips sink, and the sound knee bends more than in the recordings.
+# - Share: vault (how far the standing knee straightens while the other leg swings; 1 is nearly straight).
+# - Leg lengths: out (how far the foot swings outward).
+# - Degrees: toe_out; crouch (knee flexion added in stance); forward and side (lean of the trunk forward and
+#   to the hurt side); list (pelvis up on the hurt side while that leg swings); nod (head forward).
+ADDED_CHANGES: dict[str, dict[str, float]] = {
+    "pelvis": {
+        "speed": 0.74, "stride": 1.15, "turn": 0.8, "push": 0.65, "back": 0.6, "lift": 0.8,
+        "lift_sound": 0.3, "push_sound": 0.75, "list": 2.0,
+    },
+    "hip": {
+        "speed": 0.66, "stride": 1.2, "turn": 0.8, "push": 0.7, "vault": 0.9, "lift": 0.75,
+        "lift_sound": 0.3, "push_sound": 0.4, "forward": 2.0, "out": 0.02,
+    },
+    "thigh": {
+        "speed": 0.58, "stride": 1.08, "turn": 0.8, "push": 0.4, "vault": 1.0, "lift": 0.1,
+        "lift_sound": 0.3, "push_sound": 0.45, "out": 0.07, "strike": 0.4, "list": 5.0, "toe_out": 8.0,
+        "vault_sound": 0.5,
+    },
+    "shank": {
+        "speed": 0.62, "stride": 1.04, "turn": 0.8, "push": 0.55, "lift": 0.4, "lift_sound": 0.3,
+        "push_sound": 0.45, "strike": 0.0, "crouch": 19.0, "list": 2.0,
+    },
+    "foot": {
+        "speed": 0.66, "stride": 1.06, "turn": 0.8, "push": 0.15, "lift": 0.6, "lift_sound": 0.3,
+        "push_sound": 0.62, "strike": 1.0, "side": 2.5, "toe_out": 18.0,
+    },
+    "back": {
+        "speed": 0.68, "push": 0.6, "push_sound": 0.6, "stride": 1.12, "forward": 17.0, "crouch": 9.0,
+        "crouch_sound": 9.0, "back": 0.3, "arm": 0.4, "arm_sound": 0.4, "nod": -5.0,
+    },
+    "neck": {
+        "speed": 0.85, "head": 0.25, "back": 0.6, "forward": 3.0, "nod": 8.0, "arm": 0.6, "arm_sound": 0.6,
+    },
+    "shoulder": {"speed": 0.88, "side": 2.5, "forward": 2.0, "back": 0.8},
+    "upper arm": {"speed": 0.88, "side": 2.0, "forward": 3.0},
+    "forearm": {"speed": 0.90, "forward": 2.0},
+    "hand": {"speed": 0.94},
+}  # fmt: skip
+# Changes at severity 10 and guarding 1, for a leg or back that hurts on the right, in addition to the above.
+# From CMU 105_25 and the walks of Ferre et al. (2019): trunk 21 to 30 degrees forward, a nod of 12 to 24
+# degrees (`dip`) as the hurt foot bears weight, elbows bent by 40 to 77 degrees (`guard`), both knees
+# bent, eyes on the ground.
+GUARD_CHANGES: dict[str, float] = {
+    "forward": 27.0, "nod": 10.0, "dip": 16.0, "crouch": 10.0, "crouch_sound": 6.0, "guard": 0.95,
+    "guard_sound": 0.75,
+}  # fmt: skip
+# The changes that are ratios.
+RATIOS = (
+    "speed", "stride", "turn", "lift_sound", "push", "push_sound", "lift", "strike", "arm", "arm_sound",
+    "back", "head",
+)  # fmt: skip
+# Factor on the changes of timing in the recordings. The recordings show only half of an early landing,
+# because in them a slow ankle counts as stance. Besides, a network that is trained on hurt clips smooths the
+# effect.
+TIMING_FACTOR = 1.85
+# Part -> length of the step onto the hurt foot, as a ratio to the healthy clip. It replaces the ratio of the
+# profiles.
+STEP_RATIO = {"thigh": 0.2, "shank": 0.44, "foot": 0.58}
+
+
+@functools.cache
+def changes_of_hurt_part(part: str) -> tuple[dict[str, float], Array]:
+    """Name -> change, for a part that is hurt on the right at severity 10, and (5, 5) factors of CURVES.
+
+    A ratio is given as its difference from 1. The names are those of ADDED_CHANGES and these: `off`,
+    `off_sound`, `land_sound`: cycles by which a foot leaves or lands later. `step`: ratio of the length of
+    the step onto the hurt foot, minus the ratio that speed and stride time alone would give. `width`: leg
+    lengths by which steps are wider. For the factors see `read_profiles`.
+    """
+    changes, out = dict(ADDED_CHANGES[part]), {}
+    curves: Array = np.zeros((len(CURVES), 1 + 2 * HARMONICS))
+    if mix := MIXES.get(part):
+        profiles = [(share, read_profiles()[name]) for name, share in mix.items()]
+
+        def mixed(name: str) -> float:
+            return float(sum(share * profile[name] for share, profile in profiles))
+
+        harmonics = [share * np.array([p["curves"][name] for name in CURVES]) for share, p in profiles]
+        curves = CURVE_FACTOR.get(part, 1.0) * np.sum(harmonics, axis=0)
+        # How far pelvis and shoulders turn is the change `turn`.
+        curves[CURVES.index("pelvis_turn_left") :, 1:] = 0.0
+        # The ratio of the stride's length is the product of the ratios of speed and stride time.
+        stride_length = changes["speed"] * changes.get("stride", mixed("stride"))
+        out = {
+            "land_sound": TIMING_FACTOR * mixed("strike"),
+            "off": TIMING_FACTOR * mixed("stance_hurt"),
+            "off_sound": TIMING_FACTOR * (mixed("strike") + mixed("stance_sound")),
+            "step": min(STEP_RATIO.get(part, mixed("step_hurt")) - stride_length, 0.25),
+            "width": mixed("width"),
+        }
+        arms = {"arm": mixed("arm_hurt"), "arm_sound": min(mixed("arm_sound"), 1.0)}
+        changes = {"stride": mixed("stride"), **arms, **changes}
+    return out | {name: v - 1.0 if name in RATIOS else v for name, v in changes.items()}, curves
+
 
 LEFT, RIGHT = 0, 1
 SIDES = ("left", "right")
@@ -19,8 +176,7 @@ LEG = (("hip", "hip"), ("knee", "thigh"), ("heel", "shank"))
 ARM = (("shoulder", "shoulder"), ("elbow", "upper arm"), ("wrist", "forearm"))
 
 
-@dataclass(frozen=True)
-class BodyPart:
+class BodyPart(NamedTuple):
     """A part of the body: pelvis, hip, thigh, shank, foot, back, neck, shoulder, upper arm, forearm or hand.
 
     side: LEFT, RIGHT, or None on the midline.
@@ -38,34 +194,15 @@ def part_of_link(skeleton: Skeleton, link: tuple[str, str]) -> BodyPart:
             upper = skeleton.role(top)
             for role, name in limb:
                 lower = skeleton.role(f"{word}_{role}")
-                if child in path_up(skeleton, lower, upper):
+                if child in skeleton.path_up(lower, upper):
                     # Joints between the hips and the hip joint belong to the pelvis.
                     above_hip = role == "hip" and child != lower
                     return BodyPart("pelvis" if above_hip else name, side)
                 upper = lower
-            if upper in path_up(skeleton, child):  # below the ankle or the wrist
+            if upper in skeleton.path_up(child):  # below the ankle or the wrist
                 return BodyPart(last_part, side)
-    if child in path_up(skeleton, skeleton.role("chest"), skeleton.role("hips")):
-        return BodyPart("back", None)
-    if skeleton.role("chest") in path_up(skeleton, child):
-        return BodyPart("neck", None)
-    return BodyPart("back", None)
-
-
-def path_up(skeleton: Skeleton, joint: int, below: int = -1) -> list[int]:
-    """The joint itself, its parent, and so on: to the root, or to the joint under the joint `below`.
-
-    Empty if `below` is not an ancestor of the joint.
-    """
-    out = [joint]
-    while skeleton.parents[out[-1]] != below:
-        if skeleton.parents[out[-1]] < 0:
-            return []
-        out.append(skeleton.parents[out[-1]])
-    return out
-
-
-# Combines the severities of several links into the changes of each frame of a clip.
+    above_chest = skeleton.role("chest") in skeleton.path_up(skeleton.parents[child])
+    return BodyPart("neck" if above_chest else "back", None)
 
 
 HIGHEST_SEVERITY = 10.0
@@ -89,7 +226,7 @@ SIDED = (
     "side", "list", "dip", "upper", "fore", "carry", "guard", "join",
 )  # fmt: skip
 SOUND_SUFFIX = "_sound"  # names of changes of the side that is not hurt end with this
-# Factors on the CURVES (see `hobble.hurt.amounts`) that mirror the body. All curves but the first
+# Factors on the CURVES that mirror the body. All curves but the first
 # are measured to the left or on the left, so their sign changes.
 MIRROR_SIGNS = np.array([1.0, -1.0, -1.0, -1.0, -1.0])
 # Signs of a curve's factors (mean, then cosine and sine of each of the two harmonics) when the curve is
@@ -101,10 +238,10 @@ HELD_ARM_OF_PART = {"shoulder": "upper", "upper arm": "upper", "forearm": "fore"
 
 @dataclass(frozen=True)
 class Effects:
-    """The changes of each of F frames of a clip, named as in `hobble.hurt.amounts`.
+    """The changes of each of F frames of a clip, named as in ADDED_CHANGES.
 
     changes: name -> (F,) for changes of the WHOLE_BODY, (F, 2), left and right, for SIDED ones. curves:
-    (F, 5, 5) factors of CURVES, as in `read_profiles` of `hobble.hurt.amounts`. shown_severity: (F, L)
+    (F, 5, 5) factors of CURVES, as in `read_profiles`. shown_severity: (F, L)
     severities of the L links, as the motion shows them: after a change of the requested severity they follow
     over about a second.
     """
@@ -114,7 +251,7 @@ class Effects:
     shown_severity: Array = field(repr=False)
 
     def ratio(self, name: str) -> Array:
-        """A change of RATIOS (`hobble.hurt.amounts`) as a ratio to the healthy clip: (F,) or (F, 2)."""
+        """A change of RATIOS as a ratio to the healthy clip: (F,) or (F, 2)."""
         return np.maximum(1.0 + self.changes[name], LEAST_RATIO)
 
 
@@ -134,12 +271,11 @@ def effects_of_severities(
     terms: dict[str, list[Array]] = {name: [np.zeros(frames)] for name in WHOLE_BODY}
     terms |= {name: [np.zeros((frames, 2))] for name in SIDED}
     curves: list[Array] = [np.zeros((frames, 5, 5))]
-    parts: dict[tuple[str, int | None], Array] = {}
+    parts: dict[BodyPart, Array] = {}
     for link, column in zip(skeleton.links, strength.T, strict=True):
-        body_part = part_of_link(skeleton, link)
         # Several links of one part, such as fingers, count as one link: the worst.
-        key = (body_part.name, body_part.side)
-        parts[key] = np.maximum(parts.get(key, 0.0), column)
+        part = part_of_link(skeleton, link)
+        parts[part] = np.maximum(parts.get(part, 0.0), column)
     guarded = np.broadcast_to(np.clip(guarding, 0.0, 1.0) ** GUARD_POWER, frames)
 
     def add(name: str, values: Array, side: int | None) -> None:
@@ -148,35 +284,30 @@ def effects_of_severities(
             terms[name].append(values)
             return
         both = np.zeros((frames, 2))
-        if name == "arms":  # the change "arm" of both sides
-            name, both = "arm", both + values[:, None]
-        else:
-            hurt = RIGHT if side is None else side  # a part on the midline changes both sides alike
-            both[:, 1 - hurt if name.endswith(SOUND_SUFFIX) else hurt] = values
+        hurt = RIGHT if side is None else side  # a part on the midline changes both sides alike
+        both[:, 1 - hurt if name.endswith(SOUND_SUFFIX) else hurt] = values
         terms[name.removesuffix(SOUND_SUFFIX)].append(both)
 
-    for (part, side), part_strength in parts.items():
+    for (name_of_part, side), part_strength in parts.items():
         if not part_strength.any():
             continue
-        for name, amount in changes_of_hurt_part(part).items():
-            if name == "curves":
-                curves.append(part_strength[:, None, None] * _curves_of_side(np.asarray(amount), side))
-            elif name == "speed":
-                add(name, part_strength ** (SPEED_POWER / STRENGTH_POWER) * amount, side)
-            else:
-                add(name, part_strength * amount, side)
-        if part in GUARDED_PARTS and guarded.any():
+        changes, of_part = changes_of_hurt_part(name_of_part)
+        curves.append(part_strength[:, None, None] * _curves_of_side(of_part, side))
+        for name, amount in changes.items():
+            power = SPEED_POWER / STRENGTH_POWER if name == "speed" else 1.0
+            add(name, part_strength**power * amount, side)
+        if name_of_part in GUARDED_PARTS and guarded.any():
             # An injury on the midline is guarded by both sides, each at a share with which their sum is 1.
             sides = (LEFT, RIGHT) if side is None else (side,)
             share = len(sides) ** (-1 / SUM_NORM)
             for name, amount in GUARD_CHANGES.items():
                 for each in sides:
                     add(name, share * guarded * part_strength * amount, each)
-        if part in LEG_PARTS:
+        if name_of_part in LEG_PARTS:
             worst = HIGHEST_SEVERITY * np.clip(part_strength, 0.0, 1.0) ** (1 / STRENGTH_POWER)
             add("join", smoothstep((worst - JOIN_FROM) / (JOIN_AT - JOIN_FROM)), side)
-        if part in HELD_ARM_OF_PART and side is not None:
-            add(HELD_ARM_OF_PART[part], part_strength, side)
+        if name_of_part in HELD_ARM_OF_PART:
+            add(HELD_ARM_OF_PART[name_of_part], part_strength, side)
     shown = np.round(HIGHEST_SEVERITY * np.clip(strength, 0.0, 1.0) ** (1 / STRENGTH_POWER), 3)
     shown = np.where(shown < LEAST_SEVERITY, 0.0, shown)
     return Effects({name: _together(each) for name, each in terms.items()}, _together(curves), shown)

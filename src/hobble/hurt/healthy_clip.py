@@ -29,12 +29,12 @@ JOG_SECONDS = 0.1  # sigma of the Gaussian that smooths the share of jogging
 class SourceStance:
     """A foot on the ground from source frame `land` to `off`."""
 
-    land: float
-    off: float
+    land: int
+    off: int
 
     @property
     def middle(self) -> float:
-        """The source frame in the middle of the stance."""
+        """The source frame, with fractions, in the middle of the stance."""
         return (self.land + self.off) / 2
 
 
@@ -51,8 +51,7 @@ class HealthyClip:
     """
 
     clip: Clip
-    labels: Labels
-    stances: tuple[list[SourceStance], list[SourceStance]] = field(repr=False)
+    stances: list[list[SourceStance]] = field(repr=False)
     swinging: np.ndarray = field(repr=False)
     swing_curve: Array = field(repr=False)
     phase: Array = field(repr=False)
@@ -72,7 +71,8 @@ def measure_healthy_clip(clip: Clip, labels: Labels) -> HealthyClip:
     frames, skeleton = len(clip), clip.skeleton
     options = LabelOptions()
     all_swings = find_swings(clip, options)
-    stances, swinging, swing_curve = [], np.zeros((frames, 2), bool), np.zeros((frames, 2))
+    stances: list[list[SourceStance]] = []
+    swinging, swing_curve = np.zeros((frames, 2), bool), np.zeros((frames, 2))
     for side in (LEFT, RIGHT):
         # `find_swings` numbers the right foot 0, the left one 1.
         swings = [(s.start, min(s.end, frames - 1)) for s in all_swings if s.foot == 1 - side]
@@ -83,26 +83,20 @@ def measure_healthy_clip(clip: Clip, labels: Labels) -> HealthyClip:
             share = (np.arange(start, end) - start + 0.5) / max(end - start, 1)  # of the swing's time
             swing_curve[start:end, side] = np.sin(np.pi * share) ** 2
         # Stances fill the time before, between and after the swings.
-        ends = [0, *(frame for swing_ends in swings for frame in swing_ends), frames - 1]
-        stances.append(
-            [
-                SourceStance(float(land), float(max(land, off)))
-                for land, off in zip(ends[::2], ends[1::2], strict=True)
-            ]
-        )
+        ends = [0, *itertools.chain(*swings), frames - 1]
+        pairs = zip(ends[::2], ends[1::2], strict=True)
+        stances.append([SourceStance(land, max(land, off)) for land, off in pairs])
     phase, known = phase_of_footsteps(labels.footsteps, frames)
     change = np.diff(phase, prepend=phase[:1])
-    phase = phase[0] + np.cumsum(np.where(change < -0.5, change + 1.0, change)) if frames else phase
     return HealthyClip(
         clip,
-        labels,
-        (stances[LEFT], stances[RIGHT]),
+        stances,
         swinging,
         swing_curve,
-        phase,
+        phase[0] + np.cumsum(np.where(change < -0.5, change + 1.0, change)),
         gaussian(known.astype(float), PHASE_KNOWN_SECONDS * clip.fps),
         gaussian(labels.gait[:, GAITS.index("jog")], JOG_SECONDS * clip.fps),
-        _cycle_lengths((stances[LEFT], stances[RIGHT]), frames, clip.fps),
+        _cycle_lengths(stances, frames, clip.fps),
         gaussian(clip.positions[:, skeleton.role("hips")][:, [0, 2]], PATH_SECONDS * clip.fps),
         _heading(clip),
         skeleton.leg_length,
@@ -121,22 +115,22 @@ def _without_contacts(start: int, end: int, touches: np.ndarray) -> tuple[int, i
     return start, end
 
 
-def _cycle_lengths(stances: tuple[list[SourceStance], list[SourceStance]], frames: int, fps: float) -> Array:
+def _cycle_lengths(stances: list[list[SourceStance]], frames: int, fps: float) -> Array:
     """(frames,) length of the cycle around each frame: frames from a foot's landing to its next landing.
 
     The cycles of both feet count. The lengths are interpolated between the middles of the cycles. The first
     stance of a foot is left out, because it begins with the clip and not with a landing.
     """
-    middles, lengths = [], []
-    for of_foot in stances:
-        for a, b in itertools.pairwise(of_foot[1:]):
-            if b.land - a.land <= LONGEST_CYCLE_SECONDS * fps:
-                middles.append((a.land + b.land) / 2)
-                lengths.append(b.land - a.land)
-    if not middles:
+    cycles = sorted(
+        ((a.land + b.land) / 2, b.land - a.land)
+        for of_foot in stances
+        for a, b in itertools.pairwise(of_foot[1:])
+        if b.land - a.land <= LONGEST_CYCLE_SECONDS * fps
+    )
+    if not cycles:
         return np.full(frames, CYCLE_SECONDS * fps)
-    order = np.argsort(middles)
-    return np.interp(np.arange(frames), np.array(middles)[order], np.array(lengths)[order])
+    middles, lengths = np.array(cycles).T
+    return np.interp(np.arange(frames), middles, lengths)
 
 
 def _heading(clip: Clip) -> Array:

@@ -1,6 +1,6 @@
 """Makes the hurt version of a healthy clip: the motion of a person with hurt parts of the body."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -8,30 +8,23 @@ from hobble.core import quat
 from hobble.core.clip import Clip
 from hobble.core.errors import HobbleError
 from hobble.core.quat import Array
-from hobble.core.skeleton import local_rotations
-from hobble.core.smooth import gaussian
+from hobble.core.skeleton import Skeleton, bone_axes, local_rotations, two_bone_knee
+from hobble.core.smooth import gaussian, smooth_above
 from hobble.hurt.effects import HIGHEST_SEVERITY, LEFT, RIGHT, SIDES, Effects, effects_of_severities
+from hobble.hurt.feet import (
+    HurtFoot,
+    ground_below,
+    join_steps,
+    move_foot,
+    place_footprints,
+    reduce_pitch,
+    shorten,
+)
 from hobble.hurt.healthy_clip import (
     HealthyClip,
     interpolate_rotations,
     interpolate_values,
     measure_healthy_clip,
-)
-from hobble.hurt.legs import (
-    HurtFoot,
-    Leg,
-    ShortenedPath,
-    ground_below,
-    hips_height,
-    join_steps,
-    knee_flexion,
-    move_foot,
-    place_footprints,
-    place_leg,
-    reach_at_flexion,
-    read_leg,
-    reduce_pitch,
-    shorten,
 )
 from hobble.hurt.timing import Timing, relabel, retime
 from hobble.hurt.upper_body import change_body
@@ -41,6 +34,13 @@ from hobble.labels.clip_labels import Labels
 # impaired walks, the sound knee is bent by 8 to 10 degrees while a stiff leg swings.
 STRAIGHT_KNEE = np.radians(9.0)
 MOST_VAULT = np.radians(14.0)  # a knee straightens by at most this, so a crouching figure stays down
+# Radians of knee flexion. Below the first value, the bend is too small to tell in which direction the knee
+# points. Above the second value, the bend is large enough. Between them, it counts partly.
+BENT = np.radians([6.0, 18.0])
+STRETCH = (0.985, 0.9985)  # least and greatest value of `Leg.longest_reach`, in leg lengths
+# For the height of the hips, the horizontal distance between hip and ankle counts as at most this share of
+# the leg's length. Otherwise there would be no height at which a leg reaches a foot that is too far away.
+LEVEL_SHARE = 0.97
 
 
 @dataclass(frozen=True)
@@ -86,28 +86,23 @@ def hurt_clip(
             f"clip {clip.name}: the severities have shape {severity.shape}, but should have shape "
             f"({len(clip)}, {len(clip.skeleton.links)}): frames, links"
         )
-    if (
-        not np.isfinite(severity).all()
-        or severity.min(initial=0) < 0
-        or severity.max(initial=0) > HIGHEST_SEVERITY
-    ):
+    if not ((severity >= 0) & (severity <= HIGHEST_SEVERITY)).all():  # neither if it is not a number
         raise HobbleError(f"clip {clip.name}: every severity should be a number from 0 to 10")
-    name = clip.name if name is None else name
+    name = name or clip.name
     if not severity.any() or len(clip) < 3:
-        unchanged = Clip(name, clip.skeleton, clip.fps, clip.rotations, clip.root, clip.translations)
-        return HurtClip(unchanged, severity, labels, np.arange(len(clip), dtype=float))
+        return HurtClip(replace(clip, name=name), severity, labels, np.arange(len(clip), dtype=float))
     if clip.translations is not None:
         raise HobbleError(f"clip {clip.name} has bones that change their length, so it cannot be hurt")
     source = measure_healthy_clip(clip, labels)
     changes = effects_of_severities(clip.skeleton, severity, clip.fps, guarding)
     timing = retime(source, changes)
     feet = [reduce_pitch(source, changes, side) for side in (LEFT, RIGHT)]
-    path = shorten(source, changes, timing.stride_ratio, None if flat else ground_below(source, feet))
-    footprints = place_footprints(source, changes, path, feet)
+    shift = shorten(source, changes, timing.stride_ratio, None if flat else ground_below(source, feet))
+    footprints = place_footprints(source, changes, shift, feet)
     if not flat:
         join_steps(source, changes, feet, footprints)
     feet = [move_foot(source, changes, feet[side], footprints[side], side) for side in (LEFT, RIGHT)]
-    out = _assemble(source, changes, timing, path, feet, name)
+    out = _assemble(source, changes, timing, shift, feet, name)
     source_frame = np.clip(np.floor(timing.body_frames + 1e-6).astype(int), 0, len(clip) - 1)
     return HurtClip(
         out, changes.shown_severity[source_frame], relabel(labels, timing, zero, margins), timing.body_frames
@@ -115,23 +110,14 @@ def hurt_clip(
 
 
 def _assemble(
-    source: HealthyClip,
-    changes: Effects,
-    timing: Timing,
-    path: ShortenedPath,
-    feet: list[HurtFoot],
-    name: str,
+    source: HealthyClip, changes: Effects, timing: Timing, shift: Array, feet: list[HurtFoot], name: str
 ) -> Clip:
     """The hurt clip, put together from the upper body, the height of the hips, and the legs.
 
-    Body and legs are sampled at their own times in `timing`.
+    shift: (F, 3) by how much the body moves. Body and legs are sampled at their own times in `timing`.
     """
     clip, skeleton = source.clip, source.clip.skeleton
     world = interpolate_rotations(change_body(source, changes), timing.body_frames)
-    shift = np.stack(
-        [path.new[:, 0] - path.old[:, 0], path.new_ground - path.old_ground, path.new[:, 1] - path.old[:, 1]],
-        axis=1,
-    )
     root = interpolate_values(clip.root + shift, timing.body_frames)
     legs = [read_leg(clip, side) for side in (LEFT, RIGHT)]
     pelvis = world[:, skeleton.role("hips")]
@@ -162,6 +148,147 @@ def _hip_from_root(source: HealthyClip, world: Array, side: int) -> Array:
         out += quat.rotate(world[:, parent], skeleton.offsets[joint])
         joint = parent
     return out
+
+
+# Sets the height of the hips so that the standing knee has the desired bend, and places the knees.
+#
+# The ankle is the joint with the role heel.
+
+
+@dataclass(frozen=True)
+class Leg:
+    """A leg of the healthy clip, over F frames.
+
+    reach: (F,) cm from hip to ankle. thigh, shank: (F, 4) rotations relative to the pelvis. hinge: (F, 3)
+    axis about which the knee bends, relative to the pelvis. thigh_length, shank_length: cm.
+    """
+
+    reach: Array = field(repr=False)
+    thigh: Array = field(repr=False)
+    shank: Array = field(repr=False)
+    hinge: Array = field(repr=False)
+    thigh_length: float
+    shank_length: float
+
+    @property
+    def longest_reach(self) -> float:
+        """The largest distance from hip to ankle that is allowed, cm."""
+        length = self.thigh_length + self.shank_length
+        return float(np.clip(self.reach.max(), STRETCH[0] * length, STRETCH[1] * length))
+
+
+def read_leg(clip: Clip, side: int) -> Leg:
+    """Measure a leg in each frame.
+
+    In frames in which the leg is nearly straight, the direction of its knee is taken from the other frames.
+    """
+    skeleton = clip.skeleton
+    hip, knee, ankle = (skeleton.role(f"{SIDES[side]}_{r}") for r in ("hip", "knee", "heel"))
+    positions = clip.positions
+    hip_to_ankle = positions[:, ankle] - positions[:, hip]
+    reach = np.linalg.norm(hip_to_ankle, axis=1)
+    along = hip_to_ankle / np.maximum(reach, 1e-9)[:, None]
+    # How far the knee is from the straight line between hip and ankle, and in which direction.
+    hip_to_knee = positions[:, knee] - positions[:, hip]
+    aside = hip_to_knee - along * np.sum(hip_to_knee * along, axis=1, keepdims=True)
+    size = np.linalg.norm(aside, axis=1, keepdims=True)
+    upper, lower = (float(np.linalg.norm(skeleton.offsets[j])) for j in (knee, ankle))
+    bend = knee_flexion(reach, upper, lower)
+    certainty = np.clip((bend - BENT[0]) / (BENT[1] - BENT[0]), 0.0, 1.0)[:, None]
+    thigh = clip.global_rotations[:, hip]
+    in_thigh = quat.rotate(quat.inv(thigh), aside / np.maximum(size, 1e-9))
+    usual = np.sum(in_thigh * certainty, axis=0)
+    if certainty.sum() <= 5:  # frames; a knee that never bends is assumed to point as the foot does
+        toe = skeleton.role(f"{SIDES[side]}_toe")
+        usual = np.mean(quat.rotate(quat.inv(thigh), positions[:, toe] - positions[:, ankle]), axis=0)
+    usual = usual / max(float(np.linalg.norm(usual)), 1e-9)
+    knee_direction = quat.rotate(thigh, in_thigh * certainty + usual * (1 - certainty))
+    to_pelvis = quat.inv(clip.global_rotations[:, skeleton.role("hips")])
+    return Leg(
+        reach,
+        quat.mul(to_pelvis, thigh),
+        quat.mul(to_pelvis, clip.global_rotations[:, knee]),
+        quat.rotate(to_pelvis, np.cross(knee_direction, along)),
+        upper,
+        lower,
+    )
+
+
+def knee_flexion(reach: Array, upper: float, lower: float) -> Array:
+    """(...) radians of knee flexion, 0 if straight, by the law of cosines.
+
+    reach: (...) distance from hip to ankle. upper, lower: lengths of thigh and shank. All are in cm.
+    """
+    cosine = (reach**2 - upper**2 - lower**2) / (2 * upper * lower)
+    return np.arccos(np.clip(cosine, -1.0, 1.0))
+
+
+def reach_at_flexion(flexion: Array, upper: float, lower: float) -> Array:
+    """(...) cm from hip to ankle at a knee flexion (...) in radians: the inverse of `knee_flexion`."""
+    return np.sqrt(upper**2 + lower**2 + 2 * upper * lower * np.cos(flexion))
+
+
+def hips_height(
+    root: Array,
+    hips: list[Array],
+    ankles: list[Array],
+    reaches: list[Array],
+    stands: list[Array],
+    longest: list[float],
+) -> Array:
+    """(N,) heights of the root, cm, at which standing legs have their desired length.
+
+    root: (N, 3) positions before the change. Each list holds one entry for each leg. hips: (N, 3) position of
+    the hip joint relative to the root. ankles: (N, 3) positions in the world. reaches: (N,) desired distance
+    from hip to ankle while the leg stands, cm. stands: (N,) from 0 (swings) to 1 (stands). longest: the leg's
+    `Leg.longest_reach`. No leg gets longer than this.
+    """
+
+    def above_ankle(hip: Array, ankle: Array, length: Array | float) -> Array:
+        """(N,) how high the hip is above the ankle if the leg has this length."""
+        apart = (root + hip - ankle)[:, [0, 2]]
+        return np.sqrt(length**2 - np.minimum(np.sum(apart**2, axis=1), (LEVEL_SHARE * length) ** 2))
+
+    # Each standing leg asks for a change of the root's height. The root gets their weighted mean, smoothed.
+    weighted_change = np.zeros(len(root))
+    weight = np.full(len(root), 1e-9)
+    for hip, ankle, reach, stand in zip(hips, ankles, reaches, stands, strict=True):
+        weighted_change += stand * (ankle[:, 1] + above_ankle(hip, ankle, reach) - hip[:, 1] - root[:, 1])
+        weight += stand
+    height = root[:, 1] + gaussian(weighted_change, 3.0) / gaussian(weight, 3.0)
+    # Lower the root where a leg would still be longer than `longest`.
+    excess = np.zeros(len(root))
+    for hip, ankle, length in zip(hips, ankles, longest, strict=True):
+        excess = np.maximum(excess, height + hip[:, 1] - ankle[:, 1] - above_ankle(hip, ankle, length))
+    return height - smooth_above(np.maximum(excess, 0.0), 2)
+
+
+def place_leg(
+    skeleton: Skeleton, side: int, leg: Leg, when: Array, pelvis: Array, hip: Array, ankle: Array
+) -> tuple[Array, Array]:
+    """World rotations of thigh and of shank, (N, 4) each, with which the leg reaches from `hip` to `ankle`.
+
+    when: (N,) frames of the healthy clip, with fractions. The rotations and the direction of the knee in
+    these frames are kept as far as the new positions allow. pelvis: (N, 4) world rotations. hip, ankle:
+    (N, 3) positions in the world.
+    """
+    bones = [skeleton.offsets[skeleton.role(f"{SIDES[side]}_{r}")] for r in ("knee", "heel")]
+    thigh, shank = (
+        quat.mul(pelvis, interpolate_rotations(rotations, when)) for rotations in (leg.thigh, leg.shank)
+    )
+    hinge = quat.rotate(pelvis, interpolate_values(leg.hinge, when))
+    knee, end = two_bone_knee(hip, ankle, np.cross(ankle - hip, hinge), leg.thigh_length, leg.shank_length)
+    return _point_bone(thigh, hinge, bones[0], knee - hip), _point_bone(shank, hinge, bones[1], end - knee)
+
+
+def _point_bone(world: Array, hinge: Array, bone: Array, along: Array) -> Array:
+    """Turn world rotations (N, 4) of a bone so that it points along `along` (N, 3).
+
+    bone: (3,) vector of the bone at rest. hinge: (N, 3) axis of the knee in the world. The bone's angle to
+    this axis may change, but the bone does not roll against the axis.
+    """
+    turn = bone_axes(along, hinge) @ np.swapaxes(bone_axes(quat.rotate(world, bone), hinge), -1, -2)
+    return quat.mul(quat.from_matrix(turn), world)
 
 
 def _desired_reach(leg: Leg, changes: Effects, source: HealthyClip, timing: Timing, side: int) -> Array:

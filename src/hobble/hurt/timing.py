@@ -29,80 +29,59 @@ class Timing:
     """Which of F source frames is shown in each of N new frames. Frames have fractions.
 
     body_frames: (N,) source frame that the body shows in each new frame. leg_frames: (N, 2) the same for the
-    left and the right leg. cadence_times: (F,) the new frame that would show each source frame if the cadence
-    changed, but no landing or leaving was shifted. stride_ratio: (F,) new duration of a stride / old
-    duration.
+    left and the right leg. stride_ratio: (F,) new duration of a stride / old duration.
     """
 
     body_frames: Array = field(repr=False)
     leg_frames: Array = field(repr=False)
-    cadence_times: Array = field(repr=False)
     stride_ratio: Array = field(repr=False)
-
-    def __len__(self) -> int:
-        return len(self.body_frames)
-
-    def new_frames(self, when: Array, leg: int | None = None) -> Array:
-        """The new frames, with fractions, in which the body or a leg shows the source frames `when`.
-
-        leg: LEFT or RIGHT; None: the body.
-        """
-        shown = self.body_frames if leg is None else self.leg_frames[:, leg]
-        return np.interp(when, shown, np.arange(len(shown)))
 
 
 def retime(source: HealthyClip, effects: Effects) -> Timing:
     """Slow the cadence, and shift each foot's landing and leaving within the cycle, as `effects` says."""
     stride_ratio = 1 + effects.changes["stride"] * (1 - (1 - JOG_STRIDE) * source.jog_share)
+    # The new frame that would show each source frame if no landing or leaving was shifted.
     cadence_times = np.concatenate([[0.0], np.cumsum((stride_ratio[1:] + stride_ratio[:-1]) / 2)])
     new_cycle = source.cycle_frames * stride_ratio
     new = np.arange(int(cadence_times[-1] + 1e-6) + 1, dtype=float)
-    legs = []
-    landings: list[tuple[float, float]] = []
+    legs, landings = [], []
     shares = 1 - (1 - JOG_SHIFT) * source.jog_share
     for side in (LEFT, RIGHT):
-        # Delays in new frames, for each source frame.
-        land = _limit_shift(effects.changes["land"][:, side]) * shares * new_cycle
-        off = _limit_shift(effects.changes["off"][:, side]) * shares * new_cycle
-        events = []
-        for stance in source.stances[side]:
-            events += [(stance.land, land), (stance.off, off)]
+        # Delays in new frames, for each source frame. Shifts stay below MOST_SHIFT.
+        land, off = (
+            MOST_SHIFT * np.tanh(effects.changes[name][:, side] / MOST_SHIFT) * shares * new_cycle
+            for name in ("land", "off")
+        )
+        events = [event for s in source.stances[side] for event in ((s.land, land), (s.off, off))]
         # The first landing and the last leaving are the ends of the clip. So they are not shifted.
-        shifted = [(at, float(np.interp(at, np.arange(len(source)), delay))) for at, delay in events[1:-1]]
+        shifted = [(at, float(delay[at])) for at, delay in events[1:-1]]
         landings += shifted[1::2]
         legs.append(_source_frames(shifted, cadence_times, new))
     body = _source_frames(sorted(landings), cadence_times, new)
-    return Timing(body, np.stack(legs, axis=1), cadence_times, stride_ratio)
+    return Timing(body, np.stack(legs, axis=1), stride_ratio)
 
 
-def _limit_shift(shift: Array) -> Array:
-    """Shifts (F,) in cycles, smoothly limited to less than MOST_SHIFT either way."""
-    return MOST_SHIFT * np.tanh(shift / MOST_SHIFT)
-
-
-def _source_frames(events: list[tuple[float, float]], cadence_times: Array, new: Array) -> Array:
+def _source_frames(events: list[tuple[int, float]], cadence_times: Array, new: Array) -> Array:
     """(N,) the source frame that is shown in each of the N frames `new`.
 
-    events: (source frame, delay in new frames), in order. cadence_times: as in `Timing`. Between two events
-    the time is interpolated smoothly.
+    events: (source frame, delay in new frames), in order. cadence_times: (F,) the new frame of each source
+    frame without these delays. Between two events the time is interpolated smoothly.
     """
     last = len(cadence_times) - 1
     # `at[i]` is the source frame of an event, `goal[i]` the new frame that shows it.
-    at, goal = [0.0], [0.0]
+    at, goal = [0], [0.0]
     for when, delay in events:
-        if at[-1] + 1.0 <= when <= last - 1.0:
+        if at[-1] < when < last:
             at.append(when)
-            goal.append(float(np.interp(when, np.arange(last + 1), cadence_times)) + delay)
-    at.append(float(last))
-    goal.append(float(cadence_times[-1]))
+            goal.append(float(cadence_times[when]) + delay)
+    at.append(last)
+    goal.append(float(cadence_times[last]))
     # Two passes, forwards and backwards, keep the events at least these gaps apart.
-    least_gaps = LEAST_SHARE * np.diff(np.interp(at, np.arange(last + 1), cadence_times))
+    least_gaps = LEAST_SHARE * np.diff(cadence_times[at])
     for i, gap in enumerate(least_gaps[:-1]):
         goal[i + 1] = max(goal[i + 1], goal[i] + gap)
     for i in range(len(at) - 2, 0, -1):
         goal[i] = min(goal[i], goal[i + 1] - least_gaps[i])
-    if last < 1:
-        return np.zeros(len(new))
     return np.clip(PchipInterpolator(goal, at)(new), 0.0, last)
 
 
@@ -116,14 +95,14 @@ def relabel(labels: Labels, timing: Timing, zero: str, margins: str) -> Labels:
     that lands at phase 0, "left" or "right". margins: which cycles are used, a key of MARGINS in
     `hobble.labels.phase`.
     """
-    frames = len(timing)
+    frames = len(timing.body_frames)
     last = len(labels) - 1
     nearest = [np.clip(np.round(timing.leg_frames[:, side]).astype(int), 0, last) for side in (LEFT, RIGHT)]
     # Columns of contacts: left heel, left toe, right heel, right toe. So `column // 2` is the side.
     contacts = np.stack([labels.contacts[nearest[column // 2], column] for column in range(4)], axis=1)
     footsteps = labels.footsteps.copy()  # a row holds a right landing, a left landing and a mark
     for column, side in ((0, RIGHT), (1, LEFT)):
-        footsteps[:, column] = timing.new_frames(footsteps[:, column], side)
+        footsteps[:, column] = np.interp(footsteps[:, column], timing.leg_frames[:, side], np.arange(frames))
     phase, known = phase_of_footsteps(footsteps, frames)
     known &= ~dropped_frames(footsteps, frames)
     body = np.clip(np.round(timing.body_frames).astype(int), 0, last)

@@ -6,8 +6,7 @@ from hobble.core import quat
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton, aim_bone, forward_kinematics
 from hobble.core.smooth import gaussian
-from hobble.hurt.amounts import HARMONICS
-from hobble.hurt.effects import LEFT, RIGHT, SIDES, Effects, path_up
+from hobble.hurt.effects import HARMONICS, LEFT, RIGHT, SIDES, Effects
 from hobble.hurt.healthy_clip import HealthyClip
 
 X, Y, Z = np.eye(3)
@@ -39,20 +38,24 @@ CARRY_STRENGTH = 0.75  # an arm with a hurt hand (`carry`) is held less firmly, 
 def change_body(source: HealthyClip, effects: Effects) -> Array:
     """The world rotations (F, J, 4) of all joints in the source's frames, after the change.
 
-    The legs only turn with the pelvis; `hobble.hurt.legs` changes them later.
+    The legs only turn with the pelvis; `hobble.hurt.hurt_clip` changes them later.
     """
     skeleton = source.clip.skeleton
     local = _stiffen(source, effects)
     world, _ = forward_kinematics(skeleton, local, np.zeros((len(local), 3)))
     pelvis, chest, head = _added_rotations(source, effects)
-    trunk_positions = _positions_in_trunk(skeleton)
-    for j in range(len(skeleton.joints)):
-        section, share = trunk_positions[j]
-        if section == "pelvis":
-            turn = quat.slerp(pelvis, chest, np.full(len(source), share))
-        else:
-            turn = quat.slerp(chest, head, np.full(len(source), share))
-        world[:, j] = quat.mul(turn, world[:, j])
+    turns: dict[int, Array] = {}  # joint -> its added rotation; along back and neck it changes evenly
+    for lower, upper, role, above in ((pelvis, chest, "chest", "hips"), (chest, head, "head", "chest")):
+        joints = _between(skeleton, role, above)[::-1]
+        for i, j in enumerate(joints):
+            turns[j] = quat.slerp(lower, upper, np.full(len(source), (i + 1) / len(joints)))
+    # The joints of a limb turn with the trunk's joint to which the limb is attached.
+    none = np.zeros(len(source))
+    at_hips, at_chest = quat.slerp(pelvis, chest, none), quat.slerp(chest, head, none)
+    for j, parent in enumerate(skeleton.parents):
+        if j not in turns:
+            turns[j] = at_chest if parent == skeleton.role("chest") else turns.get(parent, at_hips)
+        world[:, j] = quat.mul(turns[j], world[:, j])
     for side in (LEFT, RIGHT):
         _hold_arm(source, effects, world, side)
     return world
@@ -79,33 +82,13 @@ def _stiffen(source: HealthyClip, effects: Effects) -> Array:
 
 def _between(skeleton: Skeleton, role: str, above: str) -> list[int]:
     """The joints from the one with `role` up to the one below the joint with the role `above`."""
-    return path_up(skeleton, skeleton.role(role), skeleton.role(above))
-
-
-def _positions_in_trunk(skeleton: Skeleton) -> list[tuple[str, float]]:
-    """For each joint, how far up the trunk it is.
-
-    ("pelvis", share): at this share of the way from the pelvis to the chest. ("head", share): at this share
-    of the way from the chest to the head. The joints of a limb have the value of the trunk's joint to which
-    the limb is attached.
-    """
-    out: list[tuple[str, float]] = [("pelvis", 0.0)] * len(skeleton.joints)
-    back = _between(skeleton, "chest", "hips")[::-1]
-    neck = _between(skeleton, "head", "chest")[::-1]
-    for j, parent in enumerate(skeleton.parents):
-        if j in back:
-            out[j] = ("pelvis", (back.index(j) + 1) / len(back))
-        elif j in neck:
-            out[j] = ("head", (neck.index(j) + 1) / len(neck))
-        elif parent >= 0:
-            out[j] = ("head", 0.0) if out[parent] == ("pelvis", 1.0) else out[parent]
-    return out
+    return skeleton.path_up(skeleton.role(role), skeleton.role(above))
 
 
 def _added_rotations(source: HealthyClip, effects: Effects) -> tuple[Array, Array, Array]:
     """World rotations to add to pelvis, chest and head, (F, 4) each."""
     phase, known = source.phase, np.clip(source.phase_known, 0.0, 1.0)
-    # The harmonics of the curves, see `read_profiles` of `hobble.hurt.amounts`. Without steps there is
+    # The harmonics of the curves, see `read_profiles`. Without steps there is
     # no phase, so only the mean of each curve counts.
     waves = [np.ones(len(source))]
     for h in range(1, HARMONICS + 1):
@@ -178,5 +161,5 @@ def _hold_arm(source: HealthyClip, effects: Effects, world: Array, side: int) ->
         fully_held = aim_bone(world[:, joint], np.broadcast_to(rest_bone, direction.shape), direction)
         turn = quat.mul(quat.slerp(world[:, joint], fully_held, held), quat.inv(world[:, joint]))
         for j in range(len(skeleton.joints)):
-            if joint in path_up(skeleton, j):
+            if joint in skeleton.path_up(j):
                 world[:, j] = quat.mul(turn, world[:, j])
