@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hobble.channels import ClipSource, channel
-from hobble.channels.clip_values import read_clip_values
+from hobble.channels import channel
+from hobble.channels.channel import ClipSource
 from hobble.channels.diagnosis import read_diagnoses
 from hobble.core.clip import Clip
 from hobble.core.errors import InputError
@@ -38,7 +38,7 @@ def test_a_manner_holds_in_every_frame_of_a_clip(
     options, files = (PATTERNS, []) if name == "mood" else ({"table": table.name}, [table])
     source = channel(name).make_source({"clip": clip, "value": value, "options": options}, files)
     motion = Clip(clip, holden31, 60.0, np.tile([1.0, 0, 0, 0], (7, 31, 1)), np.zeros((7, 3)))
-    values, warnings = read_clip_values(name, motion, source, {})
+    values, warnings = channel(name).read_checked(motion, source, {})
     np.testing.assert_array_equal(values, np.tile(np.float32(expected), (7, 1)))
     assert bool(warnings) is warns
     assert channel(name).is_neutral(source) is not any(expected)

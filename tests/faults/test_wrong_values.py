@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from hobble.channels.clip_values import load_values
+from hobble.channels.channel import load_values
 from hobble.core.clip import load_clip, load_clip_report
 from hobble.core.declared import load_report
 from hobble.core.errors import HobbleError

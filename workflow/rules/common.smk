@@ -1,5 +1,5 @@
 # What the rules share. In functions of rules, `w` holds the job's wildcards. `project` is made in the Snakefile.
-from hobble.channels import channel_packages, display_modules
+from hobble.channels import display_modules
 from hobble.measures.measure import all_measures, measure_named
 from hobble.workflow import demands
 from hobble.workflow.clips import channels_of_folder

@@ -20,7 +20,7 @@ rule database_clips:
         options=lambda w: dataset(w).options_of("database", RowOptions),
         code=lambda w: package.code(
             "database_clips",
-            *channel_packages(dataset(w).channels),
+            *(f"hobble.channels.{name}" for name in dataset(w).channels),
         ),
     script:
         "../scripts/database_clips.py"
@@ -50,7 +50,8 @@ rule database_merge:
         hurt_every=lambda w: dataset(w).hurt_row_step,
         options=lambda w: dataset(w).options_of("database", Merging),
         code=lambda w: package.code(
-            "database_merge", *channel_packages(channels_of_folder(w.channels))
+            "database_merge",
+            *(f"hobble.channels.{name}" for name in channels_of_folder(w.channels)),
         ),
     script:
         "../scripts/database_merge.py"

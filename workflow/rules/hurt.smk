@@ -29,6 +29,6 @@ rule hurt_clips:
             for clip in batch_of(w).clips
         ],
         mirrored=lambda w: batch_of(w).mirrored,
-        code=lambda w: package.code("hurt_clips", *channel_packages([HURT_CHANNEL])),
+        code=lambda w: package.code("hurt_clips", f"hobble.channels.{HURT_CHANNEL}"),
     script:
         "../scripts/hurt_clips.py"

@@ -5,7 +5,7 @@ from the data set.
 """
 
 from hobble.channels import channel
-from hobble.channels.clip_values import read_clip_values, save_values, write_report
+from hobble.channels.channel import save_values, write_report
 from hobble.core.clip import load_clip, load_clip_report
 from hobble.workflow.job import make_each
 
@@ -17,17 +17,17 @@ def make_values(piece, log):
     """
     name, clip = piece.params["channel"], load_clip(piece.input["clip"])
     source = channel(name).make_source(piece.params["source"], piece.input["files"])
-    values, warnings = read_clip_values(name, clip, source, load_clip_report(piece.input["report"]))
+    values, warnings = channel(name).read_checked(clip, source, load_clip_report(piece.input["report"]))
     for warning in warnings:
         log.warning("%s", warning)
     columns = channel(name).columns(clip.skeleton)
     save_values(piece.output["values"], values, columns)
-    write_report(piece.output["report"], name, clip, values, columns, warnings)
+    write_report(piece.output["report"], name, clip.name, warnings)
     if "mirror" in piece.output:
         mirror = load_clip(piece.input["mirror"])
         values = channel(name).mirror(values, mirror.skeleton)
         save_values(piece.output["mirror"], values, columns)
-        write_report(piece.output["mirror_report"], name, mirror, values, columns, warnings)
+        write_report(piece.output["mirror_report"], name, mirror.name, warnings)
 
 
 make_each(

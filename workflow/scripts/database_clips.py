@@ -3,7 +3,7 @@
 A row holds the network's input X, output Y and phase P for one frame.
 """
 
-from hobble.channels.clip_values import load_values
+from hobble.channels.channel import load_values
 from hobble.core.clip import load_clip
 from hobble.database.options import RowOptions
 from hobble.labels.clip_labels import load_labels

@@ -1,8 +1,8 @@
 """Creates hurt versions of healthy clips, and their mirrors: motion, labels, severities and reports."""
 
 from hobble.channels import channel
-from hobble.channels.clip_values import load_values, save_values
-from hobble.channels.clip_values import write_report as write_channel_report
+from hobble.channels.channel import load_values, save_values
+from hobble.channels.channel import write_report as write_channel_report
 from hobble.core.clip import load_clip, load_clip_report, save_clip
 from hobble.core.declared import load_report
 from hobble.core.files import write_json
@@ -65,13 +65,12 @@ def write_files(output, prefix, clip, motion_report, labels, label_report, sever
 
     output: name of each output -> its file. prefix: of the names of these outputs: "" or "mirror_".
     """
-    links = clip.skeleton.link_names
     save_clip(output[f"{prefix}clip"], clip)
     write_json(output[f"{prefix}report"], motion_report)
     save_labels(output[f"{prefix}labels"], labels)
     write_report(output[f"{prefix}label_report"], label_report, labels, clip)
-    save_values(output[f"{prefix}injury"], severity, links)
-    write_channel_report(output[f"{prefix}injury_report"], HURT_CHANNEL, clip, severity, links, [])
+    save_values(output[f"{prefix}injury"], severity, clip.skeleton.link_names)
+    write_channel_report(output[f"{prefix}injury_report"], HURT_CHANNEL, clip.name, [])
 
 
 make_each(

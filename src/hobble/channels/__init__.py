@@ -3,19 +3,8 @@
 import functools
 import importlib
 import importlib.util
-from collections.abc import Iterable
 
-from hobble.channels.channel import Channel, ClipSource
-
-__all__ = [
-    "CHANNEL_NAMES",
-    "Channel",
-    "ClipSource",
-    "all_channels",
-    "channel",
-    "channel_packages",
-    "display_modules",
-]
+from hobble.channels.channel import Channel
 
 # The names of all channels. Each is also a package in this folder, whose CHANNEL is an instance of `Channel`.
 CHANNEL_NAMES = ("injury", "guarding", "mood", "diagnosis")
@@ -30,20 +19,13 @@ def channel(name: str) -> Channel:
     """
     if name not in CHANNEL_NAMES:
         raise KeyError(f"there is no channel {name!r}. The channels are {', '.join(CHANNEL_NAMES)}")
-    definition = importlib.import_module(f"{__name__}.{name}").CHANNEL
-    assert isinstance(definition, Channel)
-    assert definition.name == name
+    definition: Channel = importlib.import_module(f"{__name__}.{name}").CHANNEL
     return definition
 
 
 def all_channels() -> tuple[Channel, ...]:
     """All channels, in the order of CHANNEL_NAMES."""
     return tuple(channel(name) for name in CHANNEL_NAMES)
-
-
-def channel_packages(names: Iterable[str]) -> list[str]:
-    """Full names of the packages of these channels. The workflow runs a job again if their code changes."""
-    return [f"{__name__}.{name}" for name in names]
 
 
 def display_modules() -> list[str]:

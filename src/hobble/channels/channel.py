@@ -3,19 +3,23 @@
 In each frame of a clip, a channel has a value in each of its columns. Values are 0 or more. 0 has no effect.
 """
 
-import itertools
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
 
 from hobble.core.clip import Clip
-from hobble.core.declared import read_declared
+from hobble.core.declared import ArrayOf, load_declared, read_declared
+from hobble.core.errors import InputError
+from hobble.core.files import save_npz, write_json
 from hobble.core.quat import Array
 from hobble.core.section import Section
+
+SILENCING_STD = 1e10  # divisor of an input that must have no effect
+CONSTANT_BELOW = 1e-6  # a column with a smaller standard deviation counts as constant
 
 
 class HasLinks(Protocol):
@@ -33,14 +37,13 @@ class HasLinks(Protocol):
 class ClipSource:
     """Where the values of one clip come from.
 
-    clip: the clip's name; for a mirrored clip, the name of its original. entry: the clip's entry in the data
-    set. value: what the entry says for this channel; None if it says nothing. options: the data set's section
+    clip: the clip's name; for a mirrored clip, the name of its original. value: what the clip's entry in the
+    data set says for this channel; None if it says nothing. options: the data set's section
     `channels.<name>`, read by the channel's `Options`. files: the channel's file beside the clip, if it
     exists, and the channel's tables (`Channel.table_files`).
     """
 
     clip: str
-    entry: Mapping[str, Any] = field(default_factory=dict)
     value: Any = None
     options: Section | None = None
     files: Sequence[str | Path] = ()
@@ -97,6 +100,18 @@ class Channel(ABC):
         be read.
         """
 
+    def read_checked(
+        self, clip: Clip, source: ClipSource, motion: Mapping[str, Any]
+    ) -> tuple[Array, list[str]]:
+        """As `read`. Also raises InputError, which names the frame, for a value outside the range."""
+        values, warnings = self.read(clip, source, motion)
+        wrong = ~((values >= 0) & (values <= self.highest))
+        if wrong.any():
+            frame, column = (int(i) for i in np.argwhere(wrong)[0])
+            value = f"{self.value_word} {values[frame, column]:g} of {self.columns(clip.skeleton)[column]}"
+            raise InputError(clip.name, f"{value} is not between 0 and {self.highest:g}", frame=frame)
+        return values, warnings
+
     def check(self, source: ClipSource, rig: HasLinks) -> None:  # noqa: B027 - most channels check nothing
         """Raise InputError if the clip's entry or the options are wrong. Called before any job runs."""
 
@@ -132,21 +147,6 @@ class Channel(ABC):
         """
         length = float(np.sqrt(np.sum(std**2)))
         return np.where(std > CONSTANT_BELOW, max(self.highest / 10, length), SILENCING_STD)
-
-    def summary(self, values: Array, labels: Sequence[str], fps: float) -> dict[str, Any]:
-        """For the clip's report: label of a column -> `seconds` above 0, `highest` value and `spells`.
-
-        For spells see `find_spells`. Columns whose values are all 0 are left out.
-        """
-        return {
-            label: {
-                "seconds": float(np.sum(column > 0) / fps),
-                "highest": float(column.max()),
-                "spells": find_spells(column, fps, self.highest),
-            }
-            for label, column in zip(labels, values.T, strict=True)
-            if column.any()
-        }
 
 
 class ClipChannel(Channel):
@@ -187,22 +187,20 @@ def read_through_curve(values: Any, highest: Any, exponent: Any) -> Any:
     return highest * (values / highest) ** exponent
 
 
-SILENCING_STD = 1e10  # divisor of an input that must have no effect
-JUMP = 0.05  # share of the channel's highest value; a larger change between two frames starts a new spell
-CONSTANT_BELOW = 1e-6  # a column with a smaller standard deviation counts as constant
+# Files with the values of a channel in each of the F frames of a clip, and what was odd about them.
 
 
-def find_spells(column: Array, fps: float, highest: float) -> list[list[float]]:
-    """The spells of a column (F,), each as [start in seconds, end in seconds, highest value].
+def save_values(path: str | Path, values: Array, labels: Sequence[str]) -> None:
+    """Write values (F, C) and the labels of their columns as one npz file."""
+    save_npz(path, values=values, labels=np.array(list(labels), dtype=np.str_))
 
-    A spell is a stretch of frames with values above 0 and without a jump. A value that rises or falls over
-    many frames does not jump. highest: the channel's highest value.
-    """
-    above = column > 0
-    is_edge = (np.abs(np.diff(column)) > JUMP * highest) | (above[1:] != above[:-1])
-    edges = np.concatenate([[0], np.flatnonzero(is_edge) + 1, [len(column)]])
-    return [
-        [round(float(a / fps), 3), round(float(b / fps), 3), float(column[a:b].max())]
-        for a, b in itertools.pairwise(edges)
-        if above[a]
-    ]
+
+def load_values(path: str | Path) -> tuple[Array, tuple[str, ...]]:
+    """Read a file of `save_values`. Returns the values (F, C) and the labels of their columns."""
+    data = load_declared(path, {"values": ArrayOf(("F", "C"), low=0), "labels": ArrayOf(("C",), "U")})
+    return data["values"], tuple(str(label) for label in data["labels"])
+
+
+def write_report(path: str | Path, name: str, clip: str, warnings: Sequence[str]) -> None:
+    """Write the warnings about the values of channel `name` in a clip as JSON."""
+    write_json(path, {"clip": clip, "channel": name, "warnings": list(warnings)})

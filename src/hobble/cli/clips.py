@@ -10,8 +10,14 @@ from typing import Any
 
 import numpy as np
 
-from hobble.channels.injury.status import FPS, InjurySpell, Status, parse_links, write_status
-from hobble.channels.injury.table import write_statuses
+from hobble.channels.injury.status import (
+    FPS,
+    InjurySpell,
+    Status,
+    parse_links,
+    write_status,
+    write_statuses,
+)
 from hobble.channels.shown import channel_display
 from hobble.cli.command import (
     FOLDER,

@@ -335,7 +335,6 @@ class Clips:
         entry = self.entry(clip)
         return {
             "clip": original(clip),
-            "entry": entry.model_dump(mode="json", exclude={"channels", "hurt", "person"}),
             "value": entry.channels.get(name),
             "options": self.settings.channels.get(name, {}),
         }

@@ -4,8 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from hobble.channels.injury.status import read_status
-from hobble.channels.injury.table import write_statuses
+from hobble.channels.injury.status import read_status, write_statuses
 from hobble.cli.__main__ import main
 from hobble.core.errors import InputError
 
@@ -26,12 +25,13 @@ def table(folder: Path, text: str, end: str = "\n") -> Path:
     return path
 
 
-def test_a_status_file_is_written_beside_each_clip_of_the_table(folder):
+def test_the_command_writes_a_status_file_beside_each_clip_of_the_table(folder, capsys):
     rows = (
         "walk,LeftUpLeg-LeftLeg,7,,\nwalk, LowerBack-Spine ,3,,\n"
         "walk,LowerBack-Spine,4.5,400,\nrun,LowerBack-Spine,2,5,50\n"
     )
-    paths = write_statuses(table(folder, rows), folder, LINKS)
+    assert main(["injury", str(table(folder, rows)), str(folder)]) == 0
+    paths = [Path(line) for line in capsys.readouterr().out.splitlines()]
     assert [p.name for p in paths] == ["walk_injuries.txt", "run_injuries.txt"]
     assert paths[0].read_text() == (
         "frames:500\n1-500 LeftUpLeg-LeftLeg[7];LowerBack-Spine[3];\n400-500 LowerBack-Spine[4.5];\n"
@@ -71,13 +71,3 @@ def test_a_file_that_is_not_csv_is_refused_with_one_message(folder, root, capsys
     assert caught.value.line == line or line is None
     assert main(["injury", str(folder / "table.csv"), str(folder)]) == 1
     assert len(capsys.readouterr().err) < 300 + len(str(folder))
-
-
-def test_the_command_writes_status_files_and_reports_an_unknown_link(folder, root, capsys):
-    skeleton = str(root / "config/skeletons/holden31.yaml")
-    path = table(folder, "walk,RightFoot-RightToeBase,5,,\n")
-    assert main(["injury", str(path), str(folder), "--skeleton", skeleton]) == 0
-    assert "walk_injuries.txt" in capsys.readouterr().out
-    path = table(folder, "walk,RightFoot,5,,\n")
-    assert main(["injury", str(path), str(folder), "--skeleton", skeleton]) == 1
-    assert "no such link: RightFoot" in capsys.readouterr().err

@@ -15,9 +15,9 @@ from pydantic import Field
 
 from hobble.channels.channel import ClipChannel, ClipSource, HasLinks
 from hobble.core.clip import Clip
+from hobble.core.clip_files import MIRROR_SUFFIX
 from hobble.core.quat import Array
 
-MIRROR_SUFFIX = "_mirror"  # end of the name of a mirrored clip
 GOLDEN = (math.sqrt(5) - 1) / 2
 
 

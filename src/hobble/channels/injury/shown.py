@@ -44,13 +44,7 @@ LOOP_SEVERITY = 8.0  # of the parts that hurt in PLAIN_LOOPS
 # Loops in which the hurt parts are not coloured: name -> labels of the parts that hurt during the whole loop.
 PLAIN_LOOPS: dict[str, tuple[str, ...]] = {
     "healthy": (),
-    "left-thigh": ("left thigh",),
-    "left-shank": ("left shank",),
-    "left-foot": ("left foot",),
-    "right-thigh": ("right thigh",),
-    "right-shank": ("right shank",),
-    "right-foot": ("right foot",),
-    "lower-back": ("lower back",),
+    **{part.replace(" ", "-"): (part,) for part in SLIDERS[:7]},
     "left-arm": ("left upper arm",),
     "right-arm": ("right upper arm",),
     "left-leg": ("left thigh", "left shank", "left foot"),
@@ -129,14 +123,8 @@ def links_between(skeleton: Skeleton, upper: str, lower: str) -> list[str]:
     """
     if any(skeleton.roles.get(role) not in skeleton.joints for role in (upper, lower)):
         return []
-    joint, top, out = skeleton.role(lower), skeleton.role(upper), []
-    while joint != top:
-        parent = skeleton.parents[joint]
-        if parent < 0:
-            return []
-        out.append(f"{skeleton.joints[parent]}-{skeleton.joints[joint]}")
-        joint = parent
-    return out[::-1]
+    path = skeleton.path_up(skeleton.role(lower), skeleton.role(upper))
+    return [f"{skeleton.joints[skeleton.parents[j]]}-{skeleton.joints[j]}" for j in path[::-1]]
 
 
 def spoken_link(skeleton: Skeleton, link: str) -> str:
@@ -146,11 +134,7 @@ def spoken_link(skeleton: Skeleton, link: str) -> str:
             return label
     # The links below a wrist are the hand, and those below a toe joint the toes.
     ends = link_ends(skeleton.joints, [link])[0]
-    above = ends[0] if ends else -1  # index of a joint above the link; -1 above the root
-    ancestors = []
-    while above >= 0:
-        ancestors.append(skeleton.joints[above])
-        above = skeleton.parents[above]
+    ancestors = [skeleton.joints[j] for j in skeleton.path_up(ends[0])] if ends else []
     for side in ("left", "right"):
         for role, word in (("wrist", "hand"), ("toe", "toes")):
             if skeleton.roles.get(f"{side}_{role}") in ancestors:
