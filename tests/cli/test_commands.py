@@ -14,7 +14,7 @@ import yaml
 
 from hobble.channels.injury.status import read_status
 from hobble.cli import clips
-from hobble.cli.__main__ import COMMANDS, GROUPS, main
+from hobble.cli.__main__ import COMMANDS, main
 from hobble.motion.read import read_bvh
 from hobble.synthetic.generate_clip import write_clip
 from hobble.synthetic.options import Synthetic
@@ -87,7 +87,6 @@ def test_help_lists_every_command_once_in_its_group(capsys):
     assert stop.value.code == 0
     text = capsys.readouterr().out
     assert [len(re.findall(rf"^  {name} +[A-Z]", text, re.M)) for name in COMMANDS] == [1] * len(COMMANDS)
-    assert {command.group for command in COMMANDS.values()} == GROUPS.keys()
     with pytest.raises(SystemExit):
         main(["--version"])
     assert re.fullmatch(r"hobble \d+\.\d+\.\d+\n", capsys.readouterr().out)

@@ -101,7 +101,6 @@ def test_all_problems_are_reported_at_once() -> None:
         ({"skeleton": "s", "synthetic": {}}, "a list of its `clips`"),
         ({"skeleton": "s", "folder": "f", "clips": {"a": None}, "held_out": ["b"]}, "not in `clips`: b"),
         ({"skeleton": "s", "folder": "f", "database": {"window": 55}}, "multiple of step"),
-        ({"skeleton": "s", "folder": "f", "motion": {"fps": 30}}, r"motion\.fps: must be 60"),
         (
             {"skeleton": "s", "folder": "f", "terrain": {"patches": 5}},
             "`patches` .5. must not be fewer than `fits`",

@@ -162,7 +162,7 @@ def cmu(shared: Path, root: Path) -> Callable[[str], Clip]:
     def get(name: str) -> Clip:
         if name not in read:
             folder = "ferre" if name.startswith("Injured") else "cmu"
-            read[name] = read_clip(shared / "mocap" / folder / f"{name}.bvh", root / "config" / "skeletons")
+            read[name] = read_clip(shared / "mocap" / folder / f"{name}.bvh")
         return read[name]
 
     return get

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from hobble.core import quat
 from hobble.core.errors import HobbleError
 from hobble.database.write import refuse_split_pairs
-from hobble.motion.axes import turned_about_vertical
 from hobble.motion.duplicates import clip_digest, duplicate_pairs
 from hobble.motion.edit import mirror_clip, resample
 
@@ -21,8 +21,9 @@ def found_with(clip, *others):
 
 def test_trimmed_resampled_shifted_turned_and_mirrored_copies_are_found(walker, holden31):
     clip = walker(holden31, 441, 60.0)
-    turned = turned_about_vertical(clip, 1.0)
-    elsewhere = replace(turned, root=turned.root + np.array([200.0, 0.0, 50.0]))
+    turn, rotations = quat.yaw(1.0), clip.rotations.copy()
+    rotations[:, 0] = quat.mul(turn, rotations[:, 0])
+    elsewhere = replace(clip, rotations=rotations, root=quat.rotate(turn, clip.root) + np.array([200, 0, 50]))
     slower = replace(clip, fps=40.0)
     lower = replace(clip, root=clip.root * [1.0, 0.9, 1.0])
     copies = (elsewhere, clip.part(slice(1, None)), clip.part(slice(100, None)), resample(clip, 24.0))

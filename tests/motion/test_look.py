@@ -7,7 +7,7 @@ import pytest
 
 from hobble.cli.__main__ import main
 from hobble.core.bvh import write_bvh
-from hobble.motion.look import PICTURES, WRONG, ClipSummary, format_table, shared_warnings, summarise_clips
+from hobble.motion.look import PICTURES, WRONG, ClipSummary, format_table, summarise_clips
 from hobble.motion.skeleton_file import load_skeleton
 
 
@@ -46,12 +46,11 @@ def test_a_refused_file_is_listed_with_its_message(root, folder):
 
 
 def test_a_warning_of_many_clips_is_printed_once():
-    rare = "repaired: its floor"
-    clips = [ClipSummary(str(i), warnings=(f"It is {i} cm too high.", rare)) for i in range(6)]
-    short, notes = shared_warnings(clips)
-    assert notes == ["6 of 6 clips (0, 1, 2, 3, 4, 5), the first one: It is 0 cm too high."]
-    assert [clip.warnings for clip in short] == [(rare,)] * 6
-    assert shared_warnings(clips[:4]) == (clips[:4], [])
+    clips = [ClipSummary(str(i), warnings=(f"It is {i} cm too high.",)) for i in range(6)]
+    assert format_table(clips, ["A note."]).split("\n")[7:] == [
+        "6 clips, such as 0: It is 0 cm too high.",
+        "A note.",
+    ]
 
 
 def test_a_wrong_map_is_refused_with_the_joint_and_a_picture(root, walker, tmp_path, capsys) -> None:

@@ -35,14 +35,6 @@ def test_a_looped_cycle_equals_the_longer_walk(walker, holden31, last):
     assert apart.mean() < 1.0
 
 
-@pytest.mark.parametrize("heading", [0.0, 90.0, -135.0])
-def test_a_loop_follows_any_heading(walker, holden31, heading):
-    looped = loop_clip(part(walker(holden31, 120, 60.0), 0, 60), 4, heading)
-    way = looped.root[180] - looped.root[0]
-    assert np.degrees(np.arctan2(way[0], way[2])) == pytest.approx(heading, abs=1e-6)
-    assert np.hypot(way[0], way[2]) == pytest.approx(300, rel=0.01)
-
-
 def test_a_cycle_that_turns_goes_on_turning(walker, holden31):
     walk = part(walker(holden31, 120, 60.0), 0, 60)
     yaw = np.linspace(0, np.pi / 3, 60)
@@ -58,9 +50,9 @@ def test_a_cycle_that_turns_goes_on_turning(walker, holden31):
 
 
 def test_a_data_set_can_ask_for_loops(walk, bvh, make):
-    clip, report = make(bvh(part(walk, 0, 121)), loops=4, heading=90.0)
+    clip, report = make(bvh(part(walk, 0, 121)), loops=4)
     assert (len(clip), report["loops"], report["cycle_frames"]) == (240, 4, 60)
     assert "repeated 4 times" in report["repairs"][-1]
-    assert clip.root[-1, 0] > 380
+    assert clip.root[-1, 2] > 380
     with pytest.raises(HobbleError, match="walk: 2 frames are too few"):
         make(bvh(part(walk, 0, 3)), loops=4, accept_doubt=True)

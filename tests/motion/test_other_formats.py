@@ -110,7 +110,7 @@ def write_gltf(
 def test_a_gltf_file_gives_the_motion_of_the_bvh_file(tmp_path, walk, bvh, make, name, interpolation):
     from_bvh, report = make(bvh(walk))
     from_gltf, other = make(write_gltf(tmp_path / name, walk, interpolation))
-    assert (other["source_fps"], other["rig"], other["unit_name"]) == (120.0, report["rig"], "m")
+    assert (other["source_fps"], other["rig"], other["unit"]) == (120.0, report["rig"], 100.0)
     assert np.abs(from_gltf.positions - from_bvh.positions).max() < 0.1
 
 

@@ -37,11 +37,10 @@ def test_constant_position_channels_become_offsets(walk, bvh, make, channels, ed
 
 
 @pytest.mark.parametrize(("joint", "base"), [("LeftLeg", 1.0), ("LeftForeArm", 0.0)])
-def test_position_channels_that_move_are_kept_and_reported(walk, bvh, make, joint, base):
+def test_position_channels_that_move_are_kept(walk, bvh, make, joint, base):
     """Around the offset (base 1), or around 0 and added to it (base 0)."""
     move = np.zeros((len(walk), 31, 3))
     move[:, walk.skeleton.index(joint), 1] = 0.3 + np.sin(np.arange(len(walk)) / 9)
     path = bvh(replace(walk, translations=base * walk.skeleton.offsets + move))
-    clip, report = make(path, proportions="clip")
+    clip, _ = make(path, proportions="clip")
     np.testing.assert_allclose(clip.translations, (walk.skeleton.offsets + move)[::2], atol=1e-5)
-    assert "Movements of joints relative to their parents were kept" in report["repairs"][-1]

@@ -71,7 +71,7 @@ def test_an_edit_runs_what_depends_on_it(copied, labels: bool) -> None:
     edits = {"labels/contacts.py": "_EDITED = 1"} if labels else {**pages, "core/quat.py": "# a comment"}
     for file, line in edits.items():
         (source / file).write_text(f"{(source / file).read_text()}\n{line}\n")
-    copied.edit("config/datasets/tiny.yaml", "held_out:", "motion: {fps: 60.0}\nheld_out:")  # the default
+    copied.edit("config/datasets/tiny.yaml", "held_out:", "motion: {up: auto}\nheld_out:")  # the default
     planned = copied.planned(TARGET)
     if not labels:
         assert set(planned) == {"page_bundle", "report"}

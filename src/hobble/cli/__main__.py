@@ -8,22 +8,14 @@ from collections.abc import Sequence
 from importlib.metadata import version
 
 from hobble.cli import characters, clips, gait  # noqa: F401 - they add their commands
-from hobble.cli.command import COMMANDS, arg, command
+from hobble.cli.command import CHARACTERS, CLIPS, COMMANDS, LIMPS, SHELL, arg, command
 from hobble.core.errors import HobbleError, keep_traceback
 from hobble.measures import score
 
-GROUPS = {
-    "clips": "BVH files",
-    "limps": "what hurts",
-    "characters": "a trained character",
-    "shell": "the shell",
-}
+command(CLIPS, score.add_arguments, name="score")(score.run)
 
 
-command("clips", score.add_arguments, name="score")(score.run)
-
-
-@command("shell", arg("shell", choices=("bash", "zsh", "fish")))
+@command(SHELL, arg("shell", choices=("bash", "zsh", "fish")))
 def completion(options: argparse.Namespace) -> int:
     """Print a script that completes the command in a shell.
 
@@ -77,11 +69,9 @@ def _description() -> str:
     lines = [
         "Commands for single clips and networks. A Snakemake workflow trains a character: see README.md."
     ]
-    for group, title in GROUPS.items():
-        lines += ["", f"{title}:"]
-        for name, found in COMMANDS.items():
-            if found.group == group:
-                lines.append(f"  {name:12}{found.text.splitlines()[0]}")
+    for group in (CLIPS, LIMPS, CHARACTERS, SHELL):
+        known = {name: found.text for name, found in COMMANDS.items() if found.group == group}
+        lines += ["", f"{group}:", *(f"  {name:12}{text.splitlines()[0]}" for name, text in known.items())]
     return "\n".join(lines)
 
 

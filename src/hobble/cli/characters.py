@@ -5,7 +5,7 @@ import webbrowser
 from pathlib import Path
 from typing import get_args
 
-from hobble.cli.command import arg, command
+from hobble.cli.command import CHARACTERS, arg, command
 from hobble.core.errors import HobbleError, InputError
 from hobble.core.section import PhaseMode
 from hobble.measures import study
@@ -15,10 +15,8 @@ from hobble.runtime.scenarios import write_motions
 
 
 @command(
-    "characters",
-    arg(
-        "results", nargs="?", type=Path, help="results/<configuration>, or a report; default: the newest one"
-    ),
+    CHARACTERS,
+    arg("results", nargs="?", type=Path, help="its folder, or a report; default: the newest report"),
     arg("--print", action="store_true", help="print the address, open no browser"),
 )
 def play(options: argparse.Namespace) -> int:
@@ -50,15 +48,12 @@ def find_report(results: Path | None) -> Path:
     return path
 
 
-TO = (
-    "onnx: one file, checked with onnxruntime; bin: .bin files as in the release of Holden et al.; bvh: some "
-    "walks that the network generates (straight, turning, ...), one BVH file each"
-)
+TO = "onnx: one file; bin: files as in the release of Holden et al.; bvh: some walks that it generates"
 MODE = "how the network's weights are interpolated over the phase; cubic is exact"
 
 
 @command(
-    "characters",
+    CHARACTERS,
     arg("to", choices=("onnx", "bin", "bvh"), help=TO),
     arg("network", help="weights.npz, the folder that holds it, or a folder of .bin files"),
     arg("target", help="the file or folder to write"),
@@ -83,4 +78,4 @@ def export(options: argparse.Namespace) -> int:
     return 0
 
 
-command("characters", study.add_arguments, name="study", text=str(study.__doc__))(study.run)
+command(CHARACTERS, study.add_arguments, name="study", text=str(study.__doc__))(study.run)

@@ -20,8 +20,10 @@ from hobble.channels.injury.status import (
 )
 from hobble.channels.shown import channel_display
 from hobble.cli.command import (
+    CLIPS,
     FOLDER,
     JSON,
+    LIMPS,
     Argument,
     Message,
     add_motion_options,
@@ -74,18 +76,12 @@ def out(text: str) -> tuple[Argument, ...]:
     return FOLDER, arg("out", type=Path, help=text), JSON, add_motion_options
 
 
-PICTURE = (
-    "only if one file is given: the picture to write, which shows the motion before and after retargeting, "
-    "and in red the joint or limb that differs most"
-)
-
-
 @command(
-    "clips",
+    CLIPS,
     FOLDER,
     skeleton_argument("skeleton to which the clips are retargeted"),
     arg("--skeletons", type=Path, help="folder of the skeleton files (default config/skeletons)"),
-    arg("--picture", type=Path, metavar="SVG", help=PICTURE),
+    arg("--picture", type=Path, metavar="SVG", help="draw one file's motion before and after retargeting"),
     JSON,
     add_motion_options,
 )
@@ -106,7 +102,7 @@ def look(options: argparse.Namespace) -> int:
 
 
 @command(
-    "clips",
+    CLIPS,
     arg("file", type=Path, help="a BVH file"),
     arg("--to", type=Path, help="the file to write (default: print it)"),
 )
@@ -134,13 +130,11 @@ def skeleton_draft(file: Path) -> str:
 
 
 @command(
-    "clips",
+    CLIPS,
     *out("the folder to write into; the clips keep their names"),
     arg("--fps", type=float, default=60.0, help="frame rate to write (default 60)"),
     arg("--skeleton", help="retarget to this skeleton: a name from config/skeletons, or a YAML file"),
     arg("--mirror", action="store_true", help="also write each clip's mirror image, as CLIP_mirror.bvh"),
-    # The earlier name of `--defects refuse`.
-    arg("--refuse", dest="defects", action="store_const", const="refuse", help=argparse.SUPPRESS),
 )
 def motion(options: argparse.Namespace) -> int:
     """Turn a folder of BVH, glTF or FBX files into a folder of checked BVH files.
@@ -190,7 +184,7 @@ def report_messages(report: Mapping[str, Any]) -> list[Message]:
 
 
 @command(
-    "clips",
+    CLIPS,
     *out("the folder to write into; if it is FOLDER, label files lie beside the clips"),
     arg("--gait", choices=GAITS, help="the main gait of the clips; used where the gait is unclear"),
     arg("--overwrite", action="store_true", help="replace existing label files"),
@@ -244,7 +238,7 @@ def _labelled(
 
 
 @command(
-    "limps",
+    LIMPS,
     *out("the folder to write into: CLIP_limps.bvh and CLIP_limps_injuries.txt"),
     arg("--injury", required=True, help="what hurts: PART[severity];..."),
 )
@@ -278,7 +272,7 @@ def hurt(options: argparse.Namespace) -> int:
 
 
 @command(
-    "limps",
+    LIMPS,
     arg("body", type=Path, help="the BVH file whose path, legs and trunk are kept"),
     arg("other", type=Path, help="the BVH file from which a part of the body is taken"),
     arg("out", type=Path, help="the BVH file to write"),
@@ -303,7 +297,7 @@ def combine(options: argparse.Namespace) -> int:
 
 
 @command(
-    "limps",
+    LIMPS,
     arg("table", type=Path, help="CSV with the columns clip, link, severity, from, to"),
     arg("folder", type=Path, help="folder with the clips' BVH files"),
     skeleton_argument("skeleton that lists the links"),

@@ -17,7 +17,7 @@ from hobble.core.messages import group_messages, in_words
 from hobble.motion.options import ClipMotion
 from hobble.motion.other_formats import MOTION_SUFFIXES
 
-MOTION_KEYS = tuple(name for name in ClipMotion.model_fields if name not in ("fps", "frames"))
+MOTION_KEYS = tuple(name for name in ClipMotion.model_fields if name != "frames")
 Message = tuple[str, str]  # one of KINDS, and a sentence
 KINDS = ("warning", "doubt", "repair", "found", "note")  # of messages about clips, the worst first
 
@@ -28,8 +28,8 @@ Argument = Callable[[argparse.ArgumentParser], Any]  # adds one argument or seve
 class Command(NamedTuple):
     """A subcommand.
 
-    group: the heading under which `hobble --help` lists it. run: runs it with the parsed arguments and
-    returns the exit status. text: its help.
+    group: the heading under which `hobble --help` lists it, such as CLIPS. run: runs it with the parsed
+    arguments and returns the exit status. text: its help.
     """
 
     group: str
@@ -39,6 +39,7 @@ class Command(NamedTuple):
 
 
 COMMANDS: dict[str, Command] = {}  # filled by `command`
+CLIPS, LIMPS, CHARACTERS, SHELL = "BVH files", "what hurts", "a trained character", "the shell"
 
 
 def command(group: str, *arguments: Argument, name: str = "", text: str = "") -> Callable:

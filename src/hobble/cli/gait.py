@@ -7,6 +7,7 @@ from typing import Any
 
 from hobble.cli.command import (
     JSON,
+    LIMPS,
     add_motion_options,
     arg,
     command,
@@ -26,23 +27,20 @@ from hobble.motion.read import read_bvh
 from hobble.motion.skeleton_file import find_skeleton, load_skeleton, skeleton_folder
 
 NO_HEALTHY = (
-    "No healthy walk was given, so the clips were compared with the mean of ten healthy people. "
-    "An unusual build can then look like a limp. Name healthy walks of the same person after --healthy."
+    "The clips were compared with the mean of ten healthy people, for whom an unusual build can look like a "
+    "limp. Name healthy walks of the same person after --healthy."
 )
-
-
 HEALTHY = "clips of healthy walks of the same person"
 SIDE = "the hurt side; default: the side that is recognised, else right"
 WINDOW = "length of a window in seconds. The whole clip is recognised, and also each window on its own"
 
 
 @command(
-    "limps",
+    LIMPS,
     arg("clips", nargs="+", type=Path, metavar="CLIP.bvh", help="clips of walks to recognise and measure"),
     arg("--healthy", nargs="+", type=Path, default=[], metavar="CLIP.bvh", help=HEALTHY),
     arg("--side", choices=("right", "left"), help=SIDE),
     arg("--window", type=float, default=4.0, help=WINDOW),
-    arg("--skeletons", type=Path, help="folder of the skeleton files (default config/skeletons)"),
     JSON,
     add_motion_options,
 )
@@ -53,10 +51,10 @@ def gait(options: argparse.Namespace) -> int:
     """
     if not 1.0 <= options.window <= 3600.0:
         raise HobbleError(f"--window: {options.window:g} is not a number of seconds from 1 to 3600")
-    settings, folder = motion_options(options), options.skeletons or skeleton_folder()
-    healthy = healthy_profile([_read_walk(path, folder, settings) for path in options.healthy])
+    settings = motion_options(options)
+    healthy = healthy_profile([_read_walk(path, settings) for path in options.healthy])
     compared = {
-        path: compare_clip(_read_walk(path, folder, settings), healthy, options.window)
+        path: compare_clip(_read_walk(path, settings), healthy, options.window)
         for path in progress(options.clips)
     }
     texts = [describe(path.stem, each, options.side) for path, each in compared.items()]
@@ -65,25 +63,20 @@ def gait(options: argparse.Namespace) -> int:
     return 0
 
 
-def read_clip(
-    path: str | Path, skeletons: str | Path | None = None, options: ClipMotion | None = None
-) -> Clip:
+def read_clip(path: str | Path, options: ClipMotion | None = None) -> Clip:
     """Read a BVH file and resample it to 60 Hz. The clip keeps its own rig and bone lengths.
 
-    skeletons: folder of the skeleton files, which name the joints of known rigs. On other rigs the parts of
-    the body are found. Raises InputError for a file that cannot be read, and if the parts cannot be found.
+    Raises InputError for a file that cannot be read, and if the parts of its body cannot be found.
     """
-    options = options or ClipMotion()
     # `load_source` uses the target only to recognise the rig and its joints.
     target = load_skeleton(find_skeleton("holden31"))
-    return resample(
-        load_source(read_bvh(path), target, skeletons or skeleton_folder(), options).clip, options.fps
-    )
+    source = load_source(read_bvh(path), target, skeleton_folder(), options or ClipMotion())
+    return resample(source.clip, ClipMotion.fps)
 
 
-def _read_walk(path: Path, skeletons: Path, options: ClipMotion) -> Clip:
+def _read_walk(path: Path, options: ClipMotion) -> Clip:
     """A clip with at least one gait cycle. Raises InputError if there is none."""
-    clip = read_clip(path, skeletons, options)
+    clip = read_clip(path, options)
     if not len(measure_clip(clip)):
         raise InputError(path, NO_CYCLE, fix="Choose a clip with at least three steps straight ahead.")
     return clip
@@ -114,14 +107,13 @@ def as_data(compared: WalkComparison) -> dict[str, Any]:
 
 
 def describe(name: str, compared: WalkComparison, side: str | None = None) -> str:
-    """What both recognisers say of a clip, the stronger one first, and the effects of its limp.
+    """What the stronger recogniser says of a clip, and the effects of its limp.
 
     name: the name of the clip. side: the side that counts as hurt; None for the recognised side, or
     the right one if no side is recognised.
     """
-    answer, grade = compared.answer, compared.grade
-    side = side or grade.side or answer.side or RIGHT
-    people = effects_of_people()
+    grade, people = compared.grade, effects_of_people()
+    side = side or grade.side or RIGHT
     lines = [
         f"{name}: {grade.name} ({compared.cycles} cycles), strength {grade.strength:.2f} (mean of people "
         f"with this limp: 1), {grade.distance:.1f} standard deviations from the likeliest known walk",
@@ -129,9 +121,6 @@ def describe(name: str, compared: WalkComparison, side: str | None = None) -> st
         f"  probabilities: {_listed(grade.probabilities)}",
         f"  share of the {len(compared.window_grades)} windows with each answer: "
         f"{_in_words(shares_of_answers(compared.window_grades))}",
-        "  a simpler recogniser, blind to mild limps: "
-        f"{answer.name}; {_listed(answer.probabilities)}; windows: "
-        f"{_in_words(shares_of_answers(compared.window_answers))}",
         f"  effects if the {side} side is hurt. "
         f"The other columns show limps of people: mean ± standard deviation ({SOURCE})",
         " " * 24 + "".join(f"{gait[:13]:>15}" for gait in people),

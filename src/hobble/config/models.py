@@ -10,7 +10,6 @@ from pydantic import AfterValidator, Field, create_model, field_validator, model
 from hobble.channels import CHANNEL_NAMES, channel
 from hobble.core.clip_files import CLIP_NAME_RULE, is_valid_clip_name
 from hobble.core.section import (
-    Finite,
     FrameRange,
     Gait,
     Ground,
@@ -86,7 +85,6 @@ class ClipEntry(Section):
         "`hurt.versions` and `hurt.longest` of the data set",
     )
     loops: Positive | None = Field(None, description="overrides motion.loops")
-    heading: Finite | None = Field(None, description="overrides motion.heading")
 
 
 class Dataset(Section):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, Self
@@ -40,10 +40,8 @@ def other_side(name: str) -> str:
 
 
 # Every character has a joint for each of these roles.
-NEEDED_ROLES = (
-    "hips",
-    *(f"{side}_{part}" for side in ("left", "right") for part in ("hip", "knee", "heel", "toe")),
-)
+LIMB_PARTS = ("shoulder", "elbow", "wrist", "hip", "knee", "heel", "toe")
+NEEDED_ROLES = ("hips", "head", *(f"{side}_{part}" for side in ("left", "right") for part in LIMB_PARTS))
 # A coordinate of a joint from its parent, cm.
 Coordinate = Annotated[float, Field(strict=True, ge=-1e5, le=1e5, allow_inf_nan=False)]
 Offset = tuple[Coordinate, Coordinate, Coordinate]
@@ -243,6 +241,30 @@ def skeleton_from_data(
         raise InputError(path, f"its skeleton has no joint for the roles {', '.join(missing)}", fix=fix)
     name = read_declared(path, "its skeleton's name", ShortName, entries.get("name"), fix)  # type: ignore[arg-type]
     return Skeleton.from_dict({**entries, "name": name})
+
+
+# Paths in a hierarchy. `parents` is the index of each joint's parent, or -1 for the root.
+
+
+def path_to_root(parents: Sequence[int], joint: int) -> list[int]:
+    """The joint and all its ancestors, the root last."""
+    chain = [joint]
+    while parents[chain[-1]] >= 0:
+        chain.append(parents[chain[-1]])
+    return chain
+
+
+def lowest_common_ancestor(parents: Sequence[int], joints: Iterable[int]) -> int:
+    """The lowest common ancestor of `joints`. A joint counts as its own ancestor here."""
+    first, *others = (path_to_root(parents, j) for j in joints)
+    return next(j for j in first if all(j in other for other in others))
+
+
+def path_between(parents: Sequence[int], start: int, end: int) -> list[int]:
+    """The joints from `start` to `end`, both included: up to their lowest common ancestor, then down."""
+    meet = lowest_common_ancestor(parents, (start, end))
+    up, down = path_to_root(parents, start), path_to_root(parents, end)
+    return up[: up.index(meet) + 1] + down[: down.index(meet)][::-1]
 
 
 def rest_positions(skeleton: Skeleton) -> Array:

@@ -15,8 +15,7 @@ from hobble.core.files import atomic_path
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 from hobble.figure.mesh import TEXTURE, Mesh, body_mesh
-from hobble.figure.pack import whole_weights
-from hobble.figure.rig import Rig, rig_of
+from hobble.figure.pack import Rig, rig_of, whole_weights
 
 METRES = 0.01  # metres per centimetre
 LEAST_MOVEMENT = 1e-5  # a joint counts as still if each component of its rotation varies by less than this

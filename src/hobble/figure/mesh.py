@@ -17,7 +17,13 @@ from hobble.core import quat
 from hobble.core.compiled import njit
 from hobble.core.files import load_npz
 from hobble.core.quat import Array
-from hobble.core.skeleton import NEEDED_ROLES, Skeleton, rest_positions
+from hobble.core.skeleton import (
+    NEEDED_ROLES,
+    Skeleton,
+    lowest_common_ancestor,
+    path_between,
+    rest_positions,
+)
 
 FIGURE = Path(__file__).with_name("body.npz")
 TEXTURE = Path(__file__).with_name("body.jpg")
@@ -50,7 +56,7 @@ def modelled_pose(skeleton: Skeleton) -> Pose:
     Its rest pose must stand and face +Z (see config/skeletons/README.md). Raises KeyError if one of
     `hobble.core.skeleton.NEEDED_ROLES` is missing.
     """
-    joint_of = _find_bones(skeleton)
+    joint_of, rest = _find_bones(skeleton), rest_positions(skeleton)
     aims = _bone_directions(joint_of)
     count = len(skeleton.joints)
     rotations, positions = np.tile(quat.IDENTITY, (count, 1)), np.zeros((count, 3))
@@ -63,60 +69,27 @@ def modelled_pose(skeleton: Skeleton) -> Pose:
             rotations[j] = quat.IDENTITY
         elif j in aims:
             below, direction = aims[j]
-            bone = quat.rotate(rotations[j], _rest_vector(skeleton, j, below))
+            bone = quat.rotate(rotations[j], rest[below] - rest[j])
             if np.linalg.norm(bone) > SHORTEST_BONE:
                 rotations[j] = quat.mul(quat.between(bone, direction), rotations[j])
-    known = {role: positions[skeleton.role(role)] for role in skeleton.roles if _has_role(skeleton, role)}
-    return Pose(positions, rotations, joint_of, _with_missing_roles(known))
-
-
-def _has_role(skeleton: Skeleton, role: str) -> bool:
-    """Whether the skeleton has a joint for a role."""
-    return skeleton.roles.get(role) in skeleton.joints
+    at = {role: positions[skeleton.role(role)] for role in skeleton.roles}
+    # Rough proportions of a person.
+    middle = (at["left_shoulder"] + at["right_shoulder"]) / 2
+    at.setdefault("neck", middle + 0.35 * (at["head"] - middle))
+    at.setdefault("chest", at["hips"] + 0.62 * (at["neck"] - at["hips"]))
+    at.setdefault("spine", at["hips"] + 0.45 * (at["chest"] - at["hips"]))
+    return Pose(positions, rotations, joint_of, at)
 
 
 def _find_bones(skeleton: Skeleton) -> dict[str, int]:
     """`Pose.joint_of` for a skeleton."""
-    for role in NEEDED_ROLES:
-        skeleton.role(role)  # raises KeyError with the name of the missing role
-    found = {role: skeleton.role(role) for role in skeleton.roles if _has_role(skeleton, role)}
-    top = next(found[role] for role in ("head", "neck", "chest", "spine", "hips") if role in found)
-    found.setdefault("neck", max(skeleton.parents[found["head"]], 0) if "head" in found else top)
-    found.setdefault("head", top)
-    for side in SIDES:
-        found.setdefault(f"{side}_shoulder", top)
-        found.setdefault(f"{side}_elbow", found[f"{side}_shoulder"])
-        found.setdefault(f"{side}_wrist", found[f"{side}_elbow"])
-    found.setdefault("chest", _common_joint(skeleton, found["left_shoulder"], found["right_shoulder"]))
-    found.setdefault("spine", _first_below(skeleton, found["hips"], found["chest"]))
+    found = {role: skeleton.role(role) for role in {*NEEDED_ROLES, *skeleton.roles}}
+    found.setdefault("neck", max(skeleton.parents[found["head"]], 0))
+    shoulders = [found[f"{side}_shoulder"] for side in SIDES]
+    found.setdefault("chest", lowest_common_ancestor(skeleton.parents, shoulders))
+    # The first joint on the way from the hips to the chest, if there is one.
+    found.setdefault("spine", path_between(skeleton.parents, found["hips"], found["chest"])[:2][-1])
     return found
-
-
-def _chain(skeleton: Skeleton, joint: int) -> list[int]:
-    """The joint and all its ancestors, nearest first."""
-    out = [joint]
-    while skeleton.parents[out[-1]] >= 0:
-        out.append(skeleton.parents[out[-1]])
-    return out
-
-
-def _common_joint(skeleton: Skeleton, a: int, b: int) -> int:
-    """The nearest common ancestor of joints a and b, or one of them if it is above the other."""
-    above = set(_chain(skeleton, b))
-    return next(j for j in _chain(skeleton, a) if j in above)
-
-
-def _first_below(skeleton: Skeleton, top: int, joint: int) -> int:
-    """The first joint on the way from `top` down to `joint`; `joint` itself if `top` is not above it."""
-    way = _chain(skeleton, joint)
-    return way[way.index(top) - 1] if top in way[1:] else joint
-
-
-def _rest_vector(skeleton: Skeleton, joint: int, below: int) -> Array:
-    """Vector (3,) in the rest pose from a joint to its descendant `below`, cm; 0 if it is no descendant."""
-    way = _chain(skeleton, below)
-    steps = way[: way.index(joint)] if joint in way else []
-    return skeleton.offsets[steps].sum(axis=0) if steps else np.zeros(3)
 
 
 def _bone_directions(joint_of: dict[str, int]) -> dict[int, tuple[int, Array]]:
@@ -132,29 +105,6 @@ def _bone_directions(joint_of: dict[str, int]) -> dict[int, tuple[int, Array]]:
             upper, lower = joint_of[f"{side}_{a}"], joint_of[f"{side}_{b}"]
             if upper != lower:
                 out[upper] = (lower, direction / np.linalg.norm(direction))
-    return out
-
-
-def _with_missing_roles(known: dict[str, Array]) -> dict[str, Array]:
-    """`Pose.position_of` from the positions of the roles that the skeleton has.
-
-    The positions of the missing roles are estimated. The factors are rough proportions of a person.
-    """
-    out = dict(known)
-    leg = float(np.linalg.norm(out["hips"] - out["left_heel"]))
-    out.setdefault("head", out["hips"] + [0.0, 0.56 * leg, 0.0])
-    for side, sign in zip(SIDES, (1.0, -1.0), strict=True):
-        way = 0.72 * (out["head"] - out["hips"])
-        out.setdefault(f"{side}_shoulder", out["hips"] + way + [sign * 0.2 * leg, 0.0, 0.0])
-    middle = (out["left_shoulder"] + out["right_shoulder"]) / 2
-    out.setdefault("neck", middle + 0.35 * (out["head"] - middle))
-    out.setdefault("chest", out["hips"] + 0.62 * (out["neck"] - out["hips"]))
-    out.setdefault("spine", out["hips"] + 0.45 * (out["chest"] - out["hips"]))
-    for side, sign in zip(SIDES, (1.0, -1.0), strict=True):
-        arm = np.array([sign * np.cos(ARMS_DOWN), -np.sin(ARMS_DOWN), 0.06])
-        upper_arm = 0.33 * leg  # length, cm
-        out.setdefault(f"{side}_elbow", out[f"{side}_shoulder"] + upper_arm * arm)
-        out.setdefault(f"{side}_wrist", out[f"{side}_elbow"] + 0.85 * upper_arm * arm)
     return out
 
 

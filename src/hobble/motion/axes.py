@@ -5,7 +5,7 @@ quaternions (4,).
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -149,27 +149,14 @@ def rest_frame(skeleton: Skeleton) -> Array:
     return snapped(quat.from_matrix(np.stack([left, up, np.cross(left, up)], axis=1)))
 
 
-@dataclass(frozen=True)
-class RigAxes:
-    """The axes of a file's coordinates, found from the motion or set by the user.
-
-    up: the axis that points up, such as "+Y". handedness: "right" or "left". facing: the axis along which the
-    rest pose faces, or "oblique" if it faces along no axis. If the coordinates are left-handed, `up` and
-    `facing` are the axes after x has been negated.
-    """
-
-    up: str
-    handedness: str
-    facing: str
-
-
 def straighten(
-    clip: Clip, up: str, handedness: str, standing: bool = True
-) -> tuple[Clip, RigAxes, str, bool]:
-    """The clip with right-handed coordinates and Y up, and the axes of its file.
+    clip: Clip, up: str, handedness: str, standing: bool
+) -> tuple[Clip, dict[str, str], str, bool]:
+    """The clip with right-handed coordinates and Y up, and the `up` and `handedness` of its file.
 
-    Also returns a sentence if motion and rest pose disagree on which axis is up, else "", and whether this is
-    in doubt. It is not if the figure crawls or moves far over the ground.
+    up: such as "+Y"; in left-handed coordinates, after x has been negated. Also returns a sentence if motion
+    and rest pose disagree on which axis is up, else "", and whether this is in doubt. It is not if the figure
+    crawls or moves far over the ground.
 
     A rest pose that faces along an axis is turned to +Z. An oblique rest pose is left as it is.
 
@@ -190,29 +177,23 @@ def straighten(
         along = np.sum(np.cross(left, upward) * ahead)
         handedness = "left" if along < -0.2 * np.linalg.norm(ahead, axis=-1).sum() else "right"
     if handedness == "left":
-        clip = _changed(clip, lambda v: v * FLIP, clip.rotations * MIRROR, clip.root * FLIP)
+        clip = changed(clip, lambda v: v * FLIP, clip.rotations * MIRROR, clip.root * FLIP)
         up_axis = {"+X": "-X", "-X": "+X"}.get(up_axis, up_axis)
     rest = rest_frame(clip.skeleton)
-    facing, cosine = _nearest_axis(quat.rotate(rest, AHEAD))
-    along_axis = cosine > 1 - 1e-9
-    axes = RigAxes(up_axis, handedness, facing if along_axis else "oblique")
+    along_axis = np.abs(quat.rotate(rest, AHEAD)).max() > 1 - 1e-9
     world = quat.between(DIRECTIONS[up_axis], UP)
     turned = _turned(clip, world, quat.inv(rest) if along_axis else quat.IDENTITY)
-    return turned, axes, note, in_doubt
-
-
-def _nearest_axis(direction: Array) -> tuple[str, float]:
-    """The axis nearest to a direction (3,), such as "+Y", and the cosine of the angle to it."""
-    cosines = unit(direction)
-    k = int(np.argmax(np.abs(cosines)))
-    return ("+" if cosines[k] > 0 else "-") + "XYZ"[k], float(abs(cosines[k]))
+    return turned, {"up": up_axis, "handedness": handedness}, note, in_doubt
 
 
 def _up_axis(clip: Clip, standing: bool) -> tuple[str, str, bool]:
     """The axis that points up, and what `straighten` returns last."""
     in_motion, in_rest = (
-        _nearest_axis(_along_body(clip.skeleton, positions).mean(axis=0))[0]
-        for positions in (clip.positions, rest_positions(clip.skeleton)[None])
+        max(DIRECTIONS, key=lambda axis: DIRECTIONS[axis] @ along)
+        for along in (
+            _along_body(clip.skeleton, positions).mean(axis=0)
+            for positions in (clip.positions, rest_positions(clip.skeleton)[None])
+        )
     )
     crawls = _crawls(clip, in_motion)
     if not standing and crawls:
@@ -269,24 +250,12 @@ def _turned(clip: Clip, world: Array, rest: Array) -> Clip:
         return clip
     rotations = quat.mul(quat.mul(rest, clip.rotations), quat.inv(rest))
     rotations[:, 0] = quat.mul(quat.mul(world, clip.rotations[:, 0]), quat.inv(rest))
-    return _changed(clip, lambda v: quat.rotate(rest, v), rotations, quat.rotate(world, clip.root))
+    return changed(clip, lambda v: quat.rotate(rest, v), rotations, quat.rotate(world, clip.root))
 
 
-def _changed(clip: Clip, vectors: Callable[[Array], Array], rotations: Array, root: Array) -> Clip:
+def changed(clip: Clip, vectors: Callable[[Array], Array], rotations: Array, root: Array) -> Clip:
     """The clip with other rotations and roots. vectors: changes all vectors (..., 3) in axes of joints."""
     ends = {name: tuple(vectors(np.array(end)).tolist()) for name, end in clip.skeleton.end_sites.items()}
     skeleton = replace(clip.skeleton, offsets=vectors(clip.skeleton.offsets), end_sites=ends)
     translations = None if clip.translations is None else vectors(clip.translations)
     return replace(clip, skeleton=skeleton, rotations=rotations, root=root, translations=translations)
-
-
-def turned_about_vertical(clip: Clip, angle: float) -> Clip:
-    """The clip turned about the vertical line through its first root position.
-
-    angle: radians, positive from +Z towards +X.
-    """
-    turn = quat.yaw(angle)
-    rotations = clip.rotations.copy()
-    rotations[:, 0] = quat.mul(turn, rotations[:, 0])
-    start = clip.root[0] * [1, 0, 1]
-    return replace(clip, rotations=rotations, root=quat.rotate(turn, clip.root - start) + start)

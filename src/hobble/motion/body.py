@@ -1,12 +1,9 @@
-"""The parts of a body on a rig: the joints of trunk, limbs and head, and where its hands point.
-
-`parents` is the index of each joint's parent, or -1 for the root.
-"""
+"""The parts of a body on a rig: the joints of trunk, limbs and head, and where its hands point."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import Any
@@ -14,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from hobble.core.quat import Array
-from hobble.core.skeleton import Skeleton
+from hobble.core.skeleton import Skeleton, lowest_common_ancestor, path_between, path_to_root
 from hobble.motion.names import part_of
 
 SIDES = ("left", "right")
@@ -27,27 +24,6 @@ REACH = 0.2
 AWAY = (0.1, 0.7)  # range of the distance from the wrist to the base of a finger, in forearm lengths
 # Forearm lengths. A finger that is shorter than the longest finger by less than this counts as equally long.
 EQUAL = 0.03
-
-
-def path_to_root(parents: Sequence[int], joint: int) -> list[int]:
-    """The joint and all its ancestors, the root last."""
-    chain = [joint]
-    while parents[chain[-1]] >= 0:
-        chain.append(parents[chain[-1]])
-    return chain
-
-
-def lowest_common_ancestor(parents: Sequence[int], joints: Iterable[int]) -> int:
-    """The lowest common ancestor of `joints`. A joint counts as its own ancestor here."""
-    first, *others = (path_to_root(parents, j) for j in joints)
-    return next(j for j in first if all(j in other for other in others))
-
-
-def path_between(parents: Sequence[int], start: int, end: int) -> list[int]:
-    """The joints from `start` to `end`, both included: up to their lowest common ancestor, then down."""
-    meet = lowest_common_ancestor(parents, (start, end))
-    up, down = path_to_root(parents, start), path_to_root(parents, end)
-    return up[: up.index(meet) + 1] + down[: down.index(meet)][::-1]
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from hobble.core.errors import HobbleError
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton, other_side
 from hobble.core.smooth import smoothstep
-from hobble.motion.axes import FLIP, MIRROR, turned_about_vertical
+from hobble.motion.axes import FLIP, MIRROR
 from hobble.motion.root import facing_directions
 
 # Loops.
@@ -106,12 +106,11 @@ def mirror_report(report: Mapping[str, Any], name: str) -> dict[str, Any]:
     return {**report, "clip": name, "mirror_of": report["clip"], "facing": 0.0 - report["facing"]}
 
 
-def loop_clip(clip: Clip, times: int, heading: float | None = None) -> Clip:
+def loop_clip(clip: Clip, times: int) -> Clip:
     """Repeat a clip of one cycle `times` times. Each repetition starts where the last one ended.
 
-    The last frame of the clip may show the same pose as its first one, or the pose before it. heading: the
-    direction in which the first cycle moves, degrees from +Z towards +X; by default as in the clip. A cycle
-    that stays within 1 cm has no direction. Raises HobbleError for a clip of less than four frames.
+    The last frame of the clip may show the same pose as its first one, or the pose before it. Raises
+    HobbleError for a clip of less than four frames.
     """
     if len(clip) < 4:
         raise HobbleError(
@@ -128,11 +127,8 @@ def loop_clip(clip: Clip, times: int, heading: float | None = None) -> Clip:
         looped = _repeat(_blended(cycle, turn, reach), turn, shift, times)
         seam_speed = _top_speed(looped.positions[: 2 * len(cycle) + 1])
         if reach >= len(cycle) // 2 or seam_speed <= FASTEST * _top_speed(clip.positions):
-            break
+            return looped
         reach = min(2 * reach, len(cycle) // 2)
-    if heading is None or np.hypot(shift[0], shift[2]) < 1.0:
-        return looped
-    return turned_about_vertical(looped, np.radians(heading) - float(np.arctan2(shift[0], shift[2])))
 
 
 def _pose(clip: Clip, frame: int) -> Array:

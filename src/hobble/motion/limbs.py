@@ -14,8 +14,9 @@ from itertools import pairwise
 import numpy as np
 
 from hobble.core.quat import Array
+from hobble.core.skeleton import lowest_common_ancestor, path_between, path_to_root
 from hobble.motion.axes import bend_direction, degrees_between, unit
-from hobble.motion.body import SIDES, Body, lowest_common_ancestor, middle, path_between, path_to_root
+from hobble.motion.body import SIDES, Body, middle
 from hobble.motion.names import are_twins, is_end, kind_score, limb_parts, part_of, side_of, side_of_pair
 
 SAMPLES = 150  # at most this many frames of the clip are looked at

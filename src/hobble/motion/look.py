@@ -2,7 +2,6 @@
 
 import html
 import json
-import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -13,9 +12,9 @@ import numpy as np
 from hobble.core.clip import Clip
 from hobble.core.clip_files import clips_in, unused_file_notes
 from hobble.core.errors import HobbleError, InputError
-from hobble.core.messages import group_messages, kind_of
+from hobble.core.messages import group_messages, in_words
 from hobble.core.quat import Array
-from hobble.motion.body import path_between
+from hobble.core.skeleton import path_between
 from hobble.motion.duplicates import ClipDigest, clip_digest, duplicate_pairs
 from hobble.motion.edit import resample
 from hobble.motion.make import fit_skeleton, load_source, make_clip
@@ -28,8 +27,6 @@ from hobble.motion.skeleton_file import load_skeleton
 
 # The table: one line for each clip, and notes on all of them.
 
-MANY = 5  # a kind of warning that at least this many clips get is printed once for all of them
-MOST_NAMED = 10  # of these clips are named
 # What to do with duplicates that do not have all in common. To hold a clip out is to keep it from training,
 # for tests.
 ADVICE, USUAL_ADVICE = "hold both out or neither", "one of them is enough"
@@ -41,10 +38,10 @@ class ClipSummary:
 
     refused: why the clip cannot be used; empty if it can. rig: name of the rig in the clip's report. fps:
     frame rate of the file. hip_height: median height of the hips, cm. speed: mean speed of the hips over the
-    ground, cm a second. steps: how often the ankles pass each other. cadence: steps a minute. standing:
-    seconds in which the figure stands. largest_difference: the joint or limb that differs most from the file
-    after retargeting, and by how many degrees; None if the clip was not retargeted. digest: the data for
-    finding duplicates; None if the clip was not read.
+    ground, cm a second. cadence: steps a minute. standing: seconds in which the figure stands.
+    largest_difference: the joint or limb that differs most from the file after retargeting, and by how many
+    degrees; None if the clip was not retargeted. digest: the data for finding duplicates; None if the clip
+    was not read.
     """
 
     name: str
@@ -54,7 +51,6 @@ class ClipSummary:
     seconds: float = 0.0
     hip_height: float = 0.0
     speed: float = 0.0
-    steps: int = 0
     cadence: float = 0.0
     standing: float = 0.0
     largest_difference: tuple[str, float] | None = None
@@ -87,27 +83,7 @@ def summarise_clips(
             refused = str(error).split("\n")[0].removeprefix(str(file)).lstrip(":, ")
             clips.append(ClipSummary(file.stem, refused=refused))
     unused = [] if folder.is_file() else unused_file_notes(folder, [file.stem for file in files])
-    short, common = shared_warnings(clips)
-    return short, [*common, *duplicate_notes(clips), *standing_notes(clips), *unused]
-
-
-def shared_warnings(clips: Sequence[ClipSummary]) -> tuple[list[ClipSummary], list[str]]:
-    """Take warnings of a kind that at least MANY clips share out of their summaries.
-
-    Returns the summaries without these warnings, and a note for each kind. Only a warning that ends with a
-    full stop can be shared. The others are about one clip.
-    """
-    warnings = ((clip.name, "", w) for clip in clips for w in clip.warnings if w.endswith("."))
-    groups = [group for group in group_messages(warnings) if len(group.clips) >= MANY]
-    kinds = {kind_of(group.message) for group in groups}
-    short = [
-        replace(clip, warnings=tuple(w for w in clip.warnings if kind_of(w) not in kinds)) for clip in clips
-    ]
-    notes = []
-    for group in groups:
-        names = ", ".join(group.clips[:MOST_NAMED]) + ", ..." * (len(group.clips) > MOST_NAMED)
-        notes.append(f"{len(group.clips)} of {len(clips)} clips ({names}), the first one: {group.message}")
-    return short, notes
+    return clips, [*duplicate_notes(clips), *standing_notes(clips), *unused]
 
 
 def summary_of_report(report: Mapping[str, Any]) -> ClipSummary:
@@ -115,17 +91,13 @@ def summary_of_report(report: Mapping[str, Any]) -> ClipSummary:
 
     The fields that would need the clip itself keep their defaults.
     """
-    warnings = [*report.get("unsure", [])]
-    if repairs := report["repairs"]:  # the start of the first one, and the number of the others
-        more = f" and {len(repairs) - 1} more" if len(repairs) > 1 else ""
-        warnings.append(f"repaired: {re.split('[;.,] ', repairs[0])[0].rstrip('.')}{more}")
     return ClipSummary(
         report["clip"],
         rig=report["rig"],
         fps=report["source_fps"],
         seconds=report["seconds"],
         largest_difference=most_different(report["retarget"]) if report.get("retarget") else None,
-        warnings=tuple(warnings),
+        warnings=(*report.get("unsure", ()), *report["repairs"]),
     )
 
 
@@ -133,15 +105,14 @@ def summary_of_clip(clip: Clip, report: Mapping[str, Any]) -> ClipSummary:
     """The whole summary of a clip. report: its report (`motion/<clip>.json`)."""
     hips = clip.positions[:, clip.skeleton.role("hips")]
     moves = np.linalg.norm(np.diff(hips[:, [0, 2]], axis=0), axis=-1)
-    seconds, steps = len(clip) / clip.fps, step_count(clip)
+    seconds = len(clip) / clip.fps
     return replace(
         summary_of_report(report),
         name=clip.name,
         seconds=seconds,
         hip_height=float(np.median(hips[:, 1])),
         speed=float(moves.sum()) / seconds,
-        steps=steps,
-        cadence=60.0 * steps / seconds,
+        cadence=60.0 * step_count(clip) / seconds,
         standing=standing_seconds(moves * clip.fps, clip.fps),
         digest=clip_digest(clip, report["sha256"]),
     )
@@ -168,9 +139,9 @@ def standing_notes(clips: Sequence[ClipSummary]) -> list[str]:
 
 
 def format_table(clips: Sequence[ClipSummary], notes: Sequence[str]) -> str:
-    """What `summarise_clips` returns as text: a line for each clip, then the notes."""
+    """What `summarise_clips` returns as text: a line for each clip, their warnings by kind, the notes."""
     width = max(4, *(len(clip.name) for clip in clips))
-    columns = f"{'rig':10} {'fps':>5} {'s':>6} {'hips':>5} {'cm/s':>5} {'steps':>5} {'/min':>4} {'stands':>6}"
+    columns = f"{'rig':10} {'fps':>5} {'s':>6} {'hips':>5} {'cm/s':>5} {'/min':>4} {'stands':>6}"
     lines = [f"{'clip':{width}} {columns}  largest difference"]
     for clip in clips:
         if clip.refused:
@@ -179,13 +150,12 @@ def format_table(clips: Sequence[ClipSummary], notes: Sequence[str]) -> str:
         difference = "not retargeted"
         if clip.largest_difference:
             difference = f"{clip.largest_difference[0]} {clip.largest_difference[1]:.0f} deg"
-        remarks = "; ".join([difference, *clip.warnings])
         lines.append(
             f"{clip.name:{width}} {clip.rig:10.10} {clip.fps:5.4g} {clip.seconds:6.1f} "
-            f"{clip.hip_height:5.0f} {clip.speed:5.0f} {clip.steps:5d} {clip.cadence:4.0f} "
-            f"{clip.standing:6.1f}  {remarks}"
+            f"{clip.hip_height:5.0f} {clip.speed:5.0f} {clip.cadence:4.0f} {clip.standing:6.1f}  {difference}"
         )
-    return "\n".join([*lines, *notes])
+    warnings = group_messages((clip.name, "", warning) for clip in clips for warning in clip.warnings)
+    return "\n".join([*lines, *map(in_words, warnings), *notes])
 
 
 # The page about a data set before training: a line for each clip, with a small walking figure. If there are
@@ -269,18 +239,17 @@ def look_page(
         summaries[n] = summary_of_clip(clip, reports[n])
         figures.append(make_figure(clip))
         foot_down[n] = float((np.asarray(contacts) > 0.5).any(axis=1).mean())
-    short, common = shared_warnings(summaries)
     # Only if all clips were read is it certain that nobody stands in them.
-    notes = standing_notes(short) if len(chosen) == len(short) else [SAMPLED.format(len(chosen))]
-    notes += [*common, *duplicate_notes(short)]
+    notes = standing_notes(summaries) if len(chosen) == len(summaries) else [SAMPLED.format(len(chosen))]
+    notes += duplicate_notes(summaries)
     if (more := len(notes) - MOST_NOTES) > 0:
         notes[MOST_NOTES:] = [f"And {more} more notes, most of them on duplicates."]
-    rows = (_row(summary, labels[n], foot_down.get(n)) for n, summary in enumerate(short))
-    seconds, title = sum(summary.seconds for summary in short), html.escape(name)
+    rows = (_row(summary, labels[n], foot_down.get(n)) for n, summary in enumerate(summaries))
+    seconds, title = sum(summary.seconds for summary in summaries), html.escape(name)
     data = json.dumps(figures, separators=(",", ":"))
     return (
         f'<!doctype html><html lang="en"><meta charset="utf-8"><title>{title}</title><style>{STYLE}</style>'
-        f"<h1>{title}</h1><p>{len(short)} clips, {seconds:.0f} s. Left is red, right is blue.</p>"
+        f"<h1>{title}</h1><p>{len(summaries)} clips, {seconds:.0f} s. Left is red, right is blue.</p>"
         + "".join(f'<p class="note">{html.escape(note)}</p>' for note in notes)
         + f"<table><thead><tr>{''.join(f'<th>{column}</th>' for column in COLUMNS)}</tr></thead>"
         + f"<tbody>{''.join(rows)}</tbody></table>"
@@ -358,18 +327,19 @@ def retarget_picture(source: Clip, result: Clip, part: str, degrees: float) -> s
     both = (("source", source), ("result", result))
     rows = [(name, clip, view) for view in ("side", "front") for name, clip in both]
     width, height = PICTURES * WIDE + 2 * EDGE, len(rows) * HIGH + 2 * EDGE
+
+    def write(x: float, y: float, text: str) -> str:
+        return f'<text x="{x:g}" y="{y:g}">{html.escape(text)}</text>'
+
     title = f"{source.name}: the {part} is {degrees:.0f} degrees off its source on average (red)"
-    texts: list[tuple[float, float, str]] = [(EDGE, 28, html.escape(title))]
-    for n, (name, _, view) in enumerate(rows):
-        texts.append((EDGE, EDGE + n * HIGH + 16, f"{name}, from the {view}"))
+    lines = [write(EDGE, 28, title)]
     for k, frame in enumerate(frames):
-        texts.append((EDGE + WIDE * (k + 0.25), height - 14, f"{frame / result.fps:.2f} s"))
-    lines = [f'<text x="{x:g}" y="{y:g}">{text}</text>' for x, y, text in texts]
-    lines += [
-        f'<g transform="translate({EDGE + WIDE * (k + 0.5):g},{EDGE + (n + 1) * HIGH - 14})">{figure}</g>'
-        for n, (_, clip, view) in enumerate(rows)
-        for k, figure in enumerate(_draw_figures(clip, frames, part, view))
-    ]
+        lines.append(write(EDGE + WIDE * (k + 0.25), height - 14, f"{frame / result.fps:.2f} s"))
+    for n, (name, clip, view) in enumerate(rows):
+        lines.append(write(EDGE, EDGE + n * HIGH + 16, f"{name}, from the {view}"))
+        for k, figure in enumerate(_draw_figures(clip, frames, part, view)):
+            x, y = EDGE + WIDE * (k + 0.5), EDGE + (n + 1) * HIGH - 14
+            lines.append(f'<g transform="translate({x:g},{y})">{figure}</g>')
     return (
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height}" width="{width}" '
         'font-family="sans-serif" font-size="14"><rect width="100%" height="100%" fill="white"/>'

@@ -15,7 +15,7 @@ import numpy as np
 from hobble.core.clip import Clip
 from hobble.core.errors import InputError
 from hobble.core.skeleton import Skeleton, rest_positions
-from hobble.motion.axes import straighten, turned_about_vertical
+from hobble.motion.axes import changed, straighten
 from hobble.motion.body import Body, body_by_roles, match_joints
 from hobble.motion.edit import facing_angle, loop_clip, repair_defects, resample, sample_times
 from hobble.motion.ground import put_on_floor, tilt_problem
@@ -37,7 +37,6 @@ from hobble.motion.retarget import (
 from hobble.motion.rig import LENGTH_OF_LEG, RigMatch, below_hips, body_in_file, likely_unit, match_rig
 from hobble.motion.skeleton_file import KnownSkeleton, load_skeleton
 
-STILL = 0.1  # cm: a joint that stays this close to its offset counts as fixed to its parent
 SAME = 1e-3  # cm: offsets count as equal if they differ from the target skeleton's by at most this much
 MOST_HEIGHT_ERROR = 3.0  # cm (two standard deviations): a clip whose height is more uncertain is refused
 FEWEST_FRAMES = 5  # of the finished clip; fewer show no motion
@@ -60,8 +59,7 @@ def make_clip(
     `motion`, already overridden by those of the clip's own entry.
 
     Returns the clip and its report (the content of `motion/<clip>.json`). Raises InputError for a file
-    that cannot be read, for an unsuitable skeleton, and for defects that cannot be repaired; with
-    `defects: refuse`, for all defects.
+    that cannot be read, for an unsuitable skeleton, and for defects that cannot be repaired.
     """
     target = load_skeleton(skeleton, skeleton_name)
     file = read_motion(bvh, options.animation)
@@ -77,11 +75,9 @@ def make_clip(
         problems = [*difference_problems(file.path, difference, source.match.rig), *problems]
     doubts = doubts + accept(file.path, problems, options)
     if loops > 1:
-        made = loop_clip(made, loops, options.heading)
+        made = loop_clip(made, loops)
         frames = len(made) // loops
         repairs.append(f"The cycle of {frames} frames was repeated {loops} times, with blended seams.")
-    if options.facing is not None:
-        made = turned_about_vertical(made, np.radians(options.facing) - facing_angle(made, 0))
     made = replace(made, name=clip)
     _check_finite(file, made)
     return made, {
@@ -155,14 +151,11 @@ def _check_length(file: Bvh, clip: Clip, target: Skeleton, options: ClipMotion) 
     """
     frames = len(clip) / clip.fps * options.fps * options.loops
     if frames * max(len(clip.skeleton.joints), len(target.joints)) > MOST_JOINT_POSES:
-        looped, fewer = "", ""
-        if options.loops > 1:
-            looped, fewer = f" with {options.loops} loops", ", or set fewer loops"
+        problem = f"{len(clip)} frames at {clip.fps:g} a second become {frames:.0f} at {options.fps:g}"
         raise InputError(
             file.path,
-            f"{len(clip)} frames at {clip.fps:g} a second become {frames:.0f} at {options.fps:g}{looped}; "
-            f"frames times joints may be at most {MOST_JOINT_POSES}",
-            fix=f"Cut it into shorter clips, or set its source_fps{fewer}.",
+            f"{problem}; frames times joints may be at most {MOST_JOINT_POSES}",
+            fix="Cut it into shorter clips, set its source_fps, or set fewer loops.",
         )
 
 
@@ -171,14 +164,9 @@ def _check_finite(file: Bvh, clip: Clip) -> None:
     for values in (clip.rotations, clip.root, clip.positions):
         bad = ~np.isfinite(values).reshape(len(clip), -1).all(axis=1)
         if bad.any():
-            short = ", ".join(file.names[j] for j in range(1, len(file.names)) if not file.offsets[j].any())
-            why = f" (in the file, these joints have no length: {short:.200})" if short else ""
-            raise InputError(
-                file.path,
-                f"the joints of {clip.skeleton.name} get rotations or positions that are not finite{why}",
-                frame=int(np.argmax(bad)) + 1,
-                fix="Check the OFFSETs and the values, and export the clip again.",
-            )
+            problem = f"the joints of {clip.skeleton.name} get rotations or positions that are not finite"
+            fix = "Check the OFFSETs and the values, and export the clip again."
+            raise InputError(file.path, problem, frame=int(np.argmax(bad)) + 1, fix=fix)
 
 
 @dataclass(frozen=True)
@@ -189,17 +177,14 @@ class FileMotion:
     only the joints of the body and a standing rest pose.
 
     match: which known skeleton the rig is, if any, and which of the rig's joints each joint of the target
-    follows. found: entries of the report: `unit`, `unit_name`, `up`, `handedness`, `rest_facing`, `stance`
-    (where the rest pose comes from, in words), and `source_start` (the file's frame, from 0, at which the
-    clip begins). has_moving_joints: whether any joint of the body except the hips moves relative to its
-    parent. repairs, notes, unsure: sentences on what was repaired, on what else users should know, and on
-    what is uncertain.
+    follows. found: entries of the report: `unit`, `up`, `handedness`, and `source_start` (the file's frame,
+    from 0, at which the clip begins). repairs, notes, unsure: sentences on what was repaired, on what else
+    users should know, and on what is uncertain.
     """
 
     clip: Clip
     match: RigMatch
     found: dict[str, Any]
-    has_moving_joints: bool
     repairs: list[str]
     notes: list[str]
     unsure: list[str]
@@ -221,8 +206,6 @@ def load_source(
     counted = []
     if len(file) != file.declared:
         problem = f"declares {file.declared} frames and has {len(file)}"
-        if options.defects == "refuse":
-            raise InputError(file.path, problem, fix="Export the clip again, or set motion.defects: repair.")
         counted = [f"The file {problem}. The {len(file)} frames are used."]
     still = accept(file.path, [_no_motion_problem(file, options)], options)
     source = _load_rig(file, target, skeleton_folder, options)
@@ -232,8 +215,6 @@ def load_source(
         if options.ground == "flat":
             clip, moved, doubts = put_on_floor(clip)
             mended, unsure = mended + moved, unsure + doubts
-    if mended and options.defects == "refuse":
-        raise InputError(file.path, mended[0], fix="Set motion.defects: repair to repair it this way.")
     found, repairs = {**source.found, "source_start": first}, counted + source.repairs + mended
     return replace(source, clip=clip, found=found, repairs=repairs, unsure=unsure)
 
@@ -258,11 +239,11 @@ def _load_rig(file: Bvh, target: KnownSkeleton, folder: str | Path, options: Cli
     if not stands and on_four_legs(body, clip.positions):
         fix = "Only clips of figures with two legs can be used."
         raise InputError(file.path, "the figure goes on four legs", fix=fix)
-    unit, unit_name, unsure = _unit(leg, options.unit)
+    unit, unsure = _unit(leg, options.unit)
     roles = match.roles if match.is_usable else body.roles(clip.skeleton.joints)
-    clip = _scaled(clip, unit, _source_fps(file, options))
-    clip = replace(clip, skeleton=replace(clip.skeleton, roles=roles))
-    has_moving_joints = _has_moving_joints(clip, body)
+    clip = changed(clip, lambda vectors: vectors * unit, clip.rotations, clip.root * unit)
+    clip = replace(clip, skeleton=replace(clip.skeleton, roles=roles), fps=_source_fps(file, options))
+    clip.skeleton.offsets[0] = 0.0  # the root has no parent
     try:
         clip, axes, note, in_doubt = straighten(clip, options.up, options.handedness, stands)
     except ValueError as error:
@@ -270,23 +251,18 @@ def _load_rig(file: Bvh, target: KnownSkeleton, folder: str | Path, options: Cli
         raise InputError(file.path, f"the up axis is in doubt: {error}", fix=fix) from None
     if note:
         (unsure if in_doubt else notes).append(note)
-    found = {"unit": unit, "unit_name": unit_name, "up": axes.up, "handedness": axes.handedness}
-    # The standing rest pose that replaces another one faces +Z.
-    found |= {"rest_facing": axes.facing if stands else "+Z", "stance": "its zero pose"}
     if not match.is_usable:
-        clip, match, found["stance"], doubts = _standing(
-            file.path, clip, body, match, target.skeleton, options
-        )
+        clip, match, doubts = _standing(file.path, clip, body, match, target.skeleton, options)
         unsure = unsure + doubts
-    return FileMotion(clip, match, found, has_moving_joints, repairs, notes, unsure)
+    return FileMotion(clip, match, {"unit": unit, **axes}, repairs, notes, unsure)
 
 
 def _standing(
     path: Path, clip: Clip, body: Body, match: RigMatch, target: Skeleton, options: ClipMotion
-) -> tuple[Clip, RigMatch, str, list[str]]:
+) -> tuple[Clip, RigMatch, list[str]]:
     """The motion on a rig that has only the joints of the body and a standing rest pose that faces +Z.
 
-    Also returns its match with the target, where the rest pose comes from, and doubts.
+    Also returns its match with the target, and doubts.
     """
     # A rig with the target's own joint names is matched with the target by these names, and any other rig by
     # the parts of the body.
@@ -301,7 +277,7 @@ def _standing(
         )
     rig = upright.clip.skeleton
     followed = named or match_joints(rig, upright.body, target, body_by_roles(target))
-    return upright.clip, RigMatch(match.rig, rig.roles, followed), upright.rest_source, upright.doubts
+    return upright.clip, RigMatch(match.rig, rig.roles, followed), upright.doubts
 
 
 def _leg_length(file: Bvh, clip: Clip, body: Body) -> float:
@@ -319,40 +295,21 @@ def _leg_length(file: Bvh, clip: Clip, body: Body) -> float:
     return float(np.median(sum(lengths)) / 2)
 
 
-def _has_moving_joints(clip: Clip, body: Body) -> bool:
-    """Whether any joint of the body except its hips moves relative to its parent."""
-    if clip.translations is None:
-        return False
-    local = clip.translations[:, [j for j in body.joints if j != body.hips]]
-    return bool(np.abs(local - np.median(local, axis=0)).max() > STILL)
-
-
-def _unit(leg: float, unit: str | float) -> tuple[float, str, list[str]]:
-    """Centimetres per unit of the file, the unit in words, and sentences on what is uncertain about it.
+def _unit(leg: float, unit: str | float) -> tuple[float, list[str]]:
+    """Centimetres per unit of the file, and sentences on what is uncertain about it.
 
     leg: length of thigh and shank together, in the file's unit. unit: the option, a number or "auto". If no
     unit gives the rig a person's size, the rig gets that of an average adult.
     """
     if unit != "auto":
-        return float(unit), f"{float(unit):g} cm (given)", []
+        return float(unit), []
     if (found := likely_unit(leg)) is not None:
-        return *found, []
+        return found, []
     doubt = (
         f"No unit gives this rig a person's size: thigh and shank together are {leg:.4g} units long. They "
         f"were taken to be {LENGTH_OF_LEG:g} cm long; motion.unit (option --unit) overrides this."
     )
-    return LENGTH_OF_LEG / leg, "unknown", [doubt]
-
-
-def _scaled(clip: Clip, unit: float, fps: float) -> Clip:
-    """The clip in centimetres, at another frame rate. unit: cm per unit of the clip."""
-    rig, moved = clip.skeleton, clip.translations
-    offsets = rig.offsets * unit
-    offsets[0] = 0.0
-    ends = {joint: (x * unit, y * unit, z * unit) for joint, (x, y, z) in rig.end_sites.items()}
-    skeleton = replace(rig, offsets=offsets, end_sites=ends)
-    moved = None if moved is None else moved * unit
-    return replace(clip, skeleton=skeleton, fps=fps, root=clip.root * unit, translations=moved)
+    return LENGTH_OF_LEG / leg, [doubt]
 
 
 def fit_skeleton(
@@ -366,8 +323,8 @@ def fit_skeleton(
     With `proportions: clip`, the clip keeps its own bone lengths if it has the target's joints and its bones
     point in the same directions in the rest pose.
     """
-    match, moved = source.match, "Movements of joints relative to their parents were "
-    clip, kept = resample(source.clip, options.fps), options.proportions == "clip"
+    match, clip = source.match, resample(source.clip, options.fps)
+    kept = options.proportions == "clip"
     if (
         match.rig == target.name
         and match.has_known_rest_pose
@@ -377,7 +334,7 @@ def fit_skeleton(
         has_equal_offsets = np.abs(reordered.skeleton.offsets - target.offsets).max() <= SAME
         if has_equal_offsets or kept:
             reordered = replace(reordered, skeleton=target) if has_equal_offsets else reordered
-            return reordered, None, [f"{moved}kept."] if source.has_moving_joints else [], source.unsure
+            return reordered, None, [], source.unsure
     followed_joints, unsure = match.followed_joints, source.unsure
     # Retargeting needs a rest pose that stands. Rigs that are no known skeleton have got one.
     if match.has_known_rest_pose:
@@ -388,15 +345,9 @@ def fit_skeleton(
         # the body.
         followed_joints = {a: b for a, b in followed_joints.items() if b in clip.skeleton.joints}
     how = plan(clip.skeleton, target, followed_joints)
-    repairs = [f"{moved}dropped, because the bone lengths changed."] if source.has_moving_joints else []
-    if kept:
-        why = f"Its rig is {'unknown' if match.rig == UNKNOWN_RIG else match.rig}"
-        if match.rig == target.name:
-            why = f"Its joints or its rest pose are not those of {target.name}"
-        repairs.append(
-            f"{why}, so it could not keep its own bone lengths. It got the bone lengths of {target.name}."
-        )
-    return retarget_clip(clip, how), how.scale, repairs, unsure
+    why = f"Its joints or its rest pose are not those of {target.name}"
+    got = [f"{why}, so it got the bone lengths of {target.name} instead of its own."] if kept else []
+    return retarget_clip(clip, how), how.scale, got, unsure
 
 
 def _reordered(clip: Clip, target: Skeleton) -> Clip:

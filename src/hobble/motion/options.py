@@ -5,23 +5,12 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Annotated, Literal, NamedTuple
+from typing import ClassVar, Literal, NamedTuple
 
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import Field, model_validator
 
 from hobble.core.errors import InputError
-from hobble.core.section import Finite, FrameRange, Ground, Positive, PositiveFloat, RelativePath, Section
-
-
-def _check_sixty(fps: float) -> float:
-    """Refuse any rate but 60 Hz. Window lengths, speeds and thresholds in other modules assume 60 Hz."""
-    if fps != 60.0:
-        raise ValueError("must be 60: all clips get 60 frames a second, whatever the rate of their files")
-    return fps
-
-
-SixtyHz = Annotated[float, AfterValidator(_check_sixty)]
-
+from hobble.core.section import FrameRange, Ground, Positive, PositiveFloat, RelativePath, Section
 
 # A name in braces in `url`, perhaps with a width of up to 99, as in {subject:0>3}: no file name needs more.
 PLACEHOLDER = re.compile(r"\{(clip|subject)(?::(?:[^{}]?[<>^])?\d{0,2})?\}")
@@ -56,7 +45,8 @@ class MotionOptions(Section):
     `auto` derives a value from the file's rig (its skeleton) and motion. Any other value overrides this.
     """
 
-    fps: SixtyHz = Field(60.0, description="frames a second of the finished clips; must be 60")
+    # Of the finished clips. Window lengths, speeds and thresholds in other modules assume 60 Hz.
+    fps: ClassVar[float] = 60.0
     source_fps: PositiveFloat | None = Field(
         None, description="frames a second of the BVH files; overrides their Frame Time"
     )
@@ -67,19 +57,13 @@ class MotionOptions(Section):
         description="handedness of the file's coordinates; left-handed ones are converted by negating x. "
         "`auto` needs joint names that say left and right",
     )
-    facing: Finite | None = Field(
-        None,
-        description="facing direction in the first frame, degrees from +Z towards +X; by default as in the "
-        "file",
-    )
     proportions: Literal["skeleton", "clip"] = Field(
         "skeleton", description="retarget onto the skeleton's bone lengths, or keep each clip's own"
     )
-    defects: Literal["repair", "refuse", "leave"] = Field(
+    defects: Literal["repair", "leave"] = Field(
         "repair",
         description="what to do with broken frames and with a floor that is not at height 0. `repair` mends "
-        "and reports them, `refuse` stops with an error, `leave` takes the clip as it is, like the code of "
-        "Holden et al.",
+        "and reports them, `leave` takes the clip as it is, like the code of Holden et al.",
     )
     accept_doubt: bool = Field(
         False,
@@ -87,11 +71,6 @@ class MotionOptions(Section):
         "knees that point aside, sliding feet, an uncertain height); the report says what",
     )
     loops: Positive = Field(1, description="how many times a clip of one cycle is played in a row")
-    heading: Finite | None = Field(
-        None,
-        description="direction in which the first cycle of a looped clip goes, degrees from +Z towards +X; "
-        "by default as in the file",
-    )
 
 
 class ClipMotion(MotionOptions):

@@ -19,9 +19,9 @@ import numpy as np
 from hobble.core import quat
 from hobble.core.clip import Clip
 from hobble.core.quat import Array
-from hobble.core.skeleton import Skeleton, local_rotations
+from hobble.core.skeleton import Skeleton, local_rotations, path_to_root
 from hobble.motion.axes import AHEAD, LEFT, UP, aligned, degrees_between, pointed_along, snapped, unit
-from hobble.motion.body import SIDES, Body, across, middle, path_to_root
+from hobble.motion.body import SIDES, Body, across, middle
 from hobble.motion.body_sample import RAISED, SHORT, BodySample, outward, spine_shares
 
 # Largest angles, in degrees, by which parts of a standing person differ from a direction. Legs are compared
@@ -67,14 +67,12 @@ class UprightMotion:
     """A clip with a standing rest pose that faces +Z with the arms out.
 
     clip: has the joints of the body, and the further joints that `with_upright_rest` was told to keep. body:
-    which joint is which part of the body. rest_source: where the rest pose comes from, in words. doubts:
-    sentences on what is uncertain. height_error: cm (two standard deviations) by which the figure may stand
-    too high or too low.
+    which joint is which part of the body. doubts: sentences on what is uncertain. height_error: cm (two
+    standard deviations) by which the figure may stand too high or too low.
     """
 
     clip: Clip = field(repr=False)
     body: Body
-    rest_source: str
     doubts: list[str]
     height_error: float
 
@@ -93,11 +91,10 @@ def with_upright_rest(
     could stand shows it.
     """
     sample = BodySample.of(clip, replace(body, arms_on_neck=_arms_on_neck(clip, body)), target)
-    problem, zero = why_not_standing(body, sample.zero_positions), None
-    if problem is None:
+    zero = None
+    if why_not_standing(body, sample.zero_positions) is None:
         zero = _frames_from_zero_pose(sample)
-        if _is_trunk_twisted(sample, zero):
-            problem, zero = "the trunk is twisted", None
+        zero = None if _is_trunk_twisted(sample, zero) else zero
     trunk = _upright_moments(sample, zero is not None)
     frames = _frames_from_motion(sample, trunk, zero)
     if zero:
@@ -106,8 +103,7 @@ def with_upright_rest(
     new_clip, new_body = _with_rest_pose(clip, sample, trunk, frames, further)
     height_error = 0.0 if zero else _height_error(sample)
     doubts = _feet_doubts(sample, zero, height_error)
-    source = "its zero pose" if zero else f"its motion, because in its zero pose {problem}"
-    return UprightMotion(new_clip, new_body, source, doubts, height_error)
+    return UprightMotion(new_clip, new_body, doubts, height_error)
 
 
 def why_not_standing(body: Body, rest: Array) -> str | None:

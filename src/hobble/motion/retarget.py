@@ -11,7 +11,7 @@ Joints that follow no joint of the source (fingers, face, roll joints) keep thei
 joint above.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -22,13 +22,20 @@ from hobble.core import quat
 from hobble.core.clip import Clip
 from hobble.core.errors import HobbleError
 from hobble.core.quat import Array
-from hobble.core.skeleton import Skeleton, aim_bone, local_rotations, rest_positions, two_bone_knee
+from hobble.core.skeleton import (
+    Skeleton,
+    aim_bone,
+    local_rotations,
+    path_between,
+    rest_positions,
+    two_bone_knee,
+)
 from hobble.core.smooth import gaussian, lowest, smooth_above, smoothstep
-from hobble.motion.axes import UP, angles_between, bend_direction, degrees_between, rest_frame, unit
-from hobble.motion.body import SIDES, path_between
+from hobble.motion.axes import AHEAD, UP, angles_between, bend_direction, degrees_between, rest_frame, unit
+from hobble.motion.body import SIDES
 from hobble.motion.ground import steady_heels
 from hobble.motion.options import Problem
-from hobble.motion.rig import leg_length, leg_lengths, missing_bone
+from hobble.motion.rig import leg_length, leg_lengths
 
 # Bones of limbs, without the side: role of the joint that turns the bone -> role of the joint at its end.
 LIMB_BONES = {"shoulder": "elbow", "elbow": "wrist", "hip": "knee", "knee": "heel"}
@@ -101,11 +108,9 @@ def plan(source: Skeleton, target: Skeleton, followed_joints: Mapping[str, str])
             raise HobbleError(
                 f"no joint of {source.name} moves {target.roles[role]} ({role}) of {target.name}"
             )
-    for skeleton in (source, target):
-        if bone := missing_bone(skeleton):
-            raise HobbleError(f"the bone from {bone} of {skeleton.name} has no length")
     # The upright pose has the body's left at +X, up at +Y and forward at +Z.
-    upright_to_source, target_to_upright = rest_frame(source), quat.inv(rest_frame(target))
+    upright_to_source, upright_to_target = rest_frame(source), rest_frame(target)
+    target_to_upright = quat.inv(upright_to_target)
     turns = np.broadcast_to(quat.mul(upright_to_source, target_to_upright), (len(pairs), 4)).copy()
     limb_turns = _limb_turns(source, target, upright_to_source, target_to_upright)
     for i, pair in enumerate(pairs):
@@ -122,7 +127,7 @@ def plan(source: Skeleton, target: Skeleton, followed_joints: Mapping[str, str])
         turns=turns,
         drivers=drivers,
         driver_offsets=driver_offsets,
-        forward=quat.rotate(rest_frame(target), np.array([0.0, 0.0, 1.0])),
+        forward=quat.rotate(upright_to_target, AHEAD),
         pelvis=middle - rest[target.role("hips")],
         scale=scale,
         lifts=_hip_heights(target, target_to_upright)
@@ -135,7 +140,8 @@ def _limb_turns(
 ) -> dict[tuple[int, int], Array]:
     """(target joint, source joint) -> the turn (4,) that makes their bones parallel, for each limb bone.
 
-    The joints are those at the start of the bones. `Retarget` explains turns.
+    The joints are those at the start of the bones. `Retarget` explains turns. Raises HobbleError if a bone of
+    a leg has no length.
     """
     target_rest, source_rest = rest_positions(target), rest_positions(source)
     out = {}
@@ -147,6 +153,10 @@ def _limb_turns(
             follower, leader = target.role(roles[0]), source.role(roles[0])
             bone = target_rest[target.role(roles[1])] - target_rest[follower]
             source_bone = source_rest[source.role(roles[1])] - source_rest[leader]
+            for skeleton, vector in ((source, source_bone), (target, bone)):
+                if start in ("hip", "knee") and np.linalg.norm(vector) < 1e-6:
+                    joints = " to ".join(skeleton.roles[role] for role in roles)
+                    raise HobbleError(f"the bone from {joints} of {skeleton.name} has no length")
             turn = quat.between(
                 quat.rotate(target_to_upright, bone), quat.rotate(quat.inv(upright_to_source), source_bone)
             )
@@ -178,36 +188,20 @@ def _drivers(target: Skeleton, joints: Array) -> tuple[Array, Array]:
 
 def retarget_clip(clip: Clip, how: Retarget) -> Clip:
     """The clip's motion on the target skeleton. how: what `plan` returns for the two skeletons."""
-    rotations = follow(how, clip.global_rotations)
+    rotations = np.empty((len(clip), len(how.target.joints), 4))  # only those of `how.joints` are set
+    rotations[:, how.joints] = quat.mul(clip.global_rotations[:, how.follows], how.turns)
     how = _with_measured_lifts(how, clip, rotations)
-    at, balls = clip.at_roles(), [clip.positions[:, how.source.role(f"{s}_toe")] * how.scale for s in SIDES]
-    left = at["left_hip"] - at["right_hip"]
-    lean = float(np.mean(np.arcsin(np.clip(unit(left)[:, 1], -1.0, 1.0))))
-    how = level_pelvis(how, rotations, left, lean, [_standing_height(ball) for ball in balls])
+    how = _with_level_pelvis(how, clip, rotations)
     for side in SIDES:
         heel, toe = (clip.positions[:, how.source.role(f"{side}_{part}")] for part in ("heel", "toe"))
         ankle, ball = how.target.role(f"{side}_heel"), how.target.role(f"{side}_toe")
         foot = quat.rotate(rotations[:, ankle], how.driver_offsets[ball])
         tilt = steady_heels(foot, heel * how.scale, toe * how.scale, clip.fps)
         rotations[:, ankle] = quat.mul(tilt, rotations[:, ankle])
-    swings = [_swing(ball, clip.fps) for ball in balls]
-    around = 2 * round(0.25 * clip.fps) + 1
-    heights = [ball[:, 1] - lowest(ball[:, 1], around) for ball in balls]
-    reach = max(1, round(SMOOTH * clip.fps))
-    hips = bend_legs(how, clip.positions, rotations, swings, heights, lambda drop: smooth_above(drop, reach))
+    hips = _bend_legs(how, clip, rotations)
     root = hips + quat.rotate(rotations[:, how.target.role("hips")], how.driver_offsets[0])
     local = quat.continuous(local_rotations(how.target, rotations[:, how.drivers]))
     return Clip(clip.name, how.target, clip.fps, local, root)
-
-
-def follow(how: Retarget, rotations: Array) -> Array:
-    """(..., J, 4) world rotations of the target's joints; only those of `how.joints` are set.
-
-    rotations: (..., J, 4) of the source's joints in the world.
-    """
-    out = np.empty((*rotations.shape[:-2], len(how.target.joints), 4))
-    out[..., how.joints, :] = quat.mul(rotations[..., how.follows, :], how.turns)
-    return out
 
 
 def _with_measured_lifts(how: Retarget, clip: Clip, rotations: Array) -> Retarget:
@@ -239,21 +233,21 @@ def _swing(ball: Array, fps: float) -> Array:
     return smoothstep((speed - SWING[0]) / (SWING[1] - SWING[0]))
 
 
-def level_pelvis(
-    how: Retarget, rotations: Array, left: Array, lean: float = 0.0, heights: Sequence[float] = (0.0, 0.0)
-) -> Retarget:
+def _with_level_pelvis(how: Retarget, clip: Clip, rotations: Array) -> Retarget:
     """The plan with `lifts` that let the feet stand equally high; the pelvis is turned by the difference.
 
     If the figure's legs are not equally long, its pelvis leans to the shorter leg while its feet are level.
     Legs of equal length then have level feet only with a level pelvis. So the pelvis is turned until the feet
     are level, but it does not lean to the other side by more than LEVEL.
 
-    rotations: (..., J, 4) of the target's joints in the world, of which those of the pelvis are changed.
-    left: (..., 3) from the source's right hip to its left. lean: radians by which this line leans on average.
-    heights: cm, of the balls of both feet while they stand.
+    rotations: (F, J, 4) of the target's joints in the world, of which those of the pelvis are changed.
     """
+    at = clip.at_roles()
+    heights = [_standing_height(at[f"{side}_toe"] * how.scale) for side in SIDES]
     if abs(heights[0] - heights[1]) > UNEVEN:
         return how
+    left = at["left_hip"] - at["right_hip"]
+    lean = float(np.mean(np.arcsin(np.clip(unit(left)[:, 1], -1.0, 1.0))))
     rest, role = rest_positions(how.target), how.target.role
     width = float(np.linalg.norm(rest[role("left_hip")] - rest[role("right_hip")]))
     needed = np.arcsin(np.clip((how.lifts[0] - how.lifts[1] - heights[0] + heights[1]) / width, -0.3, 0.3))
@@ -263,55 +257,47 @@ def level_pelvis(
     tops = [parents[role(f"{side}_hip")] for side in SIDES]
     pelvis = sorted({j for top in tops for j in path_between(parents, hips, top)})
     ahead = unit(np.cross(left, UP))
-    by = quat.normalize(quat.from_axis_angle(ahead, np.full(ahead.shape[:-1], turn)))
-    rotations[..., pelvis, :] = quat.mul(by[..., None, :], rotations[..., pelvis, :])
+    by = quat.normalize(quat.from_axis_angle(ahead, np.full(len(ahead), turn)))
+    rotations[:, pelvis] = quat.mul(by[:, None], rotations[:, pelvis])
     return replace(how, lifts=how.lifts - 0.5 * width * np.sin(turn) * np.array([1.0, -1.0]))
 
 
-def bend_legs(
-    how: Retarget,
-    source: Array,
-    rotations: Array,
-    swings: Sequence[Array],
-    heights: Sequence[Array],
-    smooth: Callable[[Array], Array],
-) -> Array:
+def _bend_legs(how: Retarget, clip: Clip, rotations: Array) -> Array:
     """Turn thighs and shanks so that the balls of the feet are where they are in the scaled source.
 
-    source: (..., J, 3) positions of the source's joints. rotations: (..., J, 4) of the target's joints in the
-    world, which are changed. swings: for each foot (...) how much it swings, 0 to 1. heights: for each foot
-    (...) how high it is above the ground, cm. smooth: makes the drop of the hips smooth over time.
-
-    Returns the positions (..., 3) of the hips, which come down where a leg would be too straight.
+    rotations: (F, J, 4) of the target's joints in the world, which are changed. Returns the positions (F, 3)
+    of the hips, which come down where a leg would be too straight.
     """
-    hips = _hips_position(how, source, rotations)
-    legs = [_Leg(how, source, rotations, hips, side) for side in SIDES]
+    hips = _hips_position(how, clip.positions, rotations)
+    legs = [_Leg(how, clip.positions, rotations, hips, side) for side in SIDES]
     too_high = [np.maximum(excess, 0.0) * weight for excess, weight in (leg.excess(SPARED) for leg in legs)]
-    drop = smooth(np.maximum(*too_high))[..., None] * UP
-    for leg, swing, height in zip(legs, swings, heights, strict=True):
-        leg.bend(leg.start - drop, swing, height)
+    drop = smooth_above(np.maximum(*too_high), max(1, round(SMOOTH * clip.fps)))[:, None] * UP
+    for leg, side in zip(legs, SIDES, strict=True):
+        ball = clip.positions[:, how.source.role(f"{side}_toe")] * how.scale
+        above_ground = ball[:, 1] - lowest(ball[:, 1], 2 * round(0.25 * clip.fps) + 1)
+        leg.bend(leg.start - drop, _swing(ball, clip.fps), above_ground)
     return hips - drop
 
 
 def _hips_position(how: Retarget, source: Array, rotations: Array) -> Array:
-    """(..., 3) position of the target's hips before they come down.
+    """(F, 3) position of the target's hips before they come down.
 
     It puts the middle between the target's hip joints where it is in the scaled source, raised by the mean of
     `how.lifts`.
     The hips joint itself is not compared, because skeletons have it at different places in the pelvis.
     """
-    middle = 0.5 * sum(source[..., how.source.role(f"{side}_hip"), :] for side in SIDES)
-    to_middle = quat.rotate(rotations[..., how.target.role("hips"), :], how.pelvis)
+    middle = 0.5 * sum(source[:, how.source.role(f"{side}_hip")] for side in SIDES)
+    to_middle = quat.rotate(rotations[:, how.target.role("hips")], how.pelvis)
     return middle * how.scale + np.array([0.0, np.mean(how.lifts), 0.0]) - to_middle
 
 
 class _Leg:
     """A leg of the target, from its hip to the position that the foot must reach.
 
-    source: (..., J, 3) positions of the source's joints. rotations: (..., J, 4) of the target's joints; the
-    method `bend` changes the rotations of thigh and shank. hips: (..., 3) position of the target's hips.
-    Attributes start, ankle: (..., 3) where the leg begins, and where its ankle must be so that the ball of
-    the foot is where the scaled source has it. stretch: (...) distance from hip to ankle in the source, as a
+    source: (F, J, 3) positions of the source's joints. rotations: (F, J, 4) of the target's joints; the
+    method `bend` changes the rotations of thigh and shank. hips: (F, 3) position of the target's hips.
+    Attributes start, ankle: (F, 3) where the leg begins, and where its ankle must be so that the ball of
+    the foot is where the scaled source has it. stretch: (F,) distance from hip to ankle in the source, as a
     share of the leg's length.
     """
 
@@ -323,18 +309,18 @@ class _Leg:
         self.start, joint = hips, self.hip
         while joint != how.target.role("hips"):
             above = how.drivers[how.target.parents[joint]]
-            self.start = self.start + quat.rotate(rotations[..., above, :], how.driver_offsets[joint])
+            self.start = self.start + quat.rotate(rotations[:, above], how.driver_offsets[joint])
             joint = above
-        toe = source[..., how.source.role(roles[3]), :] * how.scale
+        toe = source[:, how.source.role(roles[3])] * how.scale
         toe = toe + (np.mean(how.lifts) - how.lifts[SIDES.index(side)]) * UP
-        self.ankle = toe - quat.rotate(rotations[..., heel, :], how.driver_offsets[ball])
-        hip_at, knee_at, heel_at = (source[..., how.source.role(role), :] for role in roles[:3])
+        self.ankle = toe - quat.rotate(rotations[:, heel], how.driver_offsets[ball])
+        hip_at, knee_at, heel_at = (source[:, how.source.role(role)] for role in roles[:3])
         length = np.linalg.norm(knee_at - hip_at, axis=-1) + np.linalg.norm(heel_at - knee_at, axis=-1)
         self.stretch = np.linalg.norm(heel_at - hip_at, axis=-1) / length
         self.knee_bend = angles_between(knee_at - hip_at, heel_at - knee_at)
 
     def excess(self, spared: float = 0.0) -> tuple[Array, Array]:
-        """(...) cm by which the hips are too high for the leg to bend as in the source, and a weight.
+        """(F,) cm by which the hips are too high for the leg to bend as in the source, and a weight.
 
         spared: radians by which the knee may bend less than in the source. The weight is from 0 for a bent
         leg, which changes little with the height of the hips, to 1.
@@ -342,13 +328,13 @@ class _Leg:
         reach = self._reach(np.maximum(self.knee_bend - spared, 0.0))
         from_ankle = self.start - self.ankle
         # At the right height, the hip is at the distance `reach` from the ankle (Pythagoras).
-        level_squared = np.minimum(from_ankle[..., 0] ** 2 + from_ankle[..., 2] ** 2, reach**2)
-        excess = from_ankle[..., 1] - np.sqrt(reach**2 - level_squared)
+        level_squared = np.minimum(from_ankle[:, 0] ** 2 + from_ankle[:, 2] ** 2, reach**2)
+        excess = from_ankle[:, 1] - np.sqrt(reach**2 - level_squared)
         straightness = np.clip((self.stretch - BENT) / (NEARLY_STRAIGHT - BENT), 0.0, 1.0)
         return np.clip(excess, -MOST_DROP, MOST_DROP), smoothstep(straightness)
 
     def _reach(self, bend: Array) -> Array:
-        """(...) distance from hip to ankle while the knee is bent by so many radians."""
+        """(F,) distance from hip to ankle while the knee is bent by so many radians."""
         thigh, shank = np.linalg.norm(self.thigh), np.linalg.norm(self.shank)
         return np.sqrt(thigh**2 + shank**2 + 2 * thigh * shank * np.cos(bend))
 
@@ -359,33 +345,24 @@ class _Leg:
         knee by some degrees more or less. In a swing, the knee bends as in the source, and the ball may be
         elsewhere, but not below half its height.
 
-        start: (..., 3) where the leg begins after the hips came down. swing, height: see `bend_legs`.
+        start: (F, 3) where the leg begins after the hips came down. swing: (F,) how much the foot swings, 0
+        to 1. height: (F,) how high its ball is above the ground, cm.
         """
         line = self.ankle - start
         distance = np.linalg.norm(line, axis=-1)
-        down = np.maximum(-line[..., 1] / np.maximum(distance, 1e-9), 0.1)
+        down = np.maximum(-line[:, 1] / np.maximum(distance, 1e-9), 0.1)
         shift = np.minimum(swing * (self._reach(self.knee_bend) - distance), 0.5 * height / down)
         ankle = self.ankle + unit(line) * shift[..., None]
-        upper, lower = self.rotations[..., self.hip, :], self.rotations[..., self.knee, :]
-        pole = _knee_direction(upper, lower, self.thigh, self.shank, self.forward)
+        upper, lower = self.rotations[:, self.hip], self.rotations[:, self.knee]
+        thigh = quat.rotate(upper, self.thigh)
+        pole = bend_direction(np.zeros(3), thigh, thigh + quat.rotate(lower, self.shank))
+        pole += np.maximum(STRAIGHT - np.linalg.norm(pole, axis=-1), 0.0)[:, None] * quat.rotate(
+            upper, self.forward
+        )
         lengths = float(np.linalg.norm(self.thigh)), float(np.linalg.norm(self.shank))
         knee_at, ankle_at = two_bone_knee(start, ankle, pole, *lengths)
-        self.rotations[..., self.hip, :] = aim_bone(upper, self.thigh, knee_at - start)
-        self.rotations[..., self.knee, :] = aim_bone(lower, self.shank, ankle_at - knee_at)
-
-
-def _knee_direction(hip: Array, knee: Array, thigh: Array, shank: Array, ahead: Array) -> Array:
-    """(..., 3) direction from the line between hip and ankle to the knee; forward for a straight leg.
-
-    hip, knee: (..., 4) rotations of these joints. thigh, shank: (3,) bones below them. ahead: (3,) forward in
-    the rest pose.
-    """
-    to_knee = quat.rotate(hip, thigh)
-    line = to_knee + quat.rotate(knee, shank)
-    line = line / np.linalg.norm(line, axis=-1, keepdims=True)
-    bend = to_knee - line * np.sum(to_knee * line, axis=-1, keepdims=True)
-    straight = np.clip(STRAIGHT - np.linalg.norm(bend, axis=-1, keepdims=True), 0.0, None)
-    return bend + straight * quat.rotate(hip, ahead)
+        self.rotations[:, self.hip] = aim_bone(upper, self.thigh, knee_at - start)
+        self.rotations[:, self.knee] = aim_bone(lower, self.shank, ankle_at - knee_at)
 
 
 # Checks that retargeting kept the motion.

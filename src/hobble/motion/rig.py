@@ -15,14 +15,14 @@ from hobble.core import quat
 from hobble.core.clip import Clip
 from hobble.core.errors import InputError
 from hobble.core.quat import Array
-from hobble.core.skeleton import Skeleton, rest_positions
+from hobble.core.skeleton import Skeleton, path_between, path_to_root, rest_positions
 from hobble.motion.axes import body_axes, unit
-from hobble.motion.body import ARM, LEG, SIDES, Body, body_by_roles, path_between, path_to_root, with_fingers
+from hobble.motion.body import ARM, LEG, SIDES, Body, body_by_roles, with_fingers
 from hobble.motion.limbs import Doubt, TwoFigures, find_body
 from hobble.motion.skeleton_file import KnownSkeleton, load_skeleton
 
-# Name of a unit of length -> centimetres. The unit of CMU files is an inch / 0.45.
-UNITS = {"cm": 1.0, "inch": 2.54, "m": 100.0, "mm": 0.1, "CMU": 5.6444, "foot": 30.48}
+# Centimetres: cm, inch, m, mm, the unit of CMU files (an inch / 0.45), and foot.
+UNITS = (1.0, 2.54, 100.0, 0.1, 5.6444, 30.48)
 LENGTH_OF_LEG = 80.0  # cm: length of thigh plus shank of an average adult
 LEG_RANGE = (35.0, 125.0)  # cm: length of thigh plus shank, from small children to giants
 # A rig is taken for a known skeleton only if at least this share of the rig's joint names occur in that
@@ -184,23 +184,16 @@ def joint_pairs(source: KnownSkeleton, target: KnownSkeleton) -> dict[str, str]:
     The pairs come from a map of one skeleton to the other, or from maps of both to a third skeleton. Without
     such maps, the result is empty.
     """
-    source_name, target_name = source.skeleton.name, target.skeleton.name
-    if source_name == target_name:
-        return {name: name for name in target.skeleton.joints}
-    if source_name in target.maps:
-        return dict(target.maps[source_name])
-    if target_name in source.maps:
-        return _reversed(source.maps[target_name])
-    for hub in source.maps:
-        if hub in target.maps:
-            to_source = _reversed(source.maps[hub])
-            return {a: to_source[b] for a, b in target.maps[hub].items() if b in to_source}
+    from_source, from_target = (
+        {known.skeleton.name: {name: name for name in known.skeleton.joints}, **known.maps}
+        for known in (source, target)
+    )
+    for hub, pairs in from_source.items():
+        if hub in from_target:
+            # If several joints map to the same joint of the hub, the first of them in the map counts.
+            to_source = {b: a for a, b in reversed(pairs.items())}
+            return {a: to_source[b] for a, b in from_target[hub].items() if b in to_source}
     return {}
-
-
-def _reversed(pairs: Mapping[str, str]) -> dict[str, str]:
-    """Invert a map. If several joints map to the same joint, the first of them in the map counts."""
-    return {b: a for a, b in reversed(list(pairs.items()))}
 
 
 def leg_lengths(skeleton: Skeleton) -> Array:
@@ -214,26 +207,14 @@ def leg_length(skeleton: Skeleton) -> float:
     return float(leg_lengths(skeleton).mean())
 
 
-def missing_bone(skeleton: Skeleton) -> str | None:
-    """The first leg bone without length, such as "LeftUpLeg to LeftLeg"; None if all have a length."""
-    for side in SIDES:
-        for start, end in pairwise(LEG[:3]):
-            a, b = (skeleton.roles[f"{side}_{part}"] for part in (start, end))
-            if np.linalg.norm(skeleton.offsets[skeleton.index(b)]) < 1e-6:
-                return f"{a} to {b}"
-    return None
+def likely_unit(leg: float) -> float | None:
+    """The likely unit of a file, in centimetres.
 
-
-def likely_unit(leg: float) -> tuple[float, str] | None:
-    """The likely unit of a file: centimetres per unit, and the name of the unit.
-
-    leg: length of thigh plus shank in the file's unit. The unit is the one that brings this length nearest to
-    LENGTH_OF_LEG. None if it is not within LEG_RANGE even then.
+    leg: length of thigh plus shank in the file's unit, more than 0. The unit is the one that brings this
+    length nearest to LENGTH_OF_LEG. None if it is not within LEG_RANGE even then.
     """
-    if leg <= 0:
-        return None
-    name = min(UNITS, key=lambda unit: abs(np.log(leg * UNITS[unit] / LENGTH_OF_LEG)))
-    return (UNITS[name], name) if LEG_RANGE[0] <= leg * UNITS[name] <= LEG_RANGE[1] else None
+    nearest = min(UNITS, key=lambda unit: abs(np.log(leg * unit / LENGTH_OF_LEG)))
+    return nearest if LEG_RANGE[0] <= leg * nearest <= LEG_RANGE[1] else None
 
 
 def body_in_file(path: Path, raw: Clip, known: RigMatch | None, handedness: str) -> tuple[Body, list[str]]:

@@ -14,14 +14,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from pydantic import ValidationError
 
 from hobble.core.errors import InputError
 from hobble.core.files import printable, read_text, read_yaml
-from hobble.core.skeleton import Skeleton
-from hobble.motion.body import ARM, LEG, SIDES, TRUNK, lowest_common_ancestor, path_between, path_to_root
+from hobble.core.skeleton import Skeleton, SkeletonData, lowest_common_ancestor, path_between, path_to_root
+from hobble.motion.body import ARM, LEG, SIDES, TRUNK
 from hobble.motion.names import KINDS, limb_parts, part_of, side_of
 
-FARTHEST = 1e5  # cm: each component of a joint's offset from its parent is at most this large
 # The roles of each limb, from the trunk outward, and all roles that there are.
 LIMBS = [tuple(f"{side}_{part}" for part in limb) for side in SIDES for limb in (ARM, LEG)]
 ROLES = (*TRUNK, *(role for limb in LIMBS for role in limb))
@@ -67,10 +67,7 @@ def _load(path: Path, name: str, changed: int, size: int) -> KnownSkeleton:
     for section, key, problem, fix in _mistakes(data):
         line = _line_of(read_text(path), section, key)
         raise InputError(path, printable(problem, 400), line=line, fix=fix)
-    try:
-        return KnownSkeleton(Skeleton.from_dict({**data, "name": name}), data.get("maps") or {})
-    except (AttributeError, KeyError, TypeError, ValueError, OverflowError) as error:
-        raise InputError(path, f"not a skeleton file: {printable(error)}") from None
+    return KnownSkeleton(Skeleton.from_dict({**data, "name": name}), data.get("maps") or {})
 
 
 def _line_of(text: str, section: str, key: str) -> int | None:
@@ -88,48 +85,30 @@ def _line_of(text: str, section: str, key: str) -> int | None:
 def _mistakes(data: Any) -> Iterator[Mistake]:
     """The mistakes in a skeleton file's content. What comes after the first one may fail or be wrong.
 
-    Each joint but the first needs a parent that is listed above it. Each joint needs an offset of three
-    numbers. Only the roles in ROLES are allowed, and no two roles may have the same joint (except spine and
-    chest). The joints of the roles must be in order from the trunk outward, and a name that says a side must
-    say the side of the joint's role. All roles but those in OPTIONAL are required, and both toes or none.
-    The legs must hang from a joint at or near the hips. If there is a chest, the arms must hang from it or
-    from the neck.
+    `SkeletonData` says what each section holds. Only the roles in ROLES are allowed, and no two roles may
+    have the same joint (except spine and chest). The joints of the roles must be in order from the trunk
+    outward, and a name that says a side must say the side of the joint's role. All roles but those in
+    OPTIONAL are required, and both toes or none. The legs must hang from a joint at or near the hips. If
+    there is a chest, the arms must hang from it or from the neck.
     """
-    for key in ("joints", "roles"):
-        section = data.get(key) if isinstance(data, Mapping) else None
-        if not isinstance(section, Mapping) or not section:
-            yield (
-                "",
-                "",
-                f"a skeleton file needs a section `{key}`",
-                "config/skeletons/README.md describes it.",
-            )
-    joints, roles = data["joints"], data["roles"]
-    yield from _joint_mistakes(joints)
-    yield from _role_mistakes(list(joints), roles)
+    sections = data if isinstance(data, dict) else {}
+    roles = sections.get("roles")
+    if not isinstance(roles, dict):
+        yield "", "", "a skeleton file needs a section `roles`", "config/skeletons/README.md describes it."
+    try:
+        known = {key: value for key, value in sections.items() if key not in ("name", "maps")}
+        joints = SkeletonData.model_validate({**known, "roles": {}}).joints
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        place = [str(part) for part in first["loc"]]
+        section, key = [*place, "", ""][:2]
+        problem = first["msg"].removeprefix("Value error, ")
+        yield section, key, f"{' '.join(place)}: {problem}" if place else problem, None
     names = list(joints)
-    parents = [
-        -1 if joint.get("parent") is None else names.index(joint["parent"]) for joint in joints.values()
-    ]
+    yield from _role_mistakes(names, roles)
+    parents = [-1 if joint.parent is None else names.index(joint.parent) for joint in joints.values()]
     yield from _order_mistakes(names, parents, roles)
-    yield from _hub_mistakes(names, parents, roles, [joint["offset"] for joint in joints.values()])
-
-
-def _joint_mistakes(joints: Mapping[Any, Any]) -> Iterator[Mistake]:
-    above: set[str] = set()
-    for name, joint in joints.items():
-        parent, problem = joint.get("parent") if isinstance(joint, Mapping) else None, ""
-        if not isinstance(name, str) or not isinstance(joint, Mapping):
-            problem = "expected {parent: ..., offset: [x, y, z]}"
-        elif parent is None and above:
-            problem = "only the first joint may have no parent"
-        elif parent is not None and (not isinstance(parent, str) or parent not in above):
-            problem = f"its parent {parent!r} must be listed above it"
-        elif not _is_offset(joint.get("offset")):
-            problem = f"its offset must be three numbers of {FARTHEST:g} cm at most"
-        if problem:
-            yield "joints", str(name), f"joint {name}: {problem}", None
-        above.add(name)
+    yield from _hub_mistakes(names, parents, roles, [joint.offset for joint in joints.values()])
 
 
 def _role_mistakes(names: list[str], roles: Mapping[Any, Any]) -> Iterator[Mistake]:
@@ -188,12 +167,6 @@ def _guess(word: Any, known: Any, shown: str) -> str:
     """A question that names the known word nearest to a wrong one, or nothing if none is near."""
     near = get_close_matches(str(word), known, 1)
     return f" (is it {shown.format(near[0])}?)" if near else ""
-
-
-def _is_offset(offset: Any) -> bool:
-    """Whether a value is a list of three numbers that are not larger than FARTHEST."""
-    is_triple = isinstance(offset, list | tuple) and len(offset) == 3
-    return is_triple and all(type(x) in (int, float) and abs(x) <= FARTHEST for x in offset)
 
 
 def draft_skeleton_file(rig: Skeleton, roles: Mapping[str, str]) -> str:

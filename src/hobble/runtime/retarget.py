@@ -42,12 +42,12 @@ def load_rig(file: str | Path) -> KnownSkeleton:
     known = match_rig(raw.skeleton, load_rig("holden31"), skeleton_folder())
     body, _ = body_in_file(path, raw, known, "auto")
     rig = replace(raw.skeleton, roles=body.roles(raw.skeleton.joints))
-    found = likely_unit(leg_length(rig))
-    if found is None:
+    unit = likely_unit(leg_length(rig)) if leg_length(rig) > 0 else None
+    if unit is None:
         raise InputError(
             path, f"no unit gives this rig a person's size: its legs are {leg_length(rig):g} long"
         )
-    rig = replace(rig, offsets=found[0] * rig.offsets)
+    rig = replace(rig, offsets=unit * rig.offsets)
     if problem := why_not_standing(body, rest_positions(rig)):
         raise InputError(path, f"its zero pose is no rest pose: {problem}")
     return KnownSkeleton(rig, {})
