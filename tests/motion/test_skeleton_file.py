@@ -6,9 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from hobble.cli.clips import skeleton_draft
 from hobble.core.errors import InputError
-from hobble.motion.read import decode_channels, read_bvh
-from hobble.motion.skeleton_file import draft_skeleton_file, guess_roles, load_skeleton
+from hobble.motion.skeleton_file import load_skeleton
 
 
 def role(name: str, joint: str):
@@ -105,8 +105,7 @@ def test_a_joint_of_a_wrong_role_shows_in_the_motion(shared, root, tmp_path, par
     from hobble.motion.options import ClipMotion
 
     clip, folder = shared / "mocap/patients/SubjectA1_Cycle1.bvh", tmp_path / "skeletons"
-    rig = decode_channels(read_bvh(clip))[0].skeleton
-    text = draft_skeleton_file(rig, guess_roles(rig))
+    text = skeleton_draft(clip)
     for part, joint in parts.items():
         if joint is None:
             text = re.sub(rf"^  (left|right)_{part}: .*\n", "", text, flags=re.MULTILINE)

@@ -54,7 +54,6 @@ from hobble.motion.read import decode_channels
 from hobble.motion.skeleton_file import (
     draft_skeleton_file,
     find_skeleton,
-    guess_roles,
     load_skeleton,
     skeleton_folder,
 )
@@ -122,11 +121,10 @@ def skeleton_draft(file: Path) -> str:
     skeleton = clip.skeleton
     try:
         body, _ = find_body(skeleton.joints, skeleton.parents, clip.positions)
-        roles = body.roles(skeleton.joints)
     except Doubt as doubt:
-        print(f"{file}: {doubt}. The roles are guessed from the names of the joints.", file=sys.stderr)
-        roles = guess_roles(skeleton)
-    return draft_skeleton_file(skeleton, roles)
+        print(f"{file}: {doubt}.", file=sys.stderr)
+        return draft_skeleton_file(skeleton, {})
+    return draft_skeleton_file(skeleton, body.roles(skeleton.joints))
 
 
 @command(
@@ -172,7 +170,7 @@ def convert_file(name: str, file: Path, options: argparse.Namespace) -> tuple[Cl
     doubts = accept(file, clip_problems(source.clip, source.clip.fps, 1.0, settings), settings)
     clip = resample(source.clip, options.fps)
     if settings.loops > 1:
-        clip = loop_clip(clip, settings.loops, settings.heading)
+        clip = loop_clip(clip, settings.loops)
     found = {"unsure": source.unsure + doubts, "repairs": source.repairs, "notes": source.notes}
     return replace(clip, name=name), report_messages(found)
 

@@ -269,12 +269,8 @@ def _standing(
     named = match.followed_joints if match.rig == target.name else {}
     upright = with_upright_rest(clip, body, target, [clip.skeleton.index(j) for j in named.values()])
     if upright.height_error > MOST_HEIGHT_ERROR and not options.accept_doubt:
-        raise InputError(
-            path,
-            " ".join(upright.doubts),
-            fix="Use a clip in which both feet stand flat, or one with a zero pose (all rotations zero) in "
-            f"which a person could stand. {ACCEPT}",
-        )
+        fix = "Use a clip in which both feet stand flat, or one in whose zero pose a person could stand."
+        raise InputError(path, " ".join(upright.doubts), fix=f"{fix} {ACCEPT}")
     rig = upright.clip.skeleton
     followed = named or match_joints(rig, upright.body, target, body_by_roles(target))
     return upright.clip, RigMatch(match.rig, rig.roles, followed), upright.doubts
@@ -305,11 +301,9 @@ def _unit(leg: float, unit: str | float) -> tuple[float, list[str]]:
         return float(unit), []
     if (found := likely_unit(leg)) is not None:
         return found, []
-    doubt = (
-        f"No unit gives this rig a person's size: thigh and shank together are {leg:.4g} units long. They "
-        f"were taken to be {LENGTH_OF_LEG:g} cm long; motion.unit (option --unit) overrides this."
-    )
-    return LENGTH_OF_LEG / leg, [doubt]
+    seen = f"No unit gives this rig a person's size: thigh and shank together are {leg:.4g} units long"
+    used = f"They were taken for {LENGTH_OF_LEG:g} cm; motion.unit (option --unit) overrides this"
+    return LENGTH_OF_LEG / leg, [f"{seen}. {used}."]
 
 
 def fit_skeleton(

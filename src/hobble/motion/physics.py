@@ -351,9 +351,7 @@ def pace_problem(clip: Clip) -> Problem | None:
     if quotient is None or LEAST_QUOTIENT <= quotient <= MOST_QUOTIENT:
         return _standing_problem(clip)
     if quotient < IN_PLACE:
-        return Problem(
-            "the legs walk, but the hips stay in place, so the feet slide. The file hardly moves the hips"
-        )
+        return Problem("the legs walk, but the file hardly moves the hips, so the feet slide")
     return _unit_problem(quotient)
 
 
@@ -364,12 +362,9 @@ def _standing_problem(clip: Clip) -> Problem | None:
         return None
     share, factor = standing
     if share < SELDOM:
-        text = (
-            f"the feet slide: while the hips move, a foot stands in {share:.0%} of the frames, which is less "
-            "than in any walk or run. The motion is noisy, or its rotation channels are declared in another "
-            "order than they were written"
-        )
-        return Problem(text, "Export the clip again." if share < NEVER else "")
+        seen = f"the feet slide: while the hips move, a foot stands in {share:.0%} of the frames"
+        why = "Noise, or rotation channels that are declared in another order than they were written, do this"
+        return Problem(f"{seen}. {why}", "Export the clip again." if share < NEVER else "")
     if not SHORTEST_FACTOR <= factor <= LONGEST_FACTOR:
         return _unit_problem(1 / factor)
     slides = f"the feet slide: the hips go {1 / factor:.2f} times as fast as the feet step"
@@ -378,9 +373,6 @@ def _standing_problem(clip: Clip) -> Problem | None:
 
 def _unit_problem(quotient: float) -> Problem:
     """A root and bones in different units. quotient: speed of the hips / speed of the feet."""
-    times = f"{quotient:.{2 if quotient < 10 else 0}f}"
-    return Problem(
-        f"the hips go {times} times as fast as the feet step, so the root's positions seem to be in another "
-        "unit than the OFFSETs",
-        "Export the clip again with one unit.",
-    )
+    seen = f"the hips go {quotient:.{2 if quotient < 10 else 0}f} times as fast as the feet step"
+    why = "the root's positions seem to be in another unit than the OFFSETs"
+    return Problem(f"{seen}, so {why}", "Export the clip again with one unit.")

@@ -521,11 +521,9 @@ def _feet_doubts(sample: BodySample, zero: Frames | None, height_error: float) -
     """Sentences on what is uncertain about how the feet stand. zero: the frames of the zero pose."""
     tilts = sample.feet_tilt.measured
     if len(tilts) < len(SIDES):
+        added = "The rig has no joints for the balls of the feet. They were added where people have them"
         further = "" if zero else ", and toes and ankles may lie some centimetres off"
-        return [
-            "The rig has no joints for the balls of the feet. Joints were added where people have the balls, "
-            f"so the figure may stand 3 cm too high or low{further}."
-        ]
+        return [f"{added}, so the figure may stand 3 cm too high or low{further}."]
     if zero:
         raised = RAISED if sample.figure_runs else 0.0  # a runner's foot is steeper than flat
         feet = {side: sample.body.legs[side][2:] for side in SIDES if sample.is_upright_while_flat(side)}
@@ -535,16 +533,12 @@ def _feet_doubts(sample: BodySample, zero: Frames | None, height_error: float) -
         if abs(degrees) < UNLIKE_ZERO:
             return []
         high = np.radians(abs(degrees)) * np.mean([sample.length(*foot) for foot in feet.values()])
-        return [
-            f"Its feet stand {abs(degrees):.0f} degrees {'steeper' if degrees > 0 else 'flatter'} in the "
-            f"motion than in its zero pose, so the figure may stand {high:.1f} cm too high or low."
-        ]
+        unlike = f"{abs(degrees):.0f} degrees {'steeper' if degrees > 0 else 'flatter'} than in its zero pose"
+        return [f"Its feet stand {unlike}, so the figure may stand {high:.1f} cm too high or low."]
     if height_error < NOTED:
         return []
     one, other = np.degrees(list(tilts.values()))
-    apart = f" and its feet stand at different angles ({one:.0f} and {other:.0f} degrees)"
-    return [
-        "The height of the ankles is uncertain, because nobody could stand in the zero pose (all rotations "
-        f"zero) of its file{apart if abs(one - other) > APART else ''}. It was estimated from the feet while "
-        f"they stand, so the figure may stand {height_error:.1f} cm too high or low."
-    ]
+    apart = f" and its feet stand at {one:.0f} and {other:.0f} degrees" if abs(one - other) > APART else ""
+    why = f"because nobody could stand in the zero pose (all rotations zero) of its file{apart}"
+    result = f"It was estimated, so the figure may stand {height_error:.1f} cm too high or low"
+    return [f"The height of the ankles is uncertain, {why}. {result}."]

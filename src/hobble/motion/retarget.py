@@ -434,19 +434,15 @@ def difference_problems(path: Path, differences: dict[str, Any], rig: str) -> li
     name, degrees = most_different(differences)
     out = []
     if degrees > MOST_DIFFERENCE:
-        out.append(
-            Problem(
-                f"the {name} is {degrees:.0f} degrees off its source on average (rig: {rig})",
-                f"Look at both (`hobble look {path} --picture apart.svg` draws them side by side), and "
-                f"correct the roles of its rig. `hobble rig {path}` writes a draft for config/skeletons/.",
-            )
-        )
+        seen = f"the {name} is {degrees:.0f} degrees off its source on average (rig: {rig})"
+        draw = f"`hobble look {path} --picture apart.svg` draws both"
+        draft = f"`hobble rig {path}` drafts a file for config/skeletons/, in which to correct the roles"
+        out.append(Problem(seen, f"{draw}. {draft}."))
     for joint, angle in differences["angles"].items():
         if abs(angle["constant"]) > NOTED_CONSTANTS[joint.partition(" ")[2]]:
             more = "more" if angle["constant"] > 0 else "less"
-            out.append(
-                Problem(f"the {joint} bends {abs(angle['constant']):.0f} degrees {more} than in the file")
-            )
+            degrees = abs(angle["constant"])
+            out.append(Problem(f"the {joint} bends {degrees:.0f} degrees {more} than in the file"))
     return out
 
 
@@ -470,13 +466,11 @@ def knee_problem(clip: Clip, least: float) -> Problem | None:
         points = unit(bend_direction(hip, knee, heel))
         cosine = np.sum(points * ahead, axis=-1) @ weight / max(weight.sum(), 1e-9)
         if np.mean(weight > 0) >= 0.1 and cosine < least:
-            return Problem(
-                f"the {side} knee points {np.degrees(np.arccos(cosine)):.0f} degrees away from forward while "
-                f"it is bent (by up to {bends.max():.0f} degrees, at {bends.argmax() / clip.fps:.1f} s), so "
-                "the rotation channels may be declared in another order than they were written, or in "
-                "coordinates of the other handedness",
-                "Export the clip again.",
-            )
+            bent = f"bent (by up to {bends.max():.0f} degrees, at {bends.argmax() / clip.fps:.1f} s)"
+            away = f"points {np.degrees(np.arccos(cosine)):.0f} degrees away from forward while it is {bent}"
+            why = "declared in another order than they were written, or in the other handedness"
+            seen = f"the {side} knee {away}, so the rotation channels may be {why}"
+            return Problem(seen, "Export the clip again.")
     return None
 
 

@@ -191,7 +191,7 @@ def joint_pairs(source: KnownSkeleton, target: KnownSkeleton) -> dict[str, str]:
     for hub, pairs in from_source.items():
         if hub in from_target:
             # If several joints map to the same joint of the hub, the first of them in the map counts.
-            to_source = {b: a for a, b in reversed(pairs.items())}
+            to_source = {b: a for a, b in reversed(list(pairs.items()))}
             return {a: to_source[b] for a, b in from_target[hub].items() if b in to_source}
     return {}
 
@@ -236,29 +236,20 @@ def body_in_file(path: Path, raw: Clip, known: RigMatch | None, handedness: str)
     except TwoFigures as error:
         raise InputError(path, str(error), fix="Export each figure on its own.") from None
     except Doubt as doubt:
-        raise InputError(
-            path,
-            f"it is in doubt which joints are which parts of a body: {doubt}",
-            fix="Hands, animals, props and mechanisms cannot be used. If it is a person, write a draft with "
-            f"`hobble rig {path.name} --to config/skeletons/<name>.yaml`, put the right "
-            "joints into it, and run again.",
-        ) from None
-    notes = [
-        "No skeleton file describes this rig. The parts of the body were found from the rig's structure, its "
-        "motion and the names of its joints."
-    ]
+        problem = f"it is in doubt which joints are which parts of a body: {doubt}"
+        draft = f"`hobble rig {path.name} --to config/skeletons/<name>.yaml`"
+        fix = f"Hands, animals and mechanisms cannot be used. For a person, {draft} drafts a file to correct."
+        raise InputError(path, problem, fix=fix) from None
+    notes = ["No skeleton file describes this rig. Structure, motion and names told the parts of the body."]
     if not sided:
+        unsided = "its joint names do not tell left from right"
         if handedness == "auto":
-            raise InputError(
-                path,
-                "its joint names do not tell left from right. The motion does not either, because its mirror "
-                "image would also move like a person",
-                fix="Set motion.handedness (option --handedness) to right, the standard of BVH files, or to "
-                "left if the program that wrote the file has left-handed coordinates.",
+            fix = (
+                "Set motion.handedness (option --handedness) to right, the standard of BVH files, or to left "
+                "if the program that wrote the file has left-handed coordinates."
             )
-        notes.append(
-            f"The joint names do not tell left from right, so motion.handedness: {handedness} was used."
-        )
+            raise InputError(path, f"{unsided}, and a mirror image moves like a person, too", fix=fix)
+        notes.append(f"{unsided.capitalize()}, so motion.handedness: {handedness} was used.")
         if handedness == "left":
             arms, legs = ({a: limbs[b] for a, b in (SIDES, SIDES[::-1])} for limbs in (body.arms, body.legs))
             body = replace(body, arms=arms, legs=legs)
@@ -280,10 +271,7 @@ def _check_bones(path: Path, rig: Skeleton, positions: Array, name: str) -> None
                 np.linalg.norm(positions[:, b] - positions[:, a], axis=-1), [3, 50, 97]
             )
             if high - low > STRETCH * median:
-                raise InputError(
-                    path,
-                    f"{rig.joints[b]} ({roles[1]}) is {low:.3g} to {high:.3g} units from {rig.joints[a]} "
-                    f"({roles[0]}), so a joint between them bends, or one of them is not the joint of its "
-                    "role",
-                    fix=f"Correct the roles in the skeleton file {name}.yaml.",
-                )
+                ends = f"{rig.joints[a]} ({roles[0]}) and {rig.joints[b]} ({roles[1]})"
+                problem = f"{ends} are {low:.3g} to {high:.3g} units apart, so a joint between them bends"
+                fix = f"Correct the roles in the skeleton file {name}.yaml."
+                raise InputError(path, problem, fix=fix)

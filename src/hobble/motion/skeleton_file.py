@@ -20,7 +20,7 @@ from hobble.core.errors import InputError
 from hobble.core.files import printable, read_text, read_yaml
 from hobble.core.skeleton import Skeleton, SkeletonData, lowest_common_ancestor, path_between, path_to_root
 from hobble.motion.body import ARM, LEG, SIDES, TRUNK
-from hobble.motion.names import KINDS, limb_parts, part_of, side_of
+from hobble.motion.names import side_of
 
 # The roles of each limb, from the trunk outward, and all roles that there are.
 LIMBS = [tuple(f"{side}_{part}" for part in limb) for side in SIDES for limb in (ARM, LEG)]
@@ -31,9 +31,6 @@ ORDER = (  # advice in error messages
     "hip, knee, heel, toe."
 )
 APART = 0.25  # leg lengths: the joint from which the legs hang may be at most this far from the hips
-# A part of a limb (as `names.part_of` calls it) -> the role of the joint at which it begins.
-ROLE_OF_PART = {"upperarm": "shoulder", "forearm": "elbow", "hand": "wrist"}
-ROLE_OF_PART |= {"thigh": "hip", "shank": "knee", "foot": "heel", "toe": "toe"}
 
 
 # A mistake in a file: the section and the key where it is, what is wrong, and what to do (None if plain).
@@ -91,8 +88,8 @@ def _mistakes(data: Any) -> Iterator[Mistake]:
     OPTIONAL are required, and both toes or none. The legs must hang from a joint at or near the hips. If
     there is a chest, the arms must hang from it or from the neck.
     """
-    sections = data if isinstance(data, dict) else {}
-    roles = sections.get("roles")
+    sections: dict[str, Any] = data if isinstance(data, dict) else {}
+    roles: Any = sections.get("roles")
     if not isinstance(roles, dict):
         yield "", "", "a skeleton file needs a section `roles`", "config/skeletons/README.md describes it."
     try:
@@ -185,21 +182,6 @@ def draft_skeleton_file(rig: Skeleton, roles: Mapping[str, str]) -> str:
         numbers = ", ".join(f"{x + 0.0:.6g}" for x in (offset if parent >= 0 else 0 * offset))
         lines.append(f"  {_quoted(name)}: {{parent: {parent_name}, offset: [{numbers}]}}")
     return "\n".join(lines) + "\n"
-
-
-def guess_roles(rig: Skeleton) -> dict[str, str]:
-    """Role -> name of the joint, for the roles that the names of the joints suggest."""
-    parts, sides = ({name: about(name) for name in rig.joints} for about in (part_of, side_of))
-    out: dict[str, str] = {}
-    for name, part in parts.items():
-        if sides[name] is None and part in TRUNK:
-            out.setdefault(part, name)
-    for side in SIDES:
-        for words in KINDS.values():
-            joints = [name for name in rig.joints if sides[name] == side and parts[name] in words]
-            found = {part: joints[i] for part, i in limb_parts(joints).items() if part in ROLE_OF_PART}
-            out |= {f"{side}_{ROLE_OF_PART[part]}": name for part, name in found.items()}
-    return out
 
 
 def _quoted(name: str) -> str:
