@@ -156,12 +156,8 @@ class Skeleton:
 
         Empty if `below` is not an ancestor of the joint.
         """
-        out = [joint]
-        while self.parents[out[-1]] != below:
-            if self.parents[out[-1]] < 0:
-                return []
-            out.append(self.parents[out[-1]])
-        return out
+        path = [*path_to_root(self.parents, joint), -1]
+        return path[: path.index(below)] if below in path else []
 
     @property
     def leg_length(self) -> float:
