@@ -14,8 +14,7 @@ import yaml
 
 from hobble.core.clip import Clip, load_clip
 from hobble.core.processors import processor_name
-from hobble.labels.contacts import find_contacts, find_stance_contacts
-from hobble.labels.footfall import find_landings, find_swings
+from hobble.labels.footfall import find_landings, find_stance_contacts, find_still_joints, find_swings
 from hobble.labels.gait import automatic_gait
 from hobble.labels.label import label_clip
 from hobble.labels.options import LabelOptions
@@ -60,21 +59,16 @@ def main() -> None:
     folder = parser.parse_args().folder
     print(processor_name())
     clips = [load_clip(p) for p in sorted(folder.glob("*.npz"))] if folder else [synthetic_minute()]
-    options = LabelOptions()
     frames = sum(map(len, clips))
     kinematics = best_of(1, lambda: [clip.positions for clip in clips])
     parts = {
         "world positions, once": kinematics,
-        "contacts": best_of(3, lambda: [find_contacts(c, options) for c in clips]),
-        "swings and landings": best_of(
-            3, lambda: [find_landings(find_swings(c, options), len(c), options.shortest_step) for c in clips]
-        ),
-        "gait": best_of(
-            3, lambda: [automatic_gait(c, find_stance_contacts(c, options), None) for c in clips]
-        ),
+        "contacts": best_of(3, lambda: [find_still_joints(c) for c in clips]),
+        "swings and landings": best_of(3, lambda: [find_landings(find_swings(c), len(c)) for c in clips]),
+        "gait": best_of(3, lambda: [automatic_gait(c, find_stance_contacts(c), None) for c in clips]),
     }
     motion = {"source_frames": 0, "source_fps": 60.0}
-    whole = best_of(3, lambda: [label_clip(c, [], motion, None, "flat", options) for c in clips])
+    whole = best_of(3, lambda: [label_clip(c, [], motion, None, "flat", LabelOptions()) for c in clips])
     total = kinematics + whole
     print(f"{len(clips)} clips, {frames} frames: {frames / total:,.0f} frames/s")
     print(f"{frames / 60 / total:,.0f} times as fast as the motion itself")

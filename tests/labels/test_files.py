@@ -26,43 +26,43 @@ def test_a_cycle_starts_at_half_the_frame_number_of_a_120_hz_file(number):
     assert whole_frame(SourceTime(20_000, 120.0).to_clip_frame(number)) == number // 2
 
 
+def four_phases(path: Path, time: SourceTime) -> np.ndarray:
+    return read_phase(path, SourceTime(4, 60.0), 4)
+
+
+def gait_keys(path: Path, time: SourceTime) -> np.ndarray:
+    return read_gait_keys(path, time, 120)
+
+
 @pytest.mark.parametrize(
-    ("text", "line", "word"),
+    ("read", "text", "line", "word"),
     [
-        ("1 20\n20 30\n", 2, "frame 20 does not come after 20"),
-        ("1 20\n40 30\n", 2, "frame 30 does not come after 40"),
-        ("0 20\n", 1, "does not come after 0"),
-        ("1 20\nx 30\n", 2, "'x' is not a number"),
-        ("1 nan\n", 1, "'nan' is not a number"),
-        ("1 2 3\n", 1, "a line holds"),
-        ("*\n", 1, "a line holds"),
-        ("1 20\n30\n40 50\n", 2, "only the last line"),
-        ("1 20\n30\n\n\n40 50\n", 2, "only the last line"),
-        ("1 20\n30 242\n", 2, "past the clip's last frame, 240"),
+        (read_footsteps, "1 20\n20 30\n", 2, "frame 20 does not come after 20"),
+        (read_footsteps, "1 20\n40 30\n", 2, "frame 30 does not come after 40"),
+        (read_footsteps, "0 20\n", 1, "does not come after 0"),
+        (read_footsteps, "1 20\nx 30\n", 2, "'x' is not a number"),
+        (read_footsteps, "1 nan\n", 1, "'nan' is not a number"),
+        (read_footsteps, "1 2 3\n", 1, "a line holds"),
+        (read_footsteps, "*\n", 1, "a line holds"),
+        (read_footsteps, "1 20\n30\n\n\n40 50\n", 2, "only the last line"),
+        (read_footsteps, "1 20\n30 242\n", 2, "past the clip's last frame, 240"),
+        (gait_keys, "1 stand\n20 moonwalk\n", 2, "no such gait: 'moonwalk'. There are stand, walk, jog, run"),
+        (gait_keys, "1 stand\n1 walk\n", 2, "does not come after"),
+        (gait_keys, "1\n", 1, "a line holds"),
+        (gait_keys, "one stand\n", 1, "not a number"),
+        (gait_keys, "1 stand\n500 walk\n", 2, "past the clip's last"),
+        (gait_keys, "\n", None, "holds no keys"),
+        (four_phases, "0.1\n1.1\n0.2\n0.3\n", 2, "outside 0..1"),
+        (four_phases, "0.1\nnan\n0.2\n0.3\n", 2, "not a number"),
+        (four_phases, "0.1\n0.1 0.2\n0.2\n0.3\n", 2, "2 values instead of 1"),
+        (four_phases, "0.1\n0.2\n", None, "has 2 rows, but the clip's file has 4 frames"),
     ],
 )
-def test_wrong_footsteps_are_refused_with_their_line(write, text, line, word):
-    path = write("a_footsteps.txt", text)
+def test_a_wrong_file_is_refused_with_its_line(write, read, text, line, word):
+    path = write("a.txt", text)
     with pytest.raises(InputError, match=word) as caught:
-        read_footsteps(path, AT_120)
+        read(path, AT_120)
     assert (caught.value.path, caught.value.line) == (path, line)
-
-
-@pytest.mark.parametrize(
-    ("text", "line", "word"),
-    [
-        ("1 stand\n20 moonwalk\n", 2, "no such gait: 'moonwalk'. There are stand, walk, jog, run, crouch"),
-        ("1 stand\n1 walk\n", 2, "does not come after"),
-        ("1\n", 1, "a line holds"),
-        ("one stand\n", 1, "not a number"),
-        ("1 stand\n500 walk\n", 2, "past the clip's last"),
-        ("\n", None, "holds no keys"),
-    ],
-)
-def test_wrong_gait_keys_are_refused_with_their_line(write, text, line, word):
-    with pytest.raises(InputError, match=word) as caught:
-        read_gait_keys(write("a_gait.txt", text), AT_120, 120)
-    assert caught.value.line == line
 
 
 def test_a_clip_cut_at_the_start_uses_the_matching_part_of_its_files(write):
@@ -76,22 +76,6 @@ def test_a_clip_cut_at_the_start_uses_the_matching_part_of_its_files(write):
     keys = read_gait_keys(write("late_gait.txt", "11 stand\n52 walk\n"), late, 100)
     moved = read_gait_keys(write("whole_gait.txt", "4 stand\n45 walk\n"), whole, 100)
     np.testing.assert_allclose(keys, moved)
-
-
-@pytest.mark.parametrize(
-    ("text", "line", "word"),
-    [
-        ("0.1\n1.1\n0.2\n0.3\n", 2, "outside 0..1"),
-        ("0.1\nnan\n0.2\n0.3\n", 2, "not a number"),
-        ("0.1\n0.1 0.2\n0.2\n0.3\n", 2, "2 values instead of 1"),
-        ("0.1\n0.2\n", None, "has 2 rows, but the clip's file has 4 frames"),
-        ("", None, "has 0 rows"),
-    ],
-)
-def test_wrong_phase_files_are_refused(write, text, line, word):
-    with pytest.raises(InputError, match=word) as caught:
-        read_phase(write("a.phase", text), SourceTime(4, 60.0), 4)
-    assert caught.value.line == line
 
 
 @pytest.mark.shared

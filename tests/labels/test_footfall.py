@@ -1,25 +1,29 @@
-"""Landings found from the motion alone: exact on generated walks, and no extra ones on limps and pauses."""
+"""Landings and contacts found from the motion alone: exact on generated walks, whatever the body's size."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from hobble.labels.footfall import SETTLING_CM, find_landings, find_swings
-from hobble.labels.options import LabelOptions
+from hobble.labels.footfall import (
+    SETTLING_CM,
+    find_landings,
+    find_stance_contacts,
+    find_still_joints,
+    find_swings,
+)
 from hobble.labels.phase import find_cycles, rows_of_landings
 
 
-def found(clip):
-    swings = find_swings(clip, LabelOptions())
-    return swings, find_landings(swings, len(clip), 5)
+def landings(clip):
+    return find_landings(find_swings(clip), len(clip))
 
 
 @pytest.mark.parametrize("limp", [0.5, 0.3, 0.7])
 @pytest.mark.parametrize(("half", "swing", "stride"), [(30, 24, 120.0), (20, 16, 200.0), (45, 40, 50.0)])
 def test_every_landing_is_found_once(walker, limp, half, swing, stride):
     clip = walker(limp=limp, half=half, swing=swing, stride=stride)
-    _, events = found(clip)
+    events = landings(clip)
     rights = np.arange(40, 590, 2 * half, dtype=float)
     truth = sorted([(r, 0) for r in rights] + [(r + 2 * half * limp, 1) for r in rights])
     truth = [(when, foot) for when, foot in truth if when < 590]
@@ -40,8 +44,52 @@ def test_only_a_long_pause_separates_two_bouts_of_walking(walker, pause, bouts):
         root=clip.root[order],
         translations=clip.translations[order],
     )
-    _, events = found(paused)
+    events = landings(paused)
     assert [foot for _, foot in events].count(-1) == bouts - 1
-    assert len(events) - (bouts - 1) == len(found(clip)[1])
+    assert len(events) - (bouts - 1) == len(landings(clip))
     cycles, _ = find_cycles(rows_of_landings(events), len(paused), "right", "drop")
     assert any(a < both_down < b for a, b in cycles) == (bouts == 1)
+
+
+def on_the_ground(half: int, swing: int, frames: int, start: int) -> np.ndarray:
+    """(F,) whether the right foot of `walker` is on the ground."""
+    t = np.arange(frames)
+    in_the_air = [(t > landing - swing) & (t < landing) for landing in range(start, frames - 10, 2 * half)]
+    return ~np.any(in_the_air, axis=0)
+
+
+@pytest.mark.parametrize(("half", "swing", "stride"), [(30, 24, 120.0), (20, 16, 160.0), (45, 40, 60.0)])
+def test_stances_of_a_made_walk_begin_and_end_at_the_right_frames(walker, half, swing, stride):
+    """Swings begin and end slowly, so that their first and last frames look like a stance."""
+    found = find_stance_contacts(walker(half=half, swing=swing, stride=stride))
+    expected = on_the_ground(half, swing, 600, 40)
+    assert found[expected][:, 2].all()
+    assert (found[:, 2] != expected).mean() < 0.15
+
+
+@pytest.mark.parametrize("size", [0.5, 0.8, 1.3])
+def test_contacts_do_not_depend_on_body_size(walker, size):
+    clip = walker()
+    skeleton = replace(clip.skeleton, offsets=size * clip.skeleton.offsets)
+    other = replace(clip, skeleton=skeleton, root=size * clip.root, translations=size * clip.translations)
+    assert (find_stance_contacts(other) == find_stance_contacts(clip)).all()
+
+
+def test_a_sliding_foot_keeps_its_contact(walker):
+    """As on a treadmill, the foot moves half a centimetre a frame; the original's rule calls that a swing."""
+    clip = walker()
+    sliding = replace(clip, root=clip.root + np.outer(np.arange(len(clip)), [0.0, 0.0, 0.5]))
+    assert (find_stance_contacts(sliding) == find_stance_contacts(clip))[:, [0, 2]].mean() > 0.95
+    assert not find_still_joints(sliding)[100:500].any()
+
+
+def test_a_foot_held_in_the_air_has_no_contact(walker):
+    clip = walker(start=700)
+    heel = clip.skeleton.role("right_heel")
+    translations = clip.translations.copy()
+    up = 50.0 * np.clip((np.arange(len(clip)) - 100) / 30, 0, 1)
+    translations[:, heel, 1] += up
+    found = find_stance_contacts(replace(clip, translations=translations))
+    assert found[:90].all()
+    assert not found[150:, 2:].any()
+    assert found[150:, :2].all()

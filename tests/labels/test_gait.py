@@ -7,12 +7,11 @@ import pytest
 
 from hobble.labels import gait as g
 from hobble.labels.clip_labels import GAITS
-from hobble.labels.contacts import find_stance_contacts
-from hobble.labels.options import LabelOptions
+from hobble.labels.footfall import find_stance_contacts
 
 
 def automatic(clip, dominant=None):
-    return g.automatic_gait(clip, find_stance_contacts(clip, LabelOptions()), dominant)
+    return g.automatic_gait(clip, find_stance_contacts(clip), dominant)
 
 
 def bouncing(clip, height):

@@ -9,6 +9,8 @@ import pytest
 from hobble.core.declared import load_report
 from hobble.labels.clip_labels import LabelReport, load_labels, save_labels
 from hobble.labels.label import label_clip, mirror_labels, write_report
+from hobble.labels.label_files import SourceTime, footsteps_text, gait_text
+from hobble.labels.options import LabelOptions
 
 MOTION = {"source_frames": 1200, "source_fps": 120.0, "source_start": 0}
 FOOTSTEPS = "141 201\n261 321\n381 441 *\n501 561\n621 681\n741"
@@ -94,3 +96,30 @@ def test_labels_survive_their_file_and_the_picture_is_drawn(walker, options, tmp
     assert len(curves["landings"]["right"]) == np.isfinite(labels.footsteps[:, 0]).sum()
     down = [b - a for a, b in curves["contacts"]["right_toe"]]
     assert sum(down) == pytest.approx(labels.contacts[:, 3].sum() / 60, abs=0.02)
+
+
+@pytest.mark.parametrize(("fps", "start"), [(60.0, 0), (120.0, 0), (30.0, 0), (120.0, 8), (100.0, 3)])
+def test_written_label_files_read_back_unchanged(walker, tmp_path, fps, start):
+    clip = walker(frames=700, start=150, limp=0.4)
+    frames = round(len(clip) * fps / 60) + start
+    motion = {"source_frames": frames, "source_fps": fps, "source_start": start}
+    before, _ = label_clip(clip, [], motion, None, "rocky", LabelOptions())
+    time, files = SourceTime(frames, fps, start), [tmp_path / "w_footsteps.txt", tmp_path / "w_gait.txt"]
+    for file, text in zip(files, (footsteps_text, gait_text), strict=True):
+        file.write_text(text(before, time))
+    after, report = label_clip(clip, files, motion, None, "rocky", LabelOptions())
+    assert (report.phase_source, report.gait_source) == ("file", "file")
+    assert len(after.cycles) == len(before.cycles) > 5
+    assert np.abs(after.cycles - before.cycles).max() <= np.ceil(60 / fps)
+    assert (after.gait.argmax(axis=1) == before.gait.argmax(axis=1)).mean() > 0.98
+    known = before.phase_known & after.phase_known
+    assert known.sum() > 0.95 * before.phase_known.sum()
+    assert apart(after.phase, before.phase)[known].max() < 0.04
+
+
+def test_a_bout_that_ends_with_the_right_foot_is_not_joined_to_the_next(walker, options):
+    labels, _ = label_clip(walker(), [], MOTION, None, "rocky", options)
+    nan = np.nan
+    rows = np.array([[10, 40, 0], [70, nan, 0], [nan, nan, 1], [300, 330, 0], [360, nan, 0]], float)
+    text = footsteps_text(replace(labels, footsteps=rows), SourceTime(700, 60.0))
+    assert text.splitlines() == ["11 41 *", "301 331", "361"]

@@ -9,8 +9,7 @@ import pytest
 
 from hobble.core import quat
 from hobble.core.errors import InputError
-from hobble.labels.contacts import find_contacts
-from hobble.labels.options import LabelOptions
+from hobble.labels.footfall import find_stance_contacts
 
 SIDES = ("left", "right")
 SHARED = Path(os.environ.get("HOBBLE_SHARED", Path(__file__).parents[3] / "shared"))
@@ -66,7 +65,7 @@ def test_a_file_is_right_or_rightly_refused(shared, make, name):
     for joint, angle in (report["retarget"] or {"angles": {}})["angles"].items():
         if "knee" in joint:
             assert abs(angle["constant"]) < KNEES, joint
-    contacts = find_contacts(clip, LabelOptions()).mean(axis=0)
+    contacts = find_stance_contacts(clip).mean(axis=0)
     for side, column in (("left", 0), ("right", 2)):
         assert key in OTHER_HEELS or abs(contacts[column] - heel_count(clip, side)) < 0.1, side
 

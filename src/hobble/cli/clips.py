@@ -42,7 +42,7 @@ from hobble.hurt.combine import PARTS, combine_clips
 from hobble.hurt.hurt_clip import hurt_clip
 from hobble.labels.clip_labels import GAITS, Labels
 from hobble.labels.label import label_clip
-from hobble.labels.label_files import SourceTime, write_label_files
+from hobble.labels.label_files import SourceTime, footsteps_text, gait_text
 from hobble.labels.options import LabelOptions
 from hobble.motion.edit import loop_clip, mirror_clip, resample
 from hobble.motion.limbs import Doubt, find_body
@@ -192,27 +192,28 @@ def labels(options: argparse.Namespace) -> int:
 
     hobble labels FOLDER OUT
 
-    For each clip, three files are written: CLIP_footsteps.txt, CLIP_gait.txt and CLIP.phase. They tell when
-    the feet land, and which gait and phase each frame has. Frame numbers are those of the clip's file.
+    For each clip, two files are written: CLIP_footsteps.txt and CLIP_gait.txt. They tell when the feet land,
+    from which the phase follows, and which gait each frame has. Frame numbers are those of the clip's file.
     Correct the files and put them beside the clip. The workflow then uses them instead of its own labels.
     """
     return process_clips(options, lambda name, file: write_labels(name, file, options))
 
 
 def write_labels(name: str, file: Path, options: argparse.Namespace) -> list[Message]:
-    """Write the three label files of one clip. Returns notes and warnings.
+    """Write the two label files of one clip. Returns notes and warnings.
 
     file: the clip's BVH file. options: the arguments of `hobble labels`. Raises InputError if the clip cannot
     be read, or if a label file exists already and is not to be overwritten.
     """
-    paths = [options.out / f"{name}{end}" for end in ("_footsteps.txt", "_gait.txt", ".phase")]
+    paths = [options.out / f"{name}{end}" for end in ("_footsteps.txt", "_gait.txt")]
     existing = [path.name for path in paths if path.exists()]
     if existing and not options.overwrite:
         problem = f"{', '.join(existing)} would be replaced"
         raise InputError(options.out, problem, fix="Use --overwrite, or write into another folder.")
     clip, report, found, warnings = _labelled(name, file, options)
     time = SourceTime(report["source_frames"], report["source_fps"], report["source_start"])
-    write_label_files(paths[0], paths[1], paths[2], found, time)
+    for path, text in zip(paths, (footsteps_text, gait_text), strict=True):
+        write_text(path, text(found, time))
     # Seconds of each gait, for the note.
     seconds = np.bincount(found.gait.argmax(axis=1), minlength=len(GAITS)) / clip.fps
     gaits = ", ".join(f"{s:.1f} s {g}" for s, g in zip(seconds, GAITS, strict=True) if s > 0)

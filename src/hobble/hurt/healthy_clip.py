@@ -12,7 +12,6 @@ from hobble.core.smooth import gaussian
 from hobble.hurt.effects import LEFT, RIGHT, SIDES
 from hobble.labels.clip_labels import GAITS, Labels
 from hobble.labels.footfall import find_swings
-from hobble.labels.options import LabelOptions
 from hobble.labels.phase import phase_of_footsteps
 
 UP = np.array([0.0, 1.0, 0.0])
@@ -69,8 +68,7 @@ class HealthyClip:
 def measure_healthy_clip(clip: Clip, labels: Labels) -> HealthyClip:
     """Measure a healthy clip. labels: its contacts, footsteps and gait."""
     frames, skeleton = len(clip), clip.skeleton
-    options = LabelOptions()
-    all_swings = find_swings(clip, options)
+    all_swings = find_swings(clip)
     stances: list[list[SourceStance]] = []
     swinging, swing_curve = np.zeros((frames, 2), bool), np.zeros((frames, 2))
     for side in (LEFT, RIGHT):

@@ -84,19 +84,19 @@ def load_labels(path: str | Path) -> Labels:
     return Labels(**{name: data[name] for name in DECLARED})
 
 
-POINTS = 400  # a curve has at most this many values by default
+POINTS = 400  # a curve has at most this many values
 
 
-def label_curves(labels: Labels, clip: Clip, points: int = POINTS) -> dict[str, Any]:
+def label_curves(labels: Labels, clip: Clip) -> dict[str, Any]:
     """Contacts, landings, phase, gait and speed over time, under these keys, as short lists.
 
     `contacts`: for each joint of CONTACT_ROLES a list of intervals [from, to), in seconds, in which it is on
     the ground. `landings`: for "right" and "left" the times in seconds at which this foot lands. `phase`
     (None where unknown), `gait` (for each gait that occurs) and `speed` (m/s over the ground, averaged over a
-    fifth of a second) are curves, lists of at most `points` values. `seconds`: the times of these values.
+    fifth of a second) are curves, lists of at most POINTS values. `seconds`: the times of these values.
     """
     frames, ground = len(labels), clip.root[:, [0, 2]]
-    chosen = np.unique(np.linspace(0, max(frames - 1, 0), min(frames, points)).round().astype(int))
+    chosen = np.unique(np.linspace(0, max(frames - 1, 0), min(frames, POINTS)).round().astype(int))
     speed = np.zeros(frames)
     if frames > 1:
         speed = mean(np.linalg.norm(np.gradient(ground, axis=0), axis=1), 13) * clip.fps / 100

@@ -72,14 +72,15 @@ def overwrite_crouch(gait: Array, clip: Clip) -> Array:
 def automatic_gait(clip: Clip, down: np.ndarray, dominant: str | None) -> Array:
     """Find the gait from the motion. Returns shares (F, 6) of GAITS, whose sum is 1.
 
-    down: (F, 4) contacts from `hobble.labels.contacts.find_stance_contacts`. dominant: the clip's main gait,
+    down: (F, 4) contacts from `hobble.labels.footfall.find_stance_contacts`. dominant: the clip's main gait,
     or None if it is not known. It decides between walk and jog if both are about equally likely. "jump" and
     "bump" are not recognised: if `dominant` is one of them, all frames get it, except those in which the
     person stands.
     """
     odds = jog_odds(clip, down) + {"jog": DATA_SET_ODDS, "walk": -DATA_SET_ODDS}.get(dominant or "", 0.0)
-    gait = _likeliest_path(_evidence(clip, odds), SWITCH_COST)
-    shares = _fade(_without_short_walks(gait, odds), len(GAITS))
+    gait = _likeliest_path(_evidence(clip, odds))
+    # At every change the shares fade linearly over FADE_FRAMES.
+    shares = np.clip(mean(np.eye(len(GAITS))[_without_short_walks(gait, odds)], FADE_FRAMES), 0.0, 1.0)
     if dominant in ("jump", "bump"):
         shares[:, GAITS.index(dominant)] = 1 - shares[:, STAND]
         shares[:, [WALK, JOG, CROUCH]] = 0.0
@@ -159,18 +160,15 @@ def _relative_heights(clip: Clip) -> tuple[Array, Array]:
     skeleton, y = clip.skeleton, clip.positions[..., 1]
     toes = y[:, [skeleton.role("left_toe"), skeleton.role("right_toe")]]
     floor = lowest(toes, 61).mean(axis=1)
-    leg, trunk, joint = skeleton.leg_length, 0.0, skeleton.role("head")
-    while joint != skeleton.role("hips") and skeleton.parents[joint] >= 0:
-        trunk += float(np.linalg.norm(skeleton.offsets[joint]))
-        joint = skeleton.parents[joint]
-    head = (y[:, skeleton.role("head")] - floor) / (leg + trunk)
-    return head, (y[:, skeleton.role("hips")] - floor) / leg
+    head, hips, leg = skeleton.role("head"), skeleton.role("hips"), skeleton.leg_length
+    trunk = sum(float(np.linalg.norm(skeleton.offsets[j])) for j in skeleton.path_up(head, hips))
+    return (y[:, head] - floor) / (leg + trunk), (y[:, hips] - floor) / leg
 
 
-def _likeliest_path(evidence: Array, switch_cost: float) -> Array:
+def _likeliest_path(evidence: Array) -> Array:
     """(F,) the most likely gait of each frame: an index of the G gaits.
 
-    Of all sequences of gaits, this one has the highest sum of `evidence` (F, G), minus `switch_cost` for each
+    Of all sequences of gaits, this one has the highest sum of `evidence` (F, G), minus SWITCH_COST for each
     change of gait (Viterbi algorithm).
     """
     frames, gaits = evidence.shape
@@ -181,9 +179,9 @@ def _likeliest_path(evidence: Array, switch_cost: float) -> Array:
     unchanged = np.arange(gaits)
     for i in range(1, frames):
         top = int(np.argmax(best))
-        stay = best >= best[top] - switch_cost
+        stay = best >= best[top] - SWITCH_COST
         came_from[i] = np.where(stay, unchanged, top)
-        best = np.where(stay, best, best[top] - switch_cost) + evidence[i]
+        best = np.where(stay, best, best[top] - SWITCH_COST) + evidence[i]
     path = np.empty(frames, int)
     path[-1] = np.argmax(best)
     for i in range(frames - 1, 0, -1):
@@ -208,11 +206,3 @@ def _without_short_walks(gait: Array, odds: Array) -> Array:
             middle = (a + b) // 2
             out[a:middle], out[middle:b] = before, after
     return out
-
-
-def _fade(gait: Array, count: int) -> Array:
-    """(F, count) shares of `count` gaits, which fade linearly over FADE_FRAMES at every change.
-
-    gait: (F,) index of each frame's gait.
-    """
-    return np.clip(mean(np.eye(count)[gait], FADE_FRAMES), 0.0, 1.0)

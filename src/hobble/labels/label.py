@@ -11,13 +11,11 @@ from hobble.core.clip import Clip
 from hobble.core.files import write_json
 from hobble.core.quat import Array
 from hobble.labels.clip_labels import GAITS, LabelReport, Labels, label_curves
-from hobble.labels.contacts import find_contacts, find_stance_contacts
-from hobble.labels.footfall import Swing, find_landings, find_swings
+from hobble.labels.footfall import find_landings, find_stance_contacts, find_still_joints, find_swings
 from hobble.labels.gait import automatic_gait, overwrite_crouch
 from hobble.labels.label_files import SourceTime, read_footsteps, read_gait, read_gait_keys, read_phase
 from hobble.labels.options import LabelOptions as Options
 from hobble.labels.phase import (
-    MARGINS,
     dropped_frames,
     find_cycles,
     footsteps_of_phase,
@@ -49,7 +47,8 @@ def label_clip(
     "flat", or another kind of ground. options: the section `labels` of the data set. Raises InputError for an
     invalid file.
     """
-    label_files = _files_by_kind(files) if options.files else {}
+    paths = [Path(file) for file in files if options.files]
+    label_files = {kind: path for path in paths for end, kind in KINDS.items() if path.name.endswith(end)}
     warnings: list[str] = []
     if label_files and motion.get("loops", 1) > 1:
         names = ", ".join(path.name for path in label_files.values())
@@ -57,20 +56,22 @@ def label_clip(
         warnings.append(f"{names} not used: {cycle}")
         label_files = {}
     time = SourceTime(motion["source_frames"], motion["source_fps"], motion.get("source_start", 0))
-    swings = find_swings(clip, options)
-    phase, known, footsteps = _find_phase(clip, label_files, time, swings, options.shortest_step)
-    shares = _find_gait(clip, label_files, time, options, gait)
+    stances = find_stance_contacts(clip)
+    phase, known, footsteps = _find_phase(clip, label_files, time)
+    if "gait" in label_files:
+        shares = read_gait(label_files["gait"], time, len(clip))
+    elif "gait_keys" in label_files:
+        shares = read_gait_keys(label_files["gait_keys"], time, len(clip))
+    else:
+        shares = automatic_gait(clip, stances, gait)
     if ground == "flat":
         shares = overwrite_crouch(shares, clip)
     known &= ~dropped_frames(footsteps, len(clip))
     zero = options.phase_zero
     cycles, dropped = find_cycles(footsteps, len(clip), zero, options.margins, options.between)
     if not len(cycles):
-        margin, where = MARGINS[options.margins], ""
-        if options.margins == "drop":
-            where = f" with {margin} frames of the clip before and {margin + 1} after it"
-        warnings.append(f"no whole gait cycle{where}, so no frame of the clip is trained on")
-    contacts = find_contacts(clip, options)
+        warnings.append("no whole gait cycle, so no frame of the clip is trained on")
+    contacts = find_still_joints(clip) if options.contacts == "original" else stances
     left, right = contacts[:, 0].mean(), contacts[:, 2].mean()
     if abs(left - right) > UNLIKE_HEELS:
         warnings.append(
@@ -117,38 +118,19 @@ def write_report(path: str | Path, report: LabelReport, labels: Labels, clip: Cl
     write_json(path, {**asdict(report), **found})
 
 
-def _files_by_kind(files: Iterable[str | Path]) -> dict[str, Path]:
-    """Kind of a label file (phase, gait, footsteps, gait_keys) -> file. Other files are ignored."""
-    paths = [Path(file) for file in files]
-    return {kind: path for path in paths for end, kind in KINDS.items() if path.name.endswith(end)}
-
-
-def _find_phase(
-    clip: Clip, files: Mapping[str, Path], time: SourceTime, swings: list[Swing], shortest_step: int
-) -> tuple[Array, np.ndarray, Array]:
-    """Find the phase from files or, without files, from the swings.
+def _find_phase(clip: Clip, files: Mapping[str, Path], time: SourceTime) -> tuple[Array, np.ndarray, Array]:
+    """Find the phase from files or, without files, from the swings of the feet.
 
     Returns the phase (F,), which is 0 when the right foot lands; for each frame whether the phase is known,
-    bool (F,); and the footsteps (N, 3), see `hobble.labels.phase`. files: from `_files_by_kind`.
+    bool (F,); and the footsteps (N, 3), see `hobble.labels.phase`. files: kind, see KINDS -> file.
     """
     frames = len(clip)
     if "footsteps" in files:
         footsteps = read_footsteps(files["footsteps"], time)
     else:
-        footsteps = rows_of_landings(find_landings(swings, frames, shortest_step))
+        footsteps = rows_of_landings(find_landings(find_swings(clip), frames))
     if "phase" not in files:
         return *phase_of_footsteps(footsteps, frames), footsteps
     phase = read_phase(files["phase"], time, frames)
     from_phase, known = footsteps_of_phase(phase)
     return phase, known, footsteps if "footsteps" in files else from_phase
-
-
-def _find_gait(
-    clip: Clip, files: Mapping[str, Path], time: SourceTime, options: Options, dominant: str | None
-) -> Array:
-    """(F, 6) gait shares from files or, without files, from the motion. dominant: main gait, if known."""
-    if "gait" in files:
-        return read_gait(files["gait"], time, len(clip))
-    if "gait_keys" in files:
-        return read_gait_keys(files["gait_keys"], time, len(clip))
-    return automatic_gait(clip, find_stance_contacts(clip, options), dominant)

@@ -1,4 +1,4 @@
-"""Reads and writes label files beside clips: `.phase`, `.gait`, `_footsteps.txt`, `_gait.txt`.
+"""Reads label files beside clips (`.phase`, `.gait`, `_footsteps.txt`, `_gait.txt`) and writes the last two.
 
 In these files, frames are counted from 1, at the frame rate of the clip's BVH file (the source file). A clip
 has 60 frames a second, and its frames are counted from 0. Errors name the label file and the line.
@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from hobble.core.errors import InputError
-from hobble.core.files import MAX_TEXT_BYTES, read_text, write_text
+from hobble.core.files import MAX_TEXT_BYTES, read_text
 from hobble.core.quat import Array
 from hobble.labels.clip_labels import GAITS, Labels
 
@@ -64,7 +64,7 @@ def read_phase(path: Path, time: SourceTime, frames: int) -> Array:
     value that is not a number in 0..1, and for a wrong number of rows.
     """
     rows = np.unwrap(_read_matrix(path, time, 1)[:, 0], period=1.0)
-    phase = _at_clip_frames(rows, time, frames) % 1.0
+    phase = np.interp(time.source_frames_of_clip(frames), np.arange(len(rows)), rows) % 1.0
     return np.where(phase > 1 - 1e-9, 0.0, phase)
 
 
@@ -73,7 +73,8 @@ def read_gait(path: Path, time: SourceTime, frames: int) -> Array:
     rows = _read_matrix(path, time, len(FILE_GAITS))
     # (8, 6): which of GAITS each column adds to.
     added = np.eye(len(GAITS))[[GAITS.index(GAIT_OF_FILE_GAIT.get(name, name)) for name in FILE_GAITS]]
-    return np.stack([_at_clip_frames(column, time, frames) for column in rows.T], axis=1) @ added
+    when, row = time.source_frames_of_clip(frames), np.arange(len(rows))
+    return np.stack([np.interp(when, row, column) for column in rows.T], axis=1) @ added
 
 
 def read_footsteps(path: Path, time: SourceTime) -> Array:
@@ -196,28 +197,11 @@ def _read_matrix(path: Path, time: SourceTime, columns: int) -> Array:
     return np.array(rows, float)
 
 
-def _at_clip_frames(rows: Array, time: SourceTime, frames: int) -> Array:
-    """(frames,) the values of `rows` (R,), one for each source frame, at the frames of the clip."""
-    return np.interp(time.source_frames_of_clip(frames), np.arange(len(rows)), rows)
-
-
-# Writes automatic labels as files that people can correct: `_footsteps.txt`, `_gait.txt`, `.phase`.
-#
-# The files count frames from 1, at the frame rate of the clip's BVH file (its source file). Labels count them
-# from 0, at 60 Hz. `hobble.labels.label_files` reads the label files.
+# Writes automatic labels as files that people can correct: `_footsteps.txt`, `_gait.txt`. The phase follows
+# from the footsteps.
 
 
 HALF_FADE = 15  # frames at 60 Hz; a fade begins this long before a change of gait and ends this long after it
-
-
-def write_label_files(footsteps: Path, gait: Path, phase: Path, labels: Labels, time: SourceTime) -> None:
-    """Write the three label files of a clip.
-
-    footsteps, gait, phase: their paths. time: how the clip's frames relate to those of its source file.
-    """
-    write_text(footsteps, footsteps_text(labels, time))
-    write_text(gait, gait_text(labels, time))
-    write_text(phase, phase_text(labels, time))
 
 
 def footsteps_text(labels: Labels, time: SourceTime) -> str:
@@ -259,20 +243,6 @@ def gait_text(labels: Labels, time: SourceTime) -> str:
     # At a low frame rate several keys may fall on the same source frame. Only the first of them is written.
     kept = [0, *(i + 1 for i, (a, b) in enumerate(itertools.pairwise(frames)) if b > a)]
     return "".join(f"{frames[i]} {GAITS[keys[i][1]]}\n" for i in kept)
-
-
-def phase_text(labels: Labels, time: SourceTime) -> str:
-    """The content of `.phase`: a line with the phase for each source frame; 0 where it is unknown."""
-    # The frame of the clip, not rounded, at each source frame.
-    clip_frame = np.clip((np.arange(time.frames) - time.first) / time.ratio, 0, len(labels) - 1)
-    before = np.floor(clip_frame).astype(int)
-    after = np.minimum(before + 1, len(labels) - 1)
-    # The change of phase the shorter way round the cycle, -.5 to .5.
-    step = (labels.phase[after] - labels.phase[before] + 0.5) % 1.0 - 0.5
-    values = (labels.phase[before] + (clip_frame - before) * step) % 1.0
-    values[~(labels.phase_known[before] & labels.phase_known[after])] = 0.0
-    # The limit keeps six digits from rounding up to 1.
-    return "".join(f"{value:.6f}\n" for value in np.minimum(values, 0.999999))
 
 
 def _source_frame(frame: float, time: SourceTime) -> int:

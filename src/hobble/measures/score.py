@@ -19,9 +19,8 @@ from hobble.core.errors import HobbleError, InputError
 from hobble.core.files import atomic_path, write_json
 from hobble.core.quat import Array
 from hobble.labels.clip_labels import GAITS
-from hobble.labels.contacts import find_stance_contacts
+from hobble.labels.footfall import find_stance_contacts
 from hobble.labels.gait import automatic_gait
-from hobble.labels.options import LabelOptions
 from hobble.measures.motion_quality import (
     FOOT_POINTS,
     FPS,
@@ -215,8 +214,7 @@ def _features(takes: Sequence[Take]) -> Array:
 
 def _gaits(takes: Sequence[Take]) -> dict[str, float]:
     """Gait -> its share of all frames, as `hobble labels` finds gaits."""
-    options = LabelOptions()
-    shares = [automatic_gait(t.clip, find_stance_contacts(t.clip, options), None) for t in takes]
+    shares = [automatic_gait(t.clip, find_stance_contacts(t.clip), None) for t in takes]
     return dict(zip(GAITS, np.concatenate(shares).mean(axis=0).round(4).tolist(), strict=True))
 
 
