@@ -33,8 +33,8 @@ def made(holden31: Skeleton, tmp_path_factory: Any) -> Made:
 def x_of(network: Matching, rows: np.ndarray) -> np.ndarray:
     """Inputs (n, X) with the features of rows."""
     x = np.repeat(network.x_mean[None], len(rows), axis=0)
-    known = network.weights > 0
-    x[:, network.columns[known]] = network.features[rows][:, known] / network.weights[known]
+    known = network.feature_weights > 0
+    x[:, network.columns[known]] = network.features[rows][:, known] / network.feature_weights[known]
     return x.astype(np.float32)
 
 
@@ -91,7 +91,7 @@ def test_a_wish_stays_within_the_captured_features(made: Made) -> None:
 
 def test_the_same_seed_gives_the_same_bits(holden31: Skeleton, tmp_path: Path) -> None:
     one, again, other = (
-        built(holden31, tmp_path, "learned", seed=seed, **TINY)[0].arrays() for seed in (1, 1, 2)
+        built(holden31, tmp_path, "learned", seed=seed, **TINY)[0].arrays for seed in (1, 1, 2)
     )
     assert all(np.array_equal(one[name], again[name]) for name in one)
     assert not np.array_equal(one["D0"], other["D0"])

@@ -20,7 +20,11 @@ def test_the_example_of_a_game_loop_runs(
     arrays |= dict(
         zip(STATISTICS, (network.x_mean, network.x_std, network.y_mean, network.y_std), strict=True)
     )
-    meta = {"layout": network.layout.to_dict(), "skeleton": network.skeleton.to_dict()}
+    meta = {
+        "layout": network.layout.to_dict(),
+        "skeleton": network.skeleton.to_dict(),
+        "channels": dict(network.channels),
+    }
     np.savez(tmp_path / "weights.npz", **arrays, meta=np.array(json.dumps(meta)))
     monkeypatch.setattr(sys, "argv", ["game_loop.py", str(tmp_path)])
     left = runpy.run_path(str(root / "examples" / "game_loop.py"))

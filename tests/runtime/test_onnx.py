@@ -33,9 +33,9 @@ def test_onnxruntime_predicts_the_same_as_the_runtime(
 
 
 def test_the_command_exports_onnx(
-    hurtable, tmp_path: Path, root: Path, capsys: pytest.CaptureFixture
+    network, tmp_path: Path, root: Path, capsys: pytest.CaptureFixture
 ) -> None:
-    write_release(tmp_path / "pfnn", hurtable)
+    write_release(tmp_path / "pfnn", network)
     skeleton = ["--skeleton", str(root / "config" / "skeletons" / "holden31.yaml")]
     target = tmp_path / "out" / "network.onnx"
     assert main(["export", "onnx", str(tmp_path / "pfnn"), str(target), "--mode", "linear", *skeleton]) == 0

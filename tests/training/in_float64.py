@@ -15,7 +15,7 @@ import torch
 
 from hobble.database.reader import Database
 from hobble.models import network_options
-from hobble.models.model import Trainable
+from hobble.models.blend import TrainableBlend
 from hobble.training import train as module
 from hobble.training.augment import OtherPaces, OtherPoses, RollOut
 from hobble.training.batches import HostRows, SampleBatch
@@ -38,8 +38,8 @@ def widen(kind: Any) -> None:
 def in_double() -> None:
     """Make networks, batches and carried errors use float64."""
     widen(HostRows)
-    to = Trainable.to
-    Trainable.to = lambda self, device, dtype=None: to(self, device, torch.float64)  # type: ignore[method-assign]
+    to = TrainableBlend.to
+    TrainableBlend.to = lambda self, device, dtype=None: to(self, device, torch.float64)  # type: ignore[method-assign]
 
     for kind in (RollOut, OtherPoses, OtherPaces):
         widen_state(kind)

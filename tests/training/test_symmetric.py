@@ -11,8 +11,9 @@ from hobble.core.errors import HobbleError
 from hobble.core.skeleton import Skeleton
 from hobble.database.reader import Database
 from hobble.database.write import write_database
+from hobble.models.blend import TrainableBlend
 from hobble.models.mann import MannOptions
-from hobble.models.model import Options, Trainable
+from hobble.models.model import Options
 from hobble.models.pfnn import PfnnOptions
 from hobble.models.plain import PlainOptions
 from hobble.rows.layout import mirror_of_x, mirror_of_y
@@ -41,7 +42,7 @@ def data(tmp_path: Path) -> Database:
     return Database.open(path, 64)
 
 
-def apart(network: Trainable, data: Database) -> float:
+def apart(network: TrainableBlend, data: Database) -> float:
     """How far the output for mirrored inputs is from the mirrored output, in standard deviations."""
     skeleton, s = Skeleton.from_dict(data.skeleton), data.statistics
     x_mirror = mirror_of_x(data.layout, skeleton).for_standardised_rows(s.x_mean, s.x_std)

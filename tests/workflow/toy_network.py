@@ -18,7 +18,7 @@ class ToyOptions(BlendedOptions):
         return Toy
 
     def trainable(self, flat, sizes, columns):
-        return TrainableToy(flat, sizes, 1)
+        return TrainableToy(flat, sizes, 1, kind=self.kind)
 
 
 OPTIONS = ToyOptions
@@ -48,18 +48,8 @@ class Toy(BlendedNetwork):
 class TrainableToy(TrainableBlend):
     """The network in training."""
 
-    kind: ClassVar[str] = "toy"
-
     def shares(self, gate, x, p, masks):
         return p.new_ones(len(p), 1)
 
     def arrays(self):
         return {name: array[0] for name, array in super().arrays().items()}
-
-    @property
-    def file_metadata(self):
-        return {"network": self.formula()}
-
-    @property
-    def description(self):
-        return f"toy of {self.units_in_words}"

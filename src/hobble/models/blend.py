@@ -6,13 +6,14 @@ where the shares of the sets of weights come from; what is here is the same for 
 
 from __future__ import annotations
 
-from abc import abstractmethod
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from itertools import pairwise
 from math import prod
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,19 +23,24 @@ from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 from hobble.models.forward import forward
 from hobble.models.load import read_layers
-from hobble.models.model import LayerMirror, Trainable, TrainedOptions, TrainingStep
+from hobble.models.model import FinishedNetwork, Options
 from hobble.models.network import FIXED, standardise_inputs
 from hobble.models.onnx_file import Graph, Node, OnnxNetwork, add_layers
 from hobble.rows.layout import ColumnMirror, RowLayout
 
 if TYPE_CHECKING:
+    import torch
     from torch import Tensor
 
-    from hobble.models.predict import BlendPredictor, Shares
+    from hobble.models.network import Predictor
+    from hobble.models.predict import Shares
+    from hobble.models.step import AutogradStep
 
 
-class BlendedOptions(TrainedOptions):
-    """hidden_layers: number of hidden layers. units: units of each of them. The defaults are as published."""
+class BlendedOptions(Options):
+    """Options of a kind that is trained in passes over the shuffled rows of all training clips.
+
+    hidden_layers: number of hidden layers. units: units of each of them. The defaults are as published."""
 
     hidden_layers: Annotated[int, Field(ge=1, le=8)] = 2
     units: Annotated[int, Field(gt=0, le=8192)] = 512
@@ -56,11 +62,14 @@ class BlendedOptions(TrainedOptions):
         return ()
 
     def parameter_count(self, inputs: int, outputs: int) -> int:
-        """As in `TrainedOptions`."""
+        """The number of trained parameters, for X of `inputs` columns and Y of `outputs` columns."""
         return sum(map(prod, self.trainable(None, (inputs, *self.hidden, outputs), ()).shapes))
 
     def untrained_network(self, layout: RowLayout, skeleton: Skeleton, seed: int) -> TrainableBlend:
-        """As in `TrainedOptions`."""
+        """A new, untrained network on the CPU. The same seed gives the same network.
+
+        layout: the columns of X and Y, with the joints of `skeleton`.
+        """
         import torch
 
         sizes = (layout.x_size, *self.hidden, layout.y_size)
@@ -147,12 +156,11 @@ class BlendedNetwork(OnnxNetwork):
         y = forward(self.weights, self.biases, self.shares(z, phase), self.extended(z, phase))
         return y * self.y_std + self.y_mean
 
-    def predictor(self, mode: str | None = None, storage: str | None = None) -> BlendPredictor:
+    def prepared(self, mode: str, storage: str) -> Predictor:
         """As in `Network`."""
         from hobble.models.predict import BlendPredictor
 
-        prepared = self.prepare(self.resolve_mode(mode))
-        return BlendPredictor(self, *prepared, self.extended, storage or self.default_storage)
+        return BlendPredictor(self, mode, storage)
 
     def engine_data(
         self, mode: str, storage: str, inputs: NDArray[np.int64]
@@ -172,17 +180,33 @@ class BlendedNetwork(OnnxNetwork):
         return f"{hidden} hidden layer{'s' * (hidden != 1)}"
 
 
-@dataclass(frozen=True)
-class TrainableBlend(Trainable):
-    """A blended stack in training. Its first layers are those of the gate, if it has one.
+class LayerMirror(NamedTuple):
+    """How to mirror a layer (out, K, in + 1) of a network in training.
 
-    units: units of each layer, the columns of X first. sets: K.
+    inputs: how the layer's inputs change if the motion is mirrored. outputs: the same for its outputs.
+    half_cycle: how many of the K sets of weights make half a cycle; 0 if they do not depend on the phase.
+    """
+
+    inputs: ColumnMirror
+    outputs: ColumnMirror
+    half_cycle: int
+
+
+@dataclass(frozen=True)
+class TrainableBlend(ABC):
+    """A blended stack in training. Its parameters are in one buffer, layer by layer.
+
+    flat: the buffer. The parameters of a layer are (out, K, in + 1): K sets of weights, with the bias as the
+    last column. So one loop of the optimiser serves all kinds. The first layers are those of the gate, if
+    there is one. units: units of each layer, the columns of X first. sets: K. kind: as in `FinishedNetwork`.
     """
 
     extra_inputs: ClassVar[int] = 0  # as in `BlendedNetwork`
 
+    flat: Tensor
     units: tuple[int, ...]
     sets: int
+    kind: str = field(default="", kw_only=True)
 
     @abstractmethod
     def shares(self, gate: list[Tensor], x: Tensor, p: Tensor, masks: list[Tensor] | None) -> Tensor:
@@ -203,7 +227,7 @@ class TrainableBlend(Trainable):
 
     @property
     def shapes(self) -> list[tuple[int, int, int]]:
-        """As in `Trainable`."""
+        """(out, K, in + 1) of each layer in `flat`."""
         gate = [(out, 1, size + 1) for size, out in pairwise(self.gate_units)]
         sizes = (self.units[0] + self.extra_inputs, *self.units[1:])
         return gate + [(out, self.sets, size + 1) for size, out in pairwise(sizes)]
@@ -224,19 +248,23 @@ class TrainableBlend(Trainable):
         return self.units[-1]
 
     def __call__(self, x: Tensor, p: Tensor) -> Tensor:
-        """As in `Trainable`."""
+        """Standardised outputs (B, Y) of standardised inputs (B, X) at phases (B,), without dropout."""
         from hobble.models.step import evaluate
 
         return evaluate(self, self.layers, x, p)
 
-    def step(self, dropout: float, half: bool) -> TrainingStep:
-        """As in `Trainable`: compiled loops on a CPU, PyTorch's own gradient elsewhere."""
+    def step(self, dropout: float, half: bool) -> AutogradStep:
+        """The training step: compiled loops on a CPU, PyTorch's own gradient elsewhere.
+
+        dropout: share of the units that are dropped. half: whether to round the factors of the matrix
+        products to bfloat16.
+        """
         from hobble.models.step import AutogradStep, FusedStep
 
         return (FusedStep if self.flat.device.type == "cpu" else AutogradStep)(self, dropout, half)
 
     def arrays(self) -> dict[str, np.ndarray]:
-        """As in `FinishedNetwork`: `W0` (K, out, in), `b0` (K, out), `W1`, `b1`, ..."""
+        """The arrays of the network's file: `W0` (K, out, in), `b0` (K, out), `W1`, `b1`, ..."""
         arrays = {}
         for number, layer in enumerate(self.layers[self.gate_layers :]):
             values = layer.cpu().numpy().swapaxes(0, 1)
@@ -244,31 +272,58 @@ class TrainableBlend(Trainable):
             arrays[f"b{number}"] = np.ascontiguousarray(values[:, :, -1])
         return arrays
 
-    def formula(self, x: str = "x") -> str:
-        """The formula of the layers as text, without a word on W and b. x: the first layer's inputs."""
-        last = len(self.units) - 2
-        for i in range(last):
-            x = f"elu(W{i} {x} + b{i})"
-        return f"y = W{last} {x} + b{last} on standardised x and y; "
-
     @property
-    def units_in_words(self) -> str:
-        """Such as "342-512-512-311 units"."""
-        return f"{'-'.join(map(str, self.units))} units"
+    def description(self) -> str:
+        """As in `FinishedNetwork`."""
+        layers = f"{'-'.join(map(str, self.units))} units"
+        gate = f" and a gate of {'-'.join(map(str, self.gate_units))}" if self.gate_units else ""
+        return f"{layers}, {self.sets} sets of weights{gate} ({self.flat.numel():,} parameters)"
+
+    def finished(self) -> FinishedNetwork:
+        """The network with its present parameters, to be written to a file."""
+        return FinishedNetwork(self.kind, self.arrays(), self.description)
 
     def mirrors(self, inputs: ColumnMirror, outputs: ColumnMirror) -> list[LayerMirror]:
-        """As in `Trainable`."""
-        columns = [self.mirror_of_inputs(inputs), *map(_mirror_of_units, self.units[1:-1]), outputs]
-        return [LayerMirror(before, after, self.half_cycle) for before, after in pairwise(columns)]
+        """How each layer changes if standardised X and Y are mirrored.
 
-    @property
-    def half_cycle(self) -> int:
-        """As in `LayerMirror`."""
-        return 0
+        inputs, outputs: how the columns of X and Y are mirrored. Raises TypeError for a network with a gate,
+        which would have to be mirrored, too.
+        """
+        if self.gate_units:
+            raise TypeError(f"{type(self).__name__} cannot be mirrored, so set training.symmetric: false")
+        columns = [self.mirror_of_inputs(inputs), *map(_mirror_of_units, self.units[1:-1]), outputs]
+        return [LayerMirror(before, after, self.sets // 2) for before, after in pairwise(columns)]
 
     def mirror_of_inputs(self, inputs: ColumnMirror) -> ColumnMirror:
         """The mirror of the first layer's inputs. inputs: that of the columns of X."""
         return inputs
+
+    @cached_property
+    def layers(self) -> list[Tensor]:
+        """(out, K, in + 1) views of the parameters, one for each layer."""
+        return self.views(self.flat)
+
+    def views(self, flat: Tensor) -> list[Tensor]:
+        """(out, K, in + 1) views of `flat`, one for each layer. flat: a buffer laid out like `self.flat`."""
+        parts = flat.split([prod(shape) for shape in self.shapes])
+        return [part.view(shape) for part, shape in zip(parts, self.shapes, strict=True)]
+
+    def to(self, device: torch.device | str, dtype: torch.dtype | None = None) -> Self:
+        """A copy on another device or in another type."""
+        return replace(self, flat=self.flat.to(device, dtype, copy=True))
+
+    def randomise(self, seed: int) -> Self:
+        """Fill the weights with uniform random numbers within +-sqrt(6 / (in * out)); returns the network.
+
+        The code that Holden et al. (2017) released starts in the same way. The biases are not changed; in a
+        new buffer they are 0.
+        """
+        generator = np.random.default_rng([seed, 0])
+        for layer in self.layers:
+            outputs, sets, inputs = layer.shape[0], layer.shape[1], layer.shape[2] - 1
+            bound = (6.0 / (inputs * outputs)) ** 0.5
+            layer[:, :, :-1] = layer.new_tensor(generator.uniform(-bound, bound, (outputs, sets, inputs)))
+        return self
 
 
 def _mirror_of_units(count: int) -> ColumnMirror:

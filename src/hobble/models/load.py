@@ -15,7 +15,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
-from hobble.channels import CHANNEL_NAMES, all_channels, channel
+from hobble.channels import CHANNEL_NAMES, channel
 from hobble.channels.speed_limits import Limits
 from hobble.core.declared import ArrayOf, check_arrays, read_declared
 from hobble.core.errors import InputError
@@ -112,15 +112,18 @@ def network_from_arrays(
     """
     raw = _read_meta(path, arrays)
     meta = read_declared(path, "meta", Meta, raw)
-    statistics = read_statistics(path, arrays)
-    layout = _read_layout(path, meta, len(statistics["x_mean"]), len(statistics["y_mean"]), skeleton)
+    statistics, facts = read_columns(path, arrays)
+    layout = _read_layout(path, meta, len(statistics["x_mean"]), len(statistics["y_mean"]))
     if meta.skeleton:
         skeleton = skeleton_from_data(path, meta.skeleton, NEEDED_ROLES)
     if skeleton is not None and len(skeleton.joints) != layout.joints:
         raise InputError(
             path, f"has {layout.joints} joints, but skeleton {skeleton.name} has {len(skeleton.joints)}"
         )
-    labels = {name: _read_labels(path, name, meta, columns, skeleton) for name, columns in layout.channels}
+    labels = {name: meta.channels.get(name, ()) for name, _ in layout.channels}
+    for name, columns in layout.channels:
+        if len(labels[name]) != columns:
+            raise InputError(path, f"channel {name} has {columns} columns, but {len(labels[name])} labels")
     shared_fields: dict[str, Any] = {
         **statistics,
         "layout": layout,
@@ -129,7 +132,7 @@ def network_from_arrays(
         "channels": labels,
         "terrain_side": float(meta.terrain_side),
         "meta": raw,
-        "training_facts": read_facts(path, arrays, layout.x_size, layout.y_size),
+        "training_facts": facts,
         "limits": _read_limits(path, meta, labels),
     }
     kind = options_of_kind(meta.kind)
@@ -154,15 +157,13 @@ def _read_meta(path: str | Path, arrays: Mapping[str, Any]) -> dict[str, Any]:
         raise InputError(path, f"meta is not valid JSON: {error}") from None
 
 
-def _read_layout(
-    path: str | Path, meta: Meta, x_size: int, y_size: int, skeleton: Skeleton | None
-) -> RowLayout:
-    """The layout of the columns of X and Y, from `meta` or else guessed by `_guess_layout`.
+def _read_layout(path: str | Path, meta: Meta, x_size: int, y_size: int) -> RowLayout:
+    """The layout of the columns of X and Y. A file that has none gets the default window and no channels.
 
     x_size, y_size: number of columns of X and Y in the file. Raises InputError if the layout has other sizes.
     """
-    if meta.layout is None:
-        layout = _guess_layout(x_size, y_size, skeleton)
+    if meta.layout is None:  # in Y, a joint has three columns each for position, velocity and rotation
+        layout = RowLayout(max(1, (y_size - RowLayout(0).y_size) // 9))
     else:
         layout = layout_from_data(path, meta.layout)
     if unknown := [name for name, _ in layout.channels if name not in CHANNEL_NAMES]:
@@ -175,39 +176,6 @@ def _read_layout(
             f"which has {layout.x_size} inputs and {layout.y_size} outputs",
         )
     return layout
-
-
-def _guess_layout(x_size: int, y_size: int, skeleton: Skeleton | None) -> RowLayout:
-    """The layout for a file that has none: the default window, and as many joints as fit the size of Y.
-
-    Columns of X that are left over are taken for a channel. It is the first channel that has as many columns
-    for `skeleton`, or else the first of all channels.
-    """
-    # In Y, a joint has three columns each for position, velocity and rotation.
-    joints = max(1, (y_size - RowLayout(0).y_size) // 9)
-    left_over = x_size - RowLayout(joints).x_size
-    if left_over <= 0:
-        return RowLayout(joints)
-    fitting = (
-        one.name for one in all_channels() if skeleton is not None and len(one.columns(skeleton)) == left_over
-    )
-    return RowLayout(joints, channels=((next(fitting, CHANNEL_NAMES[0]), left_over),))
-
-
-def _read_labels(
-    path: str | Path, name: str, meta: Meta, columns: int, skeleton: Skeleton | None
-) -> tuple[str, ...]:
-    """The labels of the columns of channel `name`, from the file or else from the skeleton.
-
-    Raises InputError unless there is one label for each column.
-    """
-    found: Any = meta.channels.get(name)
-    if found is None and skeleton is not None:
-        found = channel(name).columns(skeleton)
-    labels = read_declared(path, f"channel {name}", Names, found or ())  # type: ignore[arg-type]
-    if len(labels) != columns:
-        raise InputError(path, f"channel {name} has {columns} columns, but {len(labels)} labels")
-    return tuple(labels)
 
 
 def _read_limits(path: str | Path, meta: Meta, channels: Mapping[str, tuple[str, ...]]) -> dict[str, Limits]:
@@ -233,26 +201,6 @@ def _check_prediction(path: str | Path, network: Network) -> None:
         raise InputError(path, "does not predict a finite pose for its mean input", fix=DIVERGED)
 
 
-def read_facts(path: str | Path, arrays: Mapping[str, Any], x_size: int, y_size: int) -> TrainingFacts | None:
-    """The facts about the training data. None if the file has none, like that of Holden et al. (2017).
-
-    x_size, y_size: numbers of columns of X and Y. Raises InputError for facts that cannot be used.
-    """
-    numbers = {"start_phase": ArrayOf((), low=0, high=1e6), "fastest": ArrayOf((), low=0, high=1e6)}
-    if not any(name in arrays for name in (*FACTS, *numbers)):
-        return None
-    sizes = {name: x_size if key in ("x_low", "x_high", "start_x") else y_size for name, key in FACTS.items()}
-    tables = {name: _between((size,), LARGEST_MEAN) for name, size in sizes.items()}
-    columns, _ = read_arrays(path, arrays, tables)
-    check_arrays(path, arrays, numbers)
-    found: dict[str, Any] = {key: columns[name] for name, key in FACTS.items()}
-    for block in "xy":
-        if (found[f"{block}_low"] > found[f"{block}_high"]).any():
-            name = block.upper()
-            raise InputError(path, f"{name}low is above {name}high in at least one column")
-    return TrainingFacts(**found, **{name: float(arrays[name]) for name in numbers})  # type: ignore[arg-type]
-
-
 def read_arrays(
     path: str | Path,
     arrays: Mapping[str, Any],
@@ -272,11 +220,6 @@ def read_arrays(
             raise InputError(path, problem)
         found[name] = np.ascontiguousarray(array, np.float32 if "f" in wanted.kinds else np.int64)
     return found, known
-
-
-def _between(shape: tuple[int | str, ...], most: float, least: float | None = None) -> ArrayOf:
-    """Numbers of any type from `least`, by default -`most`, to `most`."""
-    return ArrayOf(shape, "fiu", -most if least is None else least, most)
 
 
 def read_layers(
@@ -305,8 +248,8 @@ def read_layers(
     sets = (set_word,) if set_word else ()
     declared = {}
     for i in range(count):
-        declared[f"{weight}{i}"] = _between((*sets, units[i + 1], units[i]), LARGEST_WEIGHT)
-        declared[f"{bias}{i}"] = _between((*sets, units[i + 1]), LARGEST_WEIGHT)
+        for prefix, shape in ((weight, (*sets, units[i + 1], units[i])), (bias, (*sets, units[i + 1]))):
+            declared[f"{prefix}{i}"] = ArrayOf(shape, "fiu", -LARGEST_WEIGHT, LARGEST_WEIGHT)
     found, known = read_arrays(path, arrays, declared)
     least, most = set_range
     if set_word and not least <= known[set_word] <= most:
@@ -316,12 +259,29 @@ def read_layers(
     return weights, biases
 
 
-def read_statistics(path: str | Path, arrays: Mapping[str, Any]) -> dict[str, Array]:
-    """The means and standard deviations of the inputs X and of the outputs Y.
+def read_columns(
+    path: str | Path, arrays: Mapping[str, Any]
+) -> tuple[dict[str, Array], TrainingFacts | None]:
+    """What a file says about each column of X and Y.
 
-    The keys are x_mean and x_std, each (X,), and y_mean and y_std, each (Y,).
+    Returns the means and standard deviations, by field of `Network`: x_mean and x_std, each (X,), y_mean and
+    y_std, each (Y,). Then the facts about the training rows; None if the file has none, like that of Holden
+    et al. (2017). Raises InputError for numbers that cannot be used.
     """
-    declared = {name: _between((name[0],), LARGEST_MEAN) for name in ("Xmean", "Ymean")}
-    declared |= {name: _between((name[0],), LARGEST_STD, 0.0) for name in ("Xstd", "Ystd")}
+    numbers = dict.fromkeys(("start_phase", "fastest"), ArrayOf((), low=0, high=1e6))
+    has_facts = any(name in arrays for name in (*FACTS, *numbers))
+    declared = {}
+    for name, key in (STATISTICS | FACTS if has_facts else STATISTICS).items():
+        low, high = (0.0, LARGEST_STD) if name.endswith("std") else (-LARGEST_MEAN, LARGEST_MEAN)
+        declared[name] = ArrayOf(("X" if "x" in key else "Y",), "fiu", low, high)
     found, _ = read_arrays(path, arrays, declared)
-    return {key: found[name] for name, key in STATISTICS.items()}
+    statistics = {key: found[name] for name, key in STATISTICS.items()}
+    if not has_facts:
+        return statistics, None
+    check_arrays(path, arrays, numbers)
+    for block in "XY":
+        if (found[f"{block}low"] > found[f"{block}high"]).any():
+            raise InputError(path, f"{block}low is above {block}high in at least one column")
+    facts: dict[str, Any] = {key: found[name] for name, key in FACTS.items()}
+    facts |= {name: float(arrays[name]) for name in numbers}
+    return statistics, TrainingFacts(**facts)

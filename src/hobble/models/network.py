@@ -9,7 +9,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, ClassVar, Protocol, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,35 +29,6 @@ STORAGES = ("float32", "int16")  # types in which a predictor can keep its weigh
 # Where the runtime in C gets a prediction from: sets of weights blended around the phase, one set of weights,
 # sets that a gate blends, or recorded frames.
 PHASED, FIXED, GATED, RECORDED, LEARNED = range(5)
-
-Export = Callable[[Path, str], str]  # see `Network.exports`
-
-
-class Predictor(Protocol):
-    """A network prepared for fast evaluation, called in every frame.
-
-    It may keep buffers between calls, so each group of characters that is evaluated together needs its
-    own predictor. It keeps no state of a character. If `Network.memory_size` is above 0, the caller keeps
-    this state: an array (C, Network.memory_size) float64 for C characters, zero before a character's first
-    frame.
-    `evaluate` and `predict` then have one more argument `memory`, which the signatures below leave out. They
-    change this array in place.
-
-    X are the inputs and Y the outputs. In shapes, X and Y are the numbers of their columns.
-    """
-
-    @property
-    def network(self) -> Network:
-        """The network that the predictor evaluates."""
-
-    def standardise(self, x: Array, z: Array) -> None:
-        """Standardise the inputs x and write them into z, both (C, X) float32."""
-
-    def evaluate(self, z: Array, phase: Array, out: Array) -> None:
-        """Write Y (C, Y) float32 for standardised inputs z (C, X) at phases (C,), 0 to 1, into `out`."""
-
-    def predict(self, x: Array, phase: Array, out: Array | None = None) -> Array:
-        """Y (C, Y) float32 of X (C, X) float32 at phases (C,): `standardise`, then `evaluate`."""
 
 
 # Name in the network's file -> field of `TrainingFacts`, for the fields with a number for each column.
@@ -275,13 +246,20 @@ class Network(ABC):
     def predict(self, x: Array, phase: Array) -> Array:
         """Y (n, Y) float32 of X (n, X) at phases (n,) in 0..1, in raw units. Plain numpy, as a reference."""
 
-    @abstractmethod
     def predictor(self, mode: str | None = None, storage: str | None = None) -> Predictor:
         """The network prepared for fast evaluation.
 
         mode: one of `modes`, by default the exact one. storage: one of STORAGES, by default the kind's own.
         Raises ValueError for an unknown mode or storage.
         """
+        storage = storage or self.default_storage
+        if storage not in STORAGES:
+            raise ValueError(f"storage {storage!r}: not one of {', '.join(STORAGES)}")
+        return self.prepared(self.resolve_mode(mode), storage)
+
+    @abstractmethod
+    def prepared(self, mode: str, storage: str) -> Predictor:
+        """As `predictor`, with arguments that are known to be right."""
 
     @abstractmethod
     def engine_data(
@@ -303,23 +281,51 @@ class Network(ABC):
         """A copy that is small enough to be in a report's page; by default the network itself."""
         return self
 
-    @property
-    def exports(self) -> dict[str, Export]:
-        """Name of each export format -> a function that writes the file or folder `target` for a mode.
-
-        The function has the arguments (target, mode) and returns a message for the user.
-        """
-        return {}
-
     def export(self, to: str, target: str | Path, mode: str) -> str:
-        """Write the network in the format `to`, and return a message for the user.
+        """Write the file or folder `target` in the format `to`, by the method `export_<to>` of the kind.
 
-        Raises HobbleError if the network does not have this format.
+        mode: one of `modes`. Returns a message for the user. Raises HobbleError if the kind lacks the format.
         """
-        if to not in self.exports:
-            known = ", ".join(self.exports) or "none"
-            raise HobbleError(f"a {self.kind} network cannot be written as {to}; formats: {known}")
-        return self.exports[to](Path(target), mode)
+        writer: Callable[[Path, str], str] | None = getattr(self, f"export_{to}", None)
+        if writer is None:
+            raise HobbleError(f"a {self.kind} network cannot be written as {to}")
+        return writer(Path(target), mode)
+
+
+class Predictor(ABC):
+    """A network prepared for fast evaluation, called in every frame.
+
+    It may keep buffers between calls, so each group of characters that is evaluated together needs its
+    own predictor. It keeps no state of a character. If `Network.memory_size` is above 0, the caller keeps
+    this state: an array (C, Network.memory_size) float64 for C characters, zero before a character's first
+    frame. It is the argument `memory`, and changed in place.
+
+    X are the inputs and Y the outputs. In shapes, X and Y are the numbers of their columns.
+    """
+
+    def __init__(self, network: Network) -> None:
+        self.network = network
+        self._x_mean, self._x_inverse = (
+            np.ascontiguousarray(a, np.float32) for a in (network.x_mean, inverse_or_0(network.x_std))
+        )
+
+    def standardise(self, x: Array, z: Array) -> None:
+        """Standardise the inputs x and write them into z, both (C, X) float32."""
+        np.subtract(x, self._x_mean, out=z)
+        z *= self._x_inverse
+
+    @abstractmethod
+    def evaluate(self, z: Array, phase: Array, out: Array, memory: Array | None = None) -> None:
+        """Write Y (C, Y) float32 for standardised inputs z (C, X) at phases (C,), 0 to 1, into `out`."""
+
+    def predict(self, x: Array, phase: Array, out: Array | None = None, memory: Array | None = None) -> Array:
+        """Y (C, Y) float32 of X (C, X) float32 at phases (C,): `standardise`, then `evaluate`."""
+        z = np.empty_like(x)
+        self.standardise(x, z)
+        if out is None:
+            out = np.empty((len(x), len(self.network.y_mean)), np.float32)
+        self.evaluate(z, phase, out, memory)
+        return out
 
 
 def standardise_inputs(network: Network, x: Array) -> Array:

@@ -18,7 +18,7 @@ import numpy as np
 from hobble.core.errors import HobbleError, InputError
 from hobble.core.files import atomic_path
 from hobble.core.quat import Array
-from hobble.models.network import Export, Network, inverse_or_0
+from hobble.models.network import Network, inverse_or_0
 
 OPSET = 15  # version of the ONNX operators
 # Largest allowed difference from Hobble's runtime, in units of Y; relative for values above 1.
@@ -122,20 +122,15 @@ class OnnxNetwork(Network):
     def onnx_outputs(self, g: Graph, z: Node, mode: str) -> Node:
         """Add the nodes that find the standardised outputs to a graph. z: the standardised inputs."""
 
-    @property
-    def exports(self) -> dict[str, Export]:
-        """As in `Network`: the format "onnx"."""
-
-        def write_onnx(target: Path, mode: str) -> str:
-            with atomic_path(target) as temporary:
-                export(temporary, self, mode)
-                difference = check(temporary, self, mode)
-            return f"{target}: differs from Hobble's runtime by at most {difference:.1g}"
-
-        return {"onnx": write_onnx}
+    def export_onnx(self, target: Path, mode: str) -> str:
+        """As `Network.export`: a file that was checked."""
+        with atomic_path(target) as temporary:
+            write_graph(temporary, self, mode)
+            difference = check(temporary, self, mode)
+        return f"{target}: differs from Hobble's runtime by at most {difference:.1g}"
 
 
-def export(path: str | Path, network: OnnxNetwork, mode: str) -> None:
+def write_graph(path: str | Path, network: OnnxNetwork, mode: str) -> None:
     """Write the network, with a metadata entry `hobble` that describes columns, skeleton and channels.
 
     Raises HobbleError if onnx is not installed, ValueError for an unknown mode.

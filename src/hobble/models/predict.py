@@ -13,7 +13,6 @@ group of rows and panels whose sums are kept in registers together. The number o
 changes only the speed.
 """
 
-from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -27,8 +26,9 @@ from numpy.typing import NDArray
 
 from hobble.core.compiled import njit
 from hobble.core.quat import Array
+from hobble.models.blend import BlendedNetwork
 from hobble.models.forward import catmull_rom
-from hobble.models.network import STORAGES, Network, inverse_or_0
+from hobble.models.network import Predictor
 
 # Finds the shares (C, K) float32 of the sets, for standardised inputs (C, X) of C characters at phases (C,).
 Shares = Callable[[Array, Array], Array]
@@ -53,7 +53,7 @@ class Stack:
     weights, biases: (K, out, in) and (K, out) of each layer. storage: type in which the weights are stored.
     It is "float32", or "int16" to read half as much memory; each row of int16 weights has a factor that
     restores its scale. mean, std: (Y,) by which the last layer's outputs are brought to raw units, by default
-    0 and 1. Raises ValueError for another storage.
+    0 and 1.
 
     Fields: `weights` has the weights of all layers in panels, layer by layer and set by set. `numbers`,
     float32, has mean and std, then for each layer the factors of the rows of all sets and the biases of all
@@ -68,8 +68,6 @@ class Stack:
         mean: Array | None = None,
         std: Array | None = None,
     ) -> None:
-        if storage not in STORAGES:
-            raise ValueError(f"storage {storage!r}: not one of {', '.join(STORAGES)}")
         outputs = weights[-1].shape[1]
         numbers = [np.zeros(outputs) if mean is None else mean, np.ones(outputs) if std is None else std]
         panels, plan = [], []
@@ -100,57 +98,19 @@ class Stack:
         _run(self.weights, self.numbers, self.plan, shares, z, out)
 
 
-class StandardisingPredictor(ABC):
-    """What the predictors of all kinds share. A class of them has `evaluate`; see `Predictor`."""
+class BlendPredictor(Predictor):
+    """A `Predictor` of a blended stack. mode: one of the network's. storage: as in `Stack`."""
 
-    def __init__(self, network: Network) -> None:
-        self.network = network
-        self._x_mean, self._x_inverse = (
-            np.ascontiguousarray(a, np.float32) for a in (network.x_mean, inverse_or_0(network.x_std))
-        )
+    network: BlendedNetwork
 
-    def standardise(self, x: Array, z: Array) -> None:
-        """As in `Predictor`."""
-        np.subtract(x, self._x_mean, out=z)
-        z *= self._x_inverse
-
-    @abstractmethod
-    def evaluate(self, z: Array, phase: Array, out: Array, *memory: Any) -> None:
-        """As in `Predictor`."""
-
-    def predict(self, x: Array, phase: Array, out: Array | None = None, *memory: Any, **named: Any) -> Array:
-        """As in `Predictor`."""
-        z = np.empty_like(x)
-        self.standardise(x, z)
-        if out is None:
-            out = np.empty((len(x), len(self.network.y_mean)), np.float32)
-        self.evaluate(z, phase, out, *memory, **named)
-        return out
-
-
-class BlendPredictor(StandardisingPredictor):
-    """A `Predictor` of a blended stack.
-
-    weights, biases: of its layers. shares: finds their shares. extended: `BlendedNetwork.extended`. storage:
-    type of the stored weights, "float32" or "int16" with a factor for each row.
-    """
-
-    def __init__(
-        self,
-        network: Network,
-        weights: Sequence[Array],
-        biases: Sequence[Array],
-        shares: Shares,
-        extended: Callable[[Array, Array], Array],
-        storage: str,
-    ) -> None:
+    def __init__(self, network: BlendedNetwork, mode: str, storage: str) -> None:
         super().__init__(network)
-        self._shares, self._extended = shares, extended
+        weights, biases, self._shares = network.prepare(mode)
         self._stack = Stack(weights, biases, storage, network.y_mean, network.y_std)
 
-    def evaluate(self, z: Array, phase: Array, out: Array, *memory: Any) -> None:
+    def evaluate(self, z: Array, phase: Array, out: Array, memory: Array | None = None) -> None:
         """As in `Predictor`."""
-        self._stack.run(self._shares(z, phase), self._extended(z, phase), out)
+        self._stack.run(self._shares(z, phase), self.network.extended(z, phase), out)
 
 
 _catmull_rom = njit(forceinline=True, cache=False)(catmull_rom)

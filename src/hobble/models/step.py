@@ -21,7 +21,6 @@ from torch import Tensor
 from torch.nn.functional import elu
 
 from hobble.core.compiled import njit
-from hobble.models.model import ALL_ROWS
 
 # oneDNN's product of float32 matrices has 512-bit kernels for all processors. PyTorch's default, MKL, has
 # them only for Intel's. For products with fewer multiplications and additions than this, calling it takes
@@ -31,6 +30,7 @@ HAS_ONEDNN = torch.backends.mkldnn.is_available() and hasattr(torch.ops.mkldnn, 
 NUMBERS_PER_THREAD = 100_000  # a thread gets at least this many numbers, about 20 microseconds of work
 # The random number generator splitmix64 adds this to its state for each number that it draws.
 SPLITMIX_STEP = np.uint64(0x9E3779B97F4A7C15)
+ALL_ROWS = slice(None)
 
 
 def product(a: Tensor, b: Tensor) -> Tensor:
@@ -69,7 +69,11 @@ def evaluate(
 
 
 class AutogradStep:
-    """A `TrainingStep` on any device, whose gradient PyTorch finds.
+    """Computes the gradient of the mean squared error on one batch, on any device, by PyTorch.
+
+    gradients: result of the last call, one gradient for each layer, with its numbers in the order of the
+    layer's parameters. error: (B, Y) prediction minus y in the last call. input_mask: index of the mask for
+    the network's inputs in the list that `masks` returns.
 
     network: a `TrainableBlend`. dropout: share of units dropped before each layer, inputs included. The other
     units are scaled up. half: round the factors of the products to bfloat16. Sums and everything else stay
@@ -85,7 +89,10 @@ class AutogradStep:
         self.input_mask = network.gate_layers
 
     def __call__(self, x: Tensor, y: Tensor, p: Tensor, masks: list[Tensor]) -> Tensor:
-        """As in `TrainingStep`."""
+        """Compute `gradients` and `error`, and return the mean squared error.
+
+        x: (B, X). y: (B, Y). p: (B,) phases. masks: the dropout masks of this batch, from the method `masks`.
+        """
         layers = [layer.detach().requires_grad_() for layer in self.network.layers]
         with torch.enable_grad():
             error = evaluate(self.network, layers, x, p, masks, self.half) - y
@@ -95,13 +102,15 @@ class AutogradStep:
         return loss.detach()
 
     def seed(self, seed: int) -> None:
-        """As in `TrainingStep`."""
+        """Start a new sequence of dropout masks, 0 <= seed < 2^63."""
         self.generator.manual_seed(seed)
 
     def masks(self, rows: int, own: slice = ALL_ROWS) -> list[Tensor]:
-        """As in `TrainingStep`. A mask (own rows, in) for each layer, the gate's first.
+        """Draw the dropout masks of a batch of `rows` rows, and return the part for the rows `own`.
 
-        It is 0 where an input is dropped, else 1 / keep. Inputs that are not columns of X are never dropped.
+        If several processes share a batch, each draws the same masks and gets the part for its own rows. The
+        result is a mask (own rows, in) for each layer, the gate's first. It is 0 where an input is dropped,
+        else 1 / keep. Inputs that are not columns of X are never dropped.
         """
         flat = self.network.flat
         drawn = torch.rand(rows, sum(self.widths), generator=self.generator, device=flat.device)[own]
@@ -122,7 +131,7 @@ class FusedStep(AutogradStep):
     counter = np.uint64(0)  # state of the random number generator for the masks
 
     def __call__(self, x: Tensor, y: Tensor, p: Tensor, masks: list[Tensor]) -> Tensor:
-        """As in `TrainingStep`."""
+        """As in `AutogradStep`."""
         network, gates = self.network, self.network.gate_layers
         gate = [layer.detach().requires_grad_() for layer in network.layers[:gates]]
         with torch.enable_grad():
@@ -170,7 +179,7 @@ class FusedStep(AutogradStep):
         return product(a, b).to(self.network.flat.dtype)
 
     def seed(self, seed: int) -> None:
-        """As in `TrainingStep`."""
+        """As in `AutogradStep`."""
         self.counter = np.uint64(seed)
 
     def masks(self, rows: int, own: slice = ALL_ROWS) -> list[Tensor]:

@@ -18,7 +18,9 @@ from hobble.core.processors import count_cores, multiplies_bfloat16
 from hobble.core.skeleton import Skeleton
 from hobble.database.chunks import FILE
 from hobble.database.reader import Database
-from hobble.models.model import Options, Trainable, TrainedOptions, TrainingStep
+from hobble.models.blend import BlendedOptions, TrainableBlend
+from hobble.models.model import Options
+from hobble.models.step import AutogradStep
 from hobble.training.optimiser import Adam
 from hobble.training.options import Machines, Training
 from hobble.training.processes import ALONE, Processes
@@ -72,7 +74,7 @@ class State:
     There is no state of random generators: pass and section seed the order of the rows and dropout.
     """
 
-    network: Trainable
+    network: TrainableBlend
     adam: Adam
     sections_done: int = 0
     samples: int = 0
@@ -292,7 +294,7 @@ def new_state(
 ) -> State:
     """The state before the first section: a new network for the database's rows, and a new optimiser."""
     skeleton = Skeleton.from_dict(database.skeleton)
-    assert isinstance(network, TrainedOptions), "networks of this kind are built from rows without a training"
+    assert isinstance(network, BlendedOptions), "networks of this kind are built from rows without a training"
     device = choose_device(training.device, processes)
     new_network = network.untrained_network(database.layout, skeleton, training.seed).to(device)
     adam = Adam(new_network, **training.model_dump(include=set(ADAM_KEYS)))
@@ -324,8 +326,8 @@ def rounds_to_bfloat16(training: Training, device: torch.device) -> bool:
     return torch.cuda.is_bf16_supported(including_emulation=False)
 
 
-def step_for(network: Trainable, training: Training, half: bool) -> TrainingStep:
-    """The `TrainingStep` for the network's device and the precision of the training. half: see `State`.
+def step_for(network: TrainableBlend, training: Training, half: bool) -> AutogradStep:
+    """The training step for the network's device and the precision of the training. half: see `State`.
 
     The precision is that of the factors in matrix products; their sums are always float32. TF32 rounds the
     factors to 11 bits. PyTorch switches it on or off for the whole process.

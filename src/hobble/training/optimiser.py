@@ -11,15 +11,15 @@ from torch import Tensor
 from hobble.core.compiled import njit
 from hobble.core.skeleton import Skeleton
 from hobble.database.reader import Database
-from hobble.models.model import ALL_ROWS, LayerMirror, Trainable, TrainingStep
-from hobble.models.step import use_threads
+from hobble.models.blend import LayerMirror, TrainableBlend
+from hobble.models.step import ALL_ROWS, AutogradStep, use_threads
 from hobble.rows.layout import mirror_of_x, mirror_of_y
 from hobble.training.processes import ALONE, Processes
 
 EPSILON = 1e-8  # added to the root of the second moment, so that nothing is divided by 0
 
 
-def l1_slopes(network: Trainable, l1: float) -> list[float]:
+def l1_slopes(network: TrainableBlend, l1: float) -> list[float]:
     """For each layer, the factor of sign(w) that the L1 term adds to the gradient of a weight w.
 
     The term is l1 * (sum over the layers of mean|W|) / (2 * number of layers). The factor 2 is there because
@@ -38,7 +38,7 @@ class Adam:
     """
 
     def __init__(
-        self, network: Trainable, learning_rate: float, beta1: float, beta2: float, l1: float
+        self, network: TrainableBlend, learning_rate: float, beta1: float, beta2: float, l1: float
     ) -> None:
         self.network = network
         self.learning_rate, self.beta1, self.beta2 = learning_rate, beta1, beta2
@@ -116,7 +116,7 @@ class Update:
 
     def __init__(
         self,
-        step: TrainingStep,
+        step: AutogradStep,
         adam: Adam,
         batch: int = 0,
         processes: Processes = ALONE,
@@ -182,7 +182,7 @@ class Symmetry:
     are standardised differently.
     """
 
-    def __init__(self, network: Trainable, database: Database) -> None:
+    def __init__(self, network: TrainableBlend, database: Database) -> None:
         layout, statistics = database.layout, database.statistics
         skeleton = Skeleton.from_dict(database.skeleton)
         inputs = mirror_of_x(layout, skeleton).for_standardised_rows(statistics.x_mean, statistics.x_std)

@@ -216,7 +216,7 @@ def write_weights(
     """
     statistics = database.statistics
     arrays = {
-        **network.arrays(),
+        **network.arrays,
         "Xmean": statistics.x_mean,
         "Xstd": statistics.x_std,
         "Ymean": statistics.y_mean,
@@ -246,7 +246,7 @@ def network_metadata(
             "exponents": {c.name: c.exponent for c in channels},
             "limits": database.manifest.limits,
             "units": "; ".join([UNITS, *(f"{c.value_word} 0 to {c.highest:g}" for c in channels)]),
-            **network.file_metadata,
+            **network.meta,
             **about_training,
         }
     )  # keys are not sorted, because the skeleton's joints must keep the order of the columns
@@ -311,7 +311,7 @@ def run(
         errors = errors_on_held_out(data, state.network, state.network.flat.device)
         if data.row_count(HELD_OUT):
             about["held_out_mse"] = errors[0]
-        write(state.network, about)
+        write(state.network.finished(), about)
     write_history(history, data.layout.blocks("y"), lines)
     save_npz(checkpoint, **arrays)
 

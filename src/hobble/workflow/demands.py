@@ -18,7 +18,7 @@ from hobble.channels import channel
 from hobble.core.clip_files import is_hurt_version, original
 from hobble.labels.local_phase import PARTS
 from hobble.measures.measure import Cost, measure_named
-from hobble.models.model import TrainedOptions
+from hobble.models.blend import BlendedOptions
 from hobble.rows.layout import RowLayout
 from hobble.training.options import Machines
 from hobble.workflow.configurations import NamedConfiguration
@@ -171,7 +171,7 @@ def gres(configuration: NamedConfiguration) -> str:
 def parameter_count(configuration: NamedConfiguration) -> float:
     """Number of trained parameters of a configuration's network; 0 if it is not trained."""
     network, layout = configuration.settings.network, layout_of(configuration)
-    if isinstance(network, TrainedOptions):
+    if isinstance(network, BlendedOptions):
         return network.parameter_count(layout.x_size, layout.y_size)
     return 0
 

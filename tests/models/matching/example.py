@@ -9,7 +9,7 @@ import numpy as np
 from hobble.core.skeleton import Skeleton
 from hobble.models import network_options
 from hobble.models.load import network_from_arrays
-from hobble.models.model import BuiltNetwork, BuiltOptions
+from hobble.models.model import BuiltOptions, FinishedNetwork
 from hobble.rows.clip_rows import ClipRows, save_clip_rows
 from hobble.rows.layout import RowLayout, body_column_count
 
@@ -67,14 +67,14 @@ def clip_files(skeleton: Skeleton, folder: Path) -> list[Path]:
 
 def built(
     skeleton: Skeleton, folder: Path, kind: str = "matching", **options: Any
-) -> tuple[BuiltNetwork, dict[str, Any], Any]:
+) -> tuple[FinishedNetwork, dict[str, Any], Any]:
     """The network built from both clips, the arrays of its file, and the network read from them."""
     layout = layout_of(skeleton)
     chosen = network_options({"kind": kind, **options})
     assert isinstance(chosen, BuiltOptions)
     tables = chosen.build(clip_files(skeleton, folder), layout, skeleton)
     rng = np.random.default_rng(1)
-    arrays: dict[str, Any] = dict(tables.arrays())
+    arrays: dict[str, Any] = dict(tables.arrays)
     for name, size in (("X", layout.x_size), ("Y", layout.y_size)):
         arrays[f"{name}mean"] = rng.normal(0, 10, size).astype(np.float32)
         arrays[f"{name}std"] = rng.uniform(0.5, 2, size).astype(np.float32)
@@ -82,7 +82,8 @@ def built(
         "kind": kind,
         "layout": layout.to_dict(),
         "skeleton": skeleton.to_dict(),
-        **tables.file_metadata,
+        "channels": {"injury": skeleton.link_names},
+        **tables.meta,
     }
     arrays["meta"] = np.array(json.dumps(meta))
     return tables, arrays, network_from_arrays("weights.npz", arrays)

@@ -39,8 +39,8 @@ def played(frames: np.ndarray, rows: list[int], phase: float = 0.0) -> tuple[np.
     network = Matching(
         x_mean=zeros, x_std=zeros + 1, y_mean=frames[0] * 0, y_std=frames[0] * 0 + 1, layout=LAYOUT,
         features=zeros[None, :1].repeat(120, axis=0), frames=frames, remaining=remaining,
-        phases=(0.02 * np.arange(120) % 1).astype(np.float32), columns=np.array([0]), weights=zeros[:1],
-        every=1, halflife=HALFLIFE,
+        phase=(0.02 * np.arange(120) % 1).astype(np.float32), columns=np.array([0]),
+        feature_weights=zeros[:1], every=1, halflife=HALFLIFE,
     )  # fmt: skip
     predictor, memory, phases = network.predictor(), np.zeros((1, network.memory_size)), np.array([phase])
     for row in rows:

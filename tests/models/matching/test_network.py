@@ -27,8 +27,8 @@ def made(holden31: Skeleton, tmp_path: Path) -> Made:
 def x_of(network: Matching, row: int) -> np.ndarray:
     """An X (1, X) float32 with the features of a row."""
     x = network.x_mean.copy()
-    known = network.weights > 0
-    x[network.columns[known]] = network.features[row, known] / network.weights[known]
+    known = network.feature_weights > 0
+    x[network.columns[known]] = network.features[row, known] / network.feature_weights[known]
     return x[None].astype(np.float32)
 
 
@@ -36,7 +36,7 @@ def test_the_nearest_frame_equals_a_search_over_all(made: Made) -> None:
     _, _, network = made
     x = network.x_mean + 10 * np.random.default_rng(1).normal(size=(20, len(network.x_mean)))
     queries = network.input_features(standardise_inputs(network, x))
-    np.testing.assert_allclose(queries, x[:, network.columns] * network.weights, rtol=1e-4, atol=1e-3)
+    np.testing.assert_allclose(queries, x[:, network.columns] * network.feature_weights, rtol=1e-4, atol=1e-3)
     apart = np.square(queries[:, None] - network.features[network.start_rows][None]).sum(axis=2)
     np.testing.assert_array_equal(network.nearest_rows(queries), network.start_rows[apart.argmin(axis=1)])
 
@@ -58,7 +58,7 @@ def test_a_character_plays_on_between_searches(made: Made) -> None:
     shown = []
     for frame in range(8):
         x = x_of(network, 10) if frame == 0 else away
-        y = predictor.predict(x, np.array([network.phases[10 + frame]]), None, memory)
+        y = predictor.predict(x, np.array([network.phase[10 + frame]]), None, memory)
         shown.append(int(memory[0, ROW]) - 1)
         if frame < 5:
             np.testing.assert_allclose(y[0], network.frames[10 + frame], atol=1e-4)
@@ -126,8 +126,8 @@ def test_int16_storage_hardly_changes_the_prediction(made: Made) -> None:
 
 def test_a_page_of_many_rows_has_the_first_part_of_each_run(made: Made) -> None:
     _, _, network = made
-    assert network.shortened_copy(1000) is network
-    short = network.shortened_copy(80)  # of 70 and 90 rows, half
+    assert len(network.copy_for_page().remaining) == sum(FRAMES)
+    short = network.copy_for_page(80)  # of 70 and 90 rows, half
     np.testing.assert_array_equal(short.remaining, [*range(34, -1, -1), *range(44, -1, -1)])
     np.testing.assert_array_equal(short.frames[35:], network.frames[70:115])
     np.testing.assert_array_equal(short.features[:35], network.features[:35])

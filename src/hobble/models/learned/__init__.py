@@ -15,7 +15,7 @@ from pydantic import Field
 from hobble.core.section import Positive
 from hobble.core.skeleton import Skeleton
 from hobble.models.matching import MatchingOptions
-from hobble.models.model import BuiltNetwork
+from hobble.models.model import FinishedNetwork
 from hobble.rows.layout import RowLayout
 
 if TYPE_CHECKING:
@@ -47,7 +47,7 @@ class LearnedOptions(MatchingOptions):
 
         return Learned
 
-    def build(self, clips: Sequence[str | Path], layout: RowLayout, skeleton: Skeleton) -> BuiltNetwork:
+    def build(self, clips: Sequence[str | Path], layout: RowLayout, skeleton: Skeleton) -> FinishedNetwork:
         """As in `BuiltOptions`; trains the three networks."""
         from hobble.models.learned.train import train
         from hobble.models.matching.build import read_tables

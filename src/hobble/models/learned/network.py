@@ -28,9 +28,9 @@ from hobble.models.matching.network import (
     Playing,
     Transitions,
 )
-from hobble.models.network import LEARNED, inverse_or_0, standardise_inputs
+from hobble.models.network import LEARNED, Predictor, inverse_or_0, standardise_inputs
 from hobble.models.onnx_file import Graph, Node, OnnxNetwork, add_layers
-from hobble.models.predict import Stack, StandardisingPredictor
+from hobble.models.predict import Stack
 
 PHASE_OUTPUTS = 2  # of the decompressor, after the columns of Y: sine and cosine of the frame's phase
 # Indices in the memory of a character, an array of numbers that is 0 before its first frame.
@@ -93,9 +93,7 @@ class Learned(OnnxNetwork):
         features = lengths["features"]
         state = features + playing.latent
         return cls(
-            columns=found["columns"],
-            weights=found["feature_weights"],
-            **{name: found[f"feature_{name}"] for name in ("mean", "std", "low", "high")},
+            **{name.removeprefix("feature_"): array for name, array in found.items()},
             latent=playing.latent,
             decompressor=read_layers(path, arrays, "Dd", state, outputs + PHASE_OUTPUTS),
             stepper=read_layers(path, arrays, "Ss", state, state),
@@ -119,12 +117,8 @@ class Learned(OnnxNetwork):
     @property
     def parameter_count(self) -> int:
         """The number of weights and biases of all three networks."""
-        return sum(
-            array.size
-            for layers in (self.decompressor, self.stepper, self.projector)
-            for arrays in layers
-            for array in arrays
-        )
+        networks = self.decompressor, self.stepper, self.projector
+        return sum(array.size for layers in networks for arrays in layers for array in arrays)
 
     @property
     def description(self) -> str:
@@ -146,10 +140,9 @@ class Learned(OnnxNetwork):
         state = forward(*self.projector, one, self.wish(standardise_inputs(self, x)))
         return forward(*self.decompressor, one, state)[:, : self.layout.y_size]
 
-    def predictor(self, mode: str | None = None, storage: str | None = None) -> LearnedPredictor:
-        """As in `Network`; there is one mode."""
-        self.resolve_mode(mode)
-        return LearnedPredictor(self, storage or self.default_storage)
+    def prepared(self, mode: str, storage: str) -> LearnedPredictor:
+        """As in `Network`."""
+        return LearnedPredictor(self, storage)
 
     def engine_data(
         self, mode: str, storage: str, inputs: NDArray[np.int64]
@@ -181,12 +174,12 @@ class Learned(OnnxNetwork):
         return (y - self.y_mean) * inverse_or_0(self.y_std)
 
 
-class LearnedPredictor(StandardisingPredictor):
+class LearnedPredictor(Predictor):
     """Learned motion matching prepared to run; a `hobble.models.network.Predictor`."""
 
     network: Learned
 
-    def __init__(self, network: Learned, storage: str = "float32") -> None:
+    def __init__(self, network: Learned, storage: str) -> None:
         super().__init__(network)
         self.decompressor, self.stepper, self.projector = (
             Stack(*layers, storage) for layers in (network.decompressor, network.stepper, network.projector)
@@ -194,7 +187,7 @@ class LearnedPredictor(StandardisingPredictor):
         self._transitions = Transitions(network.layout, network.halflife)
         self._states = slice(STATE, STATE + len(network.columns) + network.latent)
 
-    def evaluate(self, z: Array, phase: Array, out: Array, memory: Any = None, *_: Any) -> None:
+    def evaluate(self, z: Array, phase: Array, out: Array, memory: Array | None = None) -> None:
         """As in `Predictor`. memory: (C, M) float64 with M = `Network.memory_size`. With None or zeros, each
         character shows the pose that the projector finds for its inputs."""
         network, features = self.network, len(self.network.columns)

@@ -9,7 +9,7 @@ frame.
 
 import logging
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from itertools import count, pairwise
 from typing import Any
 
@@ -20,8 +20,8 @@ from torch import Tensor, nn
 
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
-from hobble.models.matching.build import Tables, findable_rows
-from hobble.models.model import BuiltNetwork
+from hobble.models.matching.build import findable_rows
+from hobble.models.model import FinishedNetwork
 from hobble.rows.layout import RowLayout
 
 log = logging.getLogger("hobble.training")
@@ -40,41 +40,35 @@ FOOT_JOINTS = ("left_heel", "left_toe", "right_heel", "right_toe")  # roles
 REPORTS = 5  # lines in the log for each training
 
 Options = Any  # `hobble.models.learned.LearnedOptions`, whose module imports this one
+Tables = Mapping[str, Array]  # from `hobble.models.matching.build.read_tables`
 
 
-def train(options: Options, tables: Tables, layout: RowLayout, skeleton: Skeleton) -> BuiltNetwork:
+def train(options: Options, tables: Tables, layout: RowLayout, skeleton: Skeleton) -> FinishedNetwork:
     """Train on all frames of the tables. The same seed gives the same network on the same kind of machine."""
     torch.manual_seed(options.seed)
-    mean, std = tables.features.mean(axis=0), tables.features.std(axis=0)
+    mean, std = tables["features"].mean(axis=0), tables["features"].std(axis=0)
     std[std < LEAST_STD] = 0.0
-    features = torch.from_numpy((tables.features - mean) / np.where(std > 0, std, np.inf))
+    features = torch.from_numpy((tables["features"] - mean) / np.where(std > 0, std, np.inf))
     feet = [skeleton.role(role) for role in FOOT_JOINTS]
     decompressor, latent = _train_decompressor(options, tables, layout, feet, features)
     state = torch.cat([features, latent], dim=1)
     stepper = _train_stepper(options, tables, state)
     projector = _train_projector(options, tables, layout, state, torch.from_numpy(std))
     arrays = {
-        "columns": tables.columns,
-        "feature_weights": tables.weights,
+        "columns": tables["columns"],
+        "feature_weights": tables["feature_weights"],
         "feature_mean": mean,
         "feature_std": std,
-        "feature_low": tables.features.min(axis=0),
-        "feature_high": tables.features.max(axis=0),
+        "feature_low": tables["features"].min(axis=0),
+        "feature_high": tables["features"].max(axis=0),
         **_arrays("Dd", decompressor),
         **_arrays("Ss", stepper),
         **_arrays("Pp", projector),
     }
-    metadata = {
-        "network": "every few frames, a projector P maps weighted columns of x to features and latent "
-        "numbers of a captured frame; a stepper S advances them; a decompressor D computes y and the phase "
-        "from them; each has layers with ELU between them",
-        "every": options.every,
-        "halflife": options.halflife,
-        "latent": options.latent,
-    }
+    meta = {"every": options.every, "halflife": options.halflife, "latent": options.latent}
     size = sum(array.size for array in arrays.values())
-    words = f"decompressor, stepper and projector ({size:,} numbers) for {len(tables.y):,} frames of clips"
-    return BuiltNetwork("learned", arrays, metadata, words)
+    words = f"decompressor, stepper and projector ({size:,} numbers) for {len(features):,} frames of clips"
+    return FinishedNetwork("learned", arrays, words, meta)
 
 
 def layers(*units: int) -> nn.Sequential:
@@ -136,8 +130,8 @@ def _standard_poses(tables: Tables, layout: RowLayout) -> tuple[Tensor, Array, A
 
     The columns of a block share their deviation, as in the database.
     """
-    angle = 2 * np.pi * tables.phase[:, None]
-    poses = np.concatenate([tables.y, np.sin(angle), np.cos(angle)], axis=1)
+    angle = 2 * np.pi * tables["phase"][:, None]
+    poses = np.concatenate([tables["frames"], np.sin(angle), np.cos(angle)], axis=1)
     mean, std = poses.mean(axis=0, dtype=float), poses.std(axis=0, dtype=float)
     for block in layout.blocks("y").values():
         std[block] = std[block].mean()
@@ -156,7 +150,7 @@ def _train_decompressor(
     columns, known = poses.shape[1], features.shape[1]
     compressor = layers(columns + known, options.decompressor_units, options.latent)
     decompressor = layers(known + options.latent, options.decompressor_units, columns)
-    rows, weights = _starts(tables.remaining, 1), torch.ones(columns)
+    rows, weights = _starts(tables["remaining"], 1), torch.ones(columns)
     for block in (layout.y_joint_position, layout.y_joint_velocity):
         weights[block].view(-1, 3)[feet] = FOOT_WEIGHT
 
@@ -189,9 +183,9 @@ def _train_decompressor(
 
 def _train_stepper(options: Options, tables: Tables, state: Tensor) -> nn.Sequential:
     """The stepper, from a state to its change until the next frame."""
-    length = min(STRETCH, max(1, int(tables.remaining.max())))
-    rows, size = _starts(tables.remaining, length), state.shape[1]
-    follow = torch.from_numpy(np.flatnonzero(tables.remaining > 0))
+    length = min(STRETCH, max(1, int(tables["remaining"].max())))
+    rows, size = _starts(tables["remaining"], length), state.shape[1]
+    follow = torch.from_numpy(np.flatnonzero(tables["remaining"] > 0))
     change = state[(follow + 1).clamp(max=len(state) - 1)] - state[follow] if len(follow) else state
     spread = change.std(dim=0, correction=0).clamp(min=LEAST_STD)
     stepper = layers(size, options.units, options.units, size)
@@ -224,11 +218,11 @@ def _train_projector(
     move towards those of another frame, while the features of the pose stay.
     """
     features = state[:, : len(std)]
-    rows = torch.from_numpy(findable_rows(tables.remaining))
+    rows = torch.from_numpy(findable_rows(tables["remaining"]))
     found, found_state = features[rows] * std, state[rows]
     squares, scale = found.square().sum(dim=1), std.square().sum().sqrt()
     of_pose = torch.from_numpy(
-        np.isin(tables.columns, np.r_[layout.x_joint_position, layout.x_joint_velocity])
+        np.isin(tables["columns"], np.r_[layout.x_joint_position, layout.x_joint_velocity])
     )
     projector = layers(len(std), *[options.units] * 3, state.shape[1])
 

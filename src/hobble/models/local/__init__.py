@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 from hobble.labels.local_phase import PARTS
-from hobble.models.mann import GOAL_INPUTS, Mann, MannOptions, TrainableMann, goal_columns
+from hobble.models.mann import GOAL_INPUTS, Mann, MannOptions, goal_columns
 from hobble.rows.layout import RowLayout
 
 if TYPE_CHECKING:
@@ -37,11 +37,6 @@ class LocalOptions(MannOptions):
     def network_class(cls) -> type[Local]:
         """As in `Options`."""
         return Local
-
-    @property
-    def trainable_class(self) -> type[TrainableLocal]:
-        """As in `MannOptions`."""
-        return TrainableLocal
 
     def gate_columns(self, layout: RowLayout, skeleton: Skeleton) -> tuple[int, ...]:
         """The local phases, the gait now and at the end of the trajectory, and the trajectory's end."""
@@ -78,12 +73,11 @@ class Local(Mann):
         facts = self.training_facts
         return (self.x_mean if facts is None else facts.start_x)[self.layout.x_local_phase].astype(float)
 
-    def predictor(self, mode: str | None = None, storage: str | None = None) -> LocalPredictor:
+    def prepared(self, mode: str, storage: str) -> LocalPredictor:
         """As in `Network`."""
         from hobble.models.local.predictor import LocalPredictor
 
-        prepared = self.prepare(self.resolve_mode(mode))
-        return LocalPredictor(self, *prepared, self.extended, storage or self.default_storage)
+        return LocalPredictor(self, mode, storage)
 
     def engine_data(
         self, mode: str, storage: str, inputs: NDArray[np.int64]
@@ -91,10 +85,3 @@ class Local(Mann):
         """As in `Network`."""
         sizes, sections = super().engine_data(mode, storage, inputs)
         return sizes | {"latent": self.layout.local_phases}, sections | {"start_phases": self.start}
-
-
-@dataclass(frozen=True)
-class TrainableLocal(TrainableMann):
-    """A network with experts that are gated by local phases, in training."""
-
-    kind: ClassVar[str] = "local"

@@ -15,7 +15,7 @@ class LocalPredictor(BlendPredictor):
 
     network: Any  # a `Local`
 
-    def evaluate(self, z: Array, phase: Array, out: Array, memory: Any = None, *_: Any) -> None:
+    def evaluate(self, z: Array, phase: Array, out: Array, memory: Array | None = None) -> None:
         """As in `Predictor`. memory: (C, M) float64. With None, the local phases are those in z."""
         network, layout = self.network, self.network.layout
         at = layout.x_local_phase

@@ -19,7 +19,6 @@ from hobble.core.skeleton import Skeleton
 from hobble.models.blend import BlendedNetwork, BlendedOptions, TrainableBlend
 from hobble.models.forward import forward, softmax
 from hobble.models.load import read_arrays, read_layers
-from hobble.models.model import Trainable
 from hobble.models.network import GATED
 from hobble.rows.layout import GAITS, RowLayout
 
@@ -59,11 +58,6 @@ class MannOptions(BlendedOptions):
     gate_layers: Annotated[int, Field(ge=1, le=4)] = 2
     gate_units: Annotated[int, Field(gt=0, le=1024)] = 32
 
-    @property
-    def trainable_class(self) -> type[TrainableMann]:
-        """The class of the kind's networks in training."""
-        return TrainableMann
-
     @classmethod
     def network_class(cls) -> type[Mann]:
         """As in `Options`."""
@@ -72,7 +66,7 @@ class MannOptions(BlendedOptions):
     def trainable(self, flat: Any, sizes: tuple[int, ...], columns: tuple[int, ...]) -> TrainableMann:
         """As in `BlendedOptions`."""
         gate = (self.gate_inputs, *[self.gate_units] * self.gate_layers, self.experts)
-        return self.trainable_class(flat, sizes, self.experts, gate, columns)
+        return TrainableMann(flat, sizes, self.experts, gate, columns, kind=self.kind)
 
     def gate_columns(self, layout: RowLayout, skeleton: Skeleton) -> tuple[int, ...]:
         """The columns of X that the gate gets: the velocities of heels and toes, and `goal_columns`."""
@@ -169,12 +163,8 @@ class TrainableMann(TrainableBlend):
     gate: units of each layer of the gate, its inputs first. columns: the columns of X that the gate gets.
     """
 
-    kind: ClassVar[str] = "mann"
-
     gate: tuple[int, ...]
     columns: tuple[int, ...]
-
-    mirrors = Trainable.mirrors  # refuses: the gate would have to be mirrored, too
 
     @property
     def gate_units(self) -> tuple[int, ...]:
@@ -203,19 +193,3 @@ class TrainableMann(TrainableBlend):
             arrays[f"V{number}"] = np.ascontiguousarray(values[:, :-1])
             arrays[f"d{number}"] = np.ascontiguousarray(values[:, -1])
         return arrays | {"gate": np.array(self.columns, np.int64)}
-
-    @property
-    def file_metadata(self) -> dict[str, Any]:
-        """As in `FinishedNetwork`."""
-        gate = "V0 x[gate] + d0"
-        for i in range(1, self.gate_layers):
-            gate = f"V{i} elu({gate}) + d{i}"
-        shares = f"W and b are blended from those of the experts, in the shares softmax({gate})"
-        return {"experts": self.sets, "network": self.formula() + shares}
-
-    @property
-    def description(self) -> str:
-        """As in `FinishedNetwork`."""
-        gate = "-".join(map(str, self.gate))
-        words = f"{self.units_in_words}, {self.sets} experts side by side and a gate of {gate}"
-        return f"{words} ({self.flat.numel():,} parameters)"

@@ -10,7 +10,7 @@ from pydantic import Field
 
 from hobble.core.section import Positive, PositiveFloat
 from hobble.core.skeleton import Skeleton
-from hobble.models.model import BuiltNetwork, BuiltOptions
+from hobble.models.model import BuiltOptions, FinishedNetwork
 from hobble.rows.layout import RowLayout
 
 if TYPE_CHECKING:
@@ -52,7 +52,7 @@ class MatchingOptions(BuiltOptions):
 
         return Matching
 
-    def build(self, clips: Sequence[str | Path], layout: RowLayout, skeleton: Skeleton) -> BuiltNetwork:
+    def build(self, clips: Sequence[str | Path], layout: RowLayout, skeleton: Skeleton) -> FinishedNetwork:
         """As in `BuiltOptions`."""
         from hobble.models.matching.build import build
 

@@ -11,7 +11,6 @@ ahead and the channel values.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +21,7 @@ from hobble.channels import channel
 from hobble.core.errors import InputError
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
-from hobble.models.model import BuiltNetwork
+from hobble.models.model import FinishedNetwork
 from hobble.rows.clip_rows import ClipRows, load_clip_rows
 from hobble.rows.layout import GAITS, RowLayout, compose, frame_inputs
 
@@ -37,80 +36,51 @@ LEAST_SPREAD = 1e-6  # a group of columns with a smaller mean standard deviation
 SearchOptions = Any
 
 
-@dataclass(frozen=True)
-class Tables:
-    """R frames of clips, in runs. A run is a sequence of consecutive frames of one clip.
-
-    features: (R, n) float32, the columns of x that a search compares, each times its weight. y: (R, Y)
-    float32, raw units. phase: (R,) in cycles. remaining: (R,) int32, how many frames of the run follow.
-    columns: (n,) which columns of x are features. weights: (n,) their weights.
-    """
-
-    features: Array = field(repr=False)
-    y: Array = field(repr=False)
-    phase: Array = field(repr=False)
-    remaining: NDArray[np.int32] = field(repr=False)
-    columns: NDArray[np.int64]
-    weights: Array
-
-
 def build(
     options: SearchOptions, clips: Sequence[str | Path], layout: RowLayout, skeleton: Skeleton
-) -> BuiltNetwork:
+) -> FinishedNetwork:
     """Motion matching over the frames of clips; see `read_tables`."""
     tables = read_tables(options, clips, layout, skeleton)
-    arrays = {
-        "features": tables.features,
-        "frames": tables.y,
-        "phase": tables.phase,
-        "remaining": tables.remaining,
-        "columns": tables.columns,
-        "feature_weights": tables.weights,
-    }
-    metadata = {
-        "network": "a search compares features (weighted columns of x) and finds the frame of the clips "
-        "nearest to the input; from there the clip is played, one y a frame, until the next search",
-        "every": options.every,
-        "halflife": options.halflife,
-    }
-    words = f"{len(tables.y):,} frames of clips, compared by {len(tables.columns)} features"
-    return BuiltNetwork("matching", arrays, metadata, words)
+    words = f"{len(tables['frames']):,} frames of clips, compared by {len(tables['columns'])} features"
+    meta = {"every": options.every, "halflife": options.halflife}
+    return FinishedNetwork("matching", tables, words, meta)
 
 
 def read_tables(
     options: SearchOptions, clips: Sequence[str | Path], layout: RowLayout, skeleton: Skeleton
-) -> Tables:
-    """Build the tables.
+) -> dict[str, Array]:
+    """The arrays of the network's file: R frames of clips, in runs of consecutive frames of one clip.
+
+    features: (R, n) float32, the columns of x that a search compares, each times its weight. frames: (R, Y)
+    float32, raw units. phase: (R,) in cycles. remaining: (R,) int32, how many frames of the run follow.
+    columns: (n,) which columns of x are features. feature_weights: (n,) their weights.
 
     clips: the files with the rows of the clips. layout: the columns of x and y, with the channels of
     the network; other channels of the clips are left out. skeleton: the one to which the layout belongs.
     Raises InputError if a file is not a file of rows or has another layout, or if no file has a frame.
     """
-    xs, ys, phases, remainings = [], [], [], []
+    parts = []
     for path in clips:
         rows = load_clip_rows(path)
         if rows.layout.with_channels(()) != layout.with_channels(()) or not set(layout.channels) <= set(
             rows.layout.channels
         ):
             raise InputError(path, f"its columns ({rows.layout}) do not fit the database ({layout})")
-        x, y = on_mean_ground(rows, layout)
         kept, remaining = find_runs(rows)
-        xs.append(x[kept])
-        ys.append(y[kept])
-        phases.append(rows.p[kept])
-        remainings.append(remaining)
-    if not sum(map(len, ys)):
+        x, y = on_mean_ground(rows, layout)
+        parts.append((x[kept], y[kept], rows.p[kept], remaining))
+    if not sum(len(part[0]) for part in parts):
         raise InputError("the clips", "hold no frame to match", fix="Train on a clip with a whole cycle.")
-    x = np.concatenate(xs)
+    x, frames, phase, remaining = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
     columns, weights = columns_and_weights(layout, skeleton, options, x)
-    return Tables(
-        features=np.ascontiguousarray(x[:, columns] * weights, np.float32),
-        y=np.concatenate(ys),
-        phase=np.concatenate(phases).astype(np.float32) % 1.0,
-        remaining=np.concatenate(remainings),
-        columns=columns,
-        weights=weights,
-    )
+    return {
+        "features": np.ascontiguousarray(x[:, columns] * weights, np.float32),
+        "frames": frames,
+        "phase": phase.astype(np.float32) % 1.0,
+        "remaining": remaining,
+        "columns": columns,
+        "feature_weights": weights,
+    }
 
 
 def on_mean_ground(rows: ClipRows, layout: RowLayout) -> tuple[Array, Array]:
@@ -150,7 +120,7 @@ def find_runs(rows: ClipRows) -> tuple[NDArray[np.int64], NDArray[np.int32]]:
 
 
 def findable_rows(remaining: NDArray[Any]) -> NDArray[np.int64]:
-    """Indices (S,) of the rows that a search may find. remaining: (R,) as in `Tables`.
+    """Indices (S,) of the rows that a search may find. remaining: (R,) as in `read_tables`.
 
     These rows are not near the end of a run (FEWEST_LEFT), and not the first of a run: rotation speeds are
     computed from the row before. If all runs are too short, a search may find all rows but the first of each
@@ -187,9 +157,8 @@ def feature_groups(
         # The heights left of the path come first, then those on it.
         ("ground", [layout.x_terrain.start + samples + sample for sample in ahead], options.ground),
     ]
-    return groups + [
-        (name, _columns_of(layout.x_channel(name)), options.channels) for name, _ in layout.channels
-    ]
+    blocks = {name: layout.x_channel(name) for name, _ in layout.channels}
+    return groups + [(n, list(range(b.start, b.stop)), options.channels) for n, b in blocks.items()]
 
 
 def columns_and_weights(
@@ -212,7 +181,3 @@ def columns_and_weights(
         columns += group
         weights.append(np.full(len(group), weight / spread if spread > LEAST_SPREAD else 0.0, np.float32))
     return np.array(columns, np.int64), np.concatenate(weights)
-
-
-def _columns_of(block: slice) -> list[int]:
-    return list(range(block.start, block.stop))

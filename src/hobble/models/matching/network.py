@@ -29,8 +29,7 @@ from hobble.core.errors import InputError
 from hobble.core.quat import Array
 from hobble.models.load import LARGEST_MEAN, read_arrays
 from hobble.models.matching.build import findable_rows
-from hobble.models.network import RECORDED, STORAGES, Network, standardise_inputs
-from hobble.models.predict import StandardisingPredictor
+from hobble.models.network import RECORDED, Network, Predictor, standardise_inputs
 from hobble.rows.layout import RowLayout
 
 # Largest number of rows of the tables. The page keeps row numbers in float32, which is exact up to here.
@@ -64,11 +63,11 @@ class Playing:
 class Matching(Network):
     """Motion matching over R frames of clips, in runs of consecutive frames.
 
-    columns: (n,) the columns of X that a search compares, called features. weights: (n,) their factors.
-    features: (R, n) float32, these columns of each frame, times their factors. frames: (R, Y) float32, the Y
-    of each frame, in raw units. phases: (R,) float32, in cycles. remaining: (R,) how many frames follow each
-    frame in its run. every: frames between two searches. halflife: of the offsets that smooth a transition
-    to another frame, in frames (see `Transitions`).
+    columns: (n,) the columns of X that a search compares, called features. feature_weights: (n,) their
+    factors. features: (R, n) float32, these columns of each frame, times their factors. frames: (R, Y)
+    float32, the Y of each frame, in raw units. phase: (R,) float32, in cycles. remaining: (R,) how many
+    frames follow each frame in its run. every: frames between two searches. halflife: of the offsets that
+    smooth a transition to another frame, in frames (see `Transitions`).
     """
 
     kind: ClassVar[str] = "matching"
@@ -77,16 +76,16 @@ class Matching(Network):
 
     features: Array = field(repr=False)
     frames: Array = field(repr=False)
-    phases: Array = field(repr=False)
+    phase: Array = field(repr=False)
     remaining: NDArray[np.int64] = field(repr=False)
     columns: NDArray[np.int64] = field(repr=False)
-    weights: Array = field(repr=False)
+    feature_weights: Array = field(repr=False)
     every: int
     halflife: float
 
     @classmethod
     def read(cls, path: str | Path, arrays: Mapping[str, Any], shared_fields: Mapping[str, Any]) -> Matching:
-        """As in `Model`. arrays: those of `hobble.models.matching.build.build`."""
+        """As in `Network`. arrays: those of `hobble.models.matching.build.read_tables`."""
         inputs, outputs = len(shared_fields["x_mean"]), len(shared_fields["y_mean"])
         declared = {
             "frames": ArrayOf(("frames", outputs), "fiu", -LARGEST_MEAN, LARGEST_MEAN),
@@ -109,39 +108,18 @@ class Matching(Network):
         if shared_fields["skeleton"] is None:
             raise InputError(path, "motion matching needs a skeleton, but the meta of the file has none")
         playing = read_declared(path, "meta", Playing, shared_fields["meta"])
-        return cls(
-            features=found["features"],
-            frames=found["frames"],
-            phases=found["phase"],
-            remaining=remaining,
-            columns=found["columns"],
-            weights=found["feature_weights"],
-            every=playing.every,
-            halflife=playing.halflife,
-            **shared_fields,
-        )
+        return cls(**found, every=playing.every, halflife=playing.halflife, **shared_fields)
 
-    def shortened_copy(self, most: int) -> Matching:
-        """A copy with only the first part of each run, so that about `most` rows remain in all.
-
-        Returns the network itself if it has at most `most` rows.
-        """
-        rows = len(self.remaining)
-        if rows <= most:
-            return self
+    def copy_for_page(self, most: int = MOST_ON_PAGE) -> Matching:
+        """As in `Network`: only the first part of each run, so that about `most` rows remain in all."""
         first_rows = np.flatnonzero(np.r_[True, self.remaining[:-1] == 0])
         lengths = self.remaining[first_rows] + 1
-        new_lengths = np.ceil(lengths * (most / rows)).astype(np.int64)
-        place_in_run = np.arange(rows) - np.repeat(first_rows, lengths)
+        new_lengths = np.ceil(lengths * min(1.0, most / len(self.remaining))).astype(np.int64)
+        place_in_run = np.arange(len(self.remaining)) - np.repeat(first_rows, lengths)
         remaining = np.repeat(new_lengths, lengths) - 1 - place_in_run
-        in_copy = remaining >= 0
-        return replace(
-            self,
-            features=self.features[in_copy],
-            frames=self.frames[in_copy],
-            phases=self.phases[in_copy],
-            remaining=remaining[in_copy],
-        )
+        kept = remaining >= 0
+        shortened = {name: getattr(self, name)[kept] for name in ("features", "frames", "phase")}
+        return replace(self, remaining=remaining[kept], **shortened)
 
     @cached_property
     def start_rows(self) -> NDArray[np.int64]:
@@ -176,7 +154,7 @@ class Matching(Network):
     def input_features(self, z: Array) -> Array:
         """The weighted features (C, n) float32 of C characters, from their standardised inputs z (C, X)."""
         raw = z[:, self.columns] * self.x_std[self.columns] + self.x_mean[self.columns]
-        return np.ascontiguousarray(raw * self.weights, np.float32)
+        return np.ascontiguousarray(raw * self.feature_weights, np.float32)
 
     def nearest_rows(self, queries: Array) -> NDArray[np.int64]:
         """The rows (C,) among `start_rows` whose features are nearest to the features `queries` (C, n)."""
@@ -190,10 +168,9 @@ class Matching(Network):
         """
         return self.frames[self.nearest_rows(self.input_features(standardise_inputs(self, x)))]
 
-    def predictor(self, mode: str | None = None, storage: str | None = None) -> MatchingPredictor:
-        """As in `Network`; there is one mode. int16 halves the memory of the frames."""
-        self.resolve_mode(mode)
-        return MatchingPredictor(self, storage or self.default_storage)
+    def prepared(self, mode: str, storage: str) -> MatchingPredictor:
+        """As in `Network`. int16 halves the memory of the frames."""
+        return MatchingPredictor(self, storage)
 
     def engine_data(
         self, mode: str, storage: str, inputs: NDArray[np.int64]
@@ -207,18 +184,14 @@ class Matching(Network):
             "frame_scale": predictor.scale,
             "features": self.features.astype(np.float32),
             "feature_columns": self.columns.astype(np.int32),
-            "feature_weights": self.weights.astype(np.float32),
-            "phases": self.phases.astype(np.float32),
+            "feature_weights": self.feature_weights.astype(np.float32),
+            "phases": self.phase.astype(np.float32),
             "remaining": self.remaining.astype(np.int32),
             "findable": findable,
         }
 
-    def copy_for_page(self) -> Matching:
-        """As in `Network`: the beginnings of all runs, about MOST_ON_PAGE rows."""
-        return self.shortened_copy(MOST_ON_PAGE)
 
-
-class MatchingPredictor(StandardisingPredictor):
+class MatchingPredictor(Predictor):
     """Motion matching prepared to run; a `hobble.models.network.Predictor`.
 
     storage: how it keeps the frames: "float32", or "int16" with a factor for each column.
@@ -226,10 +199,8 @@ class MatchingPredictor(StandardisingPredictor):
 
     network: Matching
 
-    def __init__(self, network: Matching, storage: str = "float32") -> None:
+    def __init__(self, network: Matching, storage: str) -> None:
         super().__init__(network)
-        if storage not in STORAGES:
-            raise ValueError(f"storage {storage!r}: not one of {', '.join(STORAGES)}")
         self.frames, self.scale = network.frames, np.ones(network.frames.shape[1], np.float32)
         if storage == "int16":
             self.scale = np.maximum(np.abs(network.frames).max(axis=0) / 32767, 1e-30).astype(np.float32)
@@ -237,7 +208,7 @@ class MatchingPredictor(StandardisingPredictor):
         self._transitions = Transitions(network.layout, network.halflife)
         _ = network.tree  # build the tree now, not in the first frame
 
-    def evaluate(self, z: Array, phase: Array, out: Array, memory: Any = None, *_: Any) -> None:
+    def evaluate(self, z: Array, phase: Array, out: Array, memory: Array | None = None) -> None:
         """As in `Predictor`. memory: (C, M) float64 with M = `Network.memory_size`. With None or zeros, each
         character shows the frame nearest to its inputs."""
         network, transitions = self.network, self._transitions
@@ -256,7 +227,7 @@ class MatchingPredictor(StandardisingPredictor):
             offsets[jumps] = self._jump(offsets[jumps], before[jumps], following[jumps], shown[jumps])
         out[:] = pose = self._poses(shown)
         transitions.advance(offsets, out)
-        transitions.pull_phase(network.phases[shown], phase, out)
+        transitions.pull_phase(network.phase[shown], phase, out)
         out[new] = pose[new]
 
     def _poses(self, rows: NDArray[np.int64]) -> Array:

@@ -16,7 +16,7 @@ from hobble.core.quat import Array
 from hobble.core.section import PhaseMode
 from hobble.models.blend import BlendedNetwork, BlendedOptions, TrainableBlend
 from hobble.models.forward import catmull_rom, phase_shares, weights_at
-from hobble.models.network import PHASED, Export
+from hobble.models.network import PHASED
 from hobble.models.pfnn.release import read_release, write_release
 
 if TYPE_CHECKING:
@@ -54,7 +54,7 @@ class PfnnOptions(BlendedOptions):
 
     def trainable(self, flat: Any, sizes: tuple[int, ...], columns: tuple[int, ...]) -> TrainablePfnn:
         """As in `BlendedOptions`."""
-        return TrainablePfnn(flat, sizes, self.control_points)
+        return TrainablePfnn(flat, sizes, self.control_points, kind=self.kind)
 
 
 OPTIONS = PfnnOptions
@@ -135,22 +135,15 @@ class Pfnn(BlendedNetwork):
         at = g("Cast", g("Equal", g("Unsqueeze", index, [2]), np.arange(points)), to=1)  # 1 is float32
         return None, g("ReduceSum", at * g("Unsqueeze", share, [2]), [1], keepdims=0)
 
-    @property
-    def exports(self) -> dict[str, Export]:
-        """The formats "onnx" and "bin", the .bin files of Holden et al. (2017)."""
-
-        def write_bin(target: Path, mode: str) -> str:
-            write_release(target, self)  # always the weights of the mode constant
-            return f"{target}: weights at 50 phases"
-
-        return {**super().exports, "bin": write_bin}
+    def export_bin(self, target: Path, mode: str) -> str:
+        """As `Network.export`: the .bin files of Holden et al. (2017), with the weights of mode constant."""
+        write_release(target, self)
+        return f"{target}: weights at 50 phases"
 
 
 @dataclass(frozen=True)
 class TrainablePfnn(TrainableBlend):
     """A phase-functioned network in training."""
-
-    kind: ClassVar[str] = "pfnn"
 
     def shares(self, gate: list[Tensor], x: Tensor, p: Tensor, masks: list[Tensor] | None) -> Tensor:
         """As in `TrainableBlend`."""
@@ -163,19 +156,3 @@ class TrainablePfnn(TrainableBlend):
         shares = p.new_zeros(len(p), self.sets)
         write_phase_shares(4, p.numpy(), shares.numpy())
         return shares
-
-    @property
-    def half_cycle(self) -> int:
-        """As in `LayerMirror`: half of the control points."""
-        return self.sets // 2
-
-    @property
-    def file_metadata(self) -> dict[str, Any]:
-        """As in `FinishedNetwork`."""
-        spline = "Catmull-Rom splines of the phase through their control points at k / control_points"
-        return {"control_points": self.sets, "network": f"{self.formula()}W and b are cyclic {spline}"}
-
-    @property
-    def description(self) -> str:
-        """As in `FinishedNetwork`."""
-        return f"{self.units_in_words} and {self.sets} control points ({self.flat.numel():,} parameters)"

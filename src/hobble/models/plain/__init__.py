@@ -37,7 +37,7 @@ class PlainOptions(BlendedOptions):
 
     def trainable(self, flat: Any, sizes: tuple[int, ...], columns: tuple[int, ...]) -> TrainablePlain:
         """As in `BlendedOptions`."""
-        return TrainablePlain(flat, sizes, 1)
+        return TrainablePlain(flat, sizes, 1, kind=self.kind)
 
 
 OPTIONS = PlainOptions
@@ -84,7 +84,6 @@ class Plain(BlendedNetwork):
 class TrainablePlain(TrainableBlend):
     """A plain network in training."""
 
-    kind: ClassVar[str] = "plain"
     extra_inputs: ClassVar[int] = PHASE_INPUTS
 
     def shares(self, gate: list[Tensor], x: Tensor, p: Tensor, masks: list[Tensor] | None) -> Tensor:
@@ -107,15 +106,5 @@ class TrainablePlain(TrainableBlend):
         )
 
     def arrays(self) -> dict[str, np.ndarray]:
-        """As in `FinishedNetwork`: `W0` (out, in), `b0` (out,), `W1`, `b1`, ..."""
+        """As in `TrainableBlend`: `W0` (out, in), `b0` (out,), `W1`, `b1`, ..."""
         return {name: array[0] for name, array in super().arrays().items()}
-
-    @property
-    def file_metadata(self) -> dict[str, Any]:
-        """As in `FinishedNetwork`."""
-        return {"network": f"{self.formula('(x, sin 2 pi p, cos 2 pi p)')}p is the phase"}
-
-    @property
-    def description(self) -> str:
-        """As in `FinishedNetwork`."""
-        return f"{self.units_in_words}, given the phase ({self.flat.numel():,} parameters)"
