@@ -22,7 +22,7 @@ from hobble.engine.export import EXAMPLES, SOURCES, export_engine
 from hobble.engine.hob import character_bytes
 from hobble.engine.traces import SITUATIONS, trace
 from hobble.runtime.animation import ProceduralAnimation
-from hobble.runtime.export import restore_bone_lengths
+from hobble.runtime.generated import restore_bone_lengths
 from hobble.runtime.options import Runtime
 from tests.engine.networks import network_of
 

@@ -14,7 +14,7 @@ from hobble.figure.mesh import body_mesh
 from hobble.models.network import Network
 from hobble.motion.read import decode_channels, frame_rate, read_bvh
 from hobble.runtime.animation import ProceduralAnimation
-from hobble.runtime.export import restore_bone_lengths
+from hobble.runtime.generated import restore_bone_lengths
 from hobble.runtime.options import Runtime
 from tests.report.browser import Browser
 

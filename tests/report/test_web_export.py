@@ -13,7 +13,7 @@ from hobble.core import quat
 from hobble.models.network import Network
 from hobble.report.bundle import WEB, export_web
 from hobble.runtime.animation import ProceduralAnimation
-from hobble.runtime.export import restore_bone_lengths
+from hobble.runtime.generated import restore_bone_lengths
 from hobble.runtime.options import Runtime
 from tests.report.browser import opened
 

@@ -1,6 +1,5 @@
-"""Bounds: wild predictions do not break the character, and a state that is not finite restarts."""
+"""Bounds: wild predictions do not break the character, nor does ground that is switched."""
 
-import warnings
 from dataclasses import replace
 
 import numpy as np
@@ -30,24 +29,21 @@ def walked(network: Pfnn, fastest: float = 4.0) -> TrainingFacts:
     )
 
 
-def targets(frames: int):
-    rng = np.random.default_rng(4)
-    for k in range(frames):
-        if k % 30 == 0:
-            target = rng.uniform(-8, 8, 2) * rng.integers(2), rng.normal(size=2)
-        yield target
-
-
 def run(network: Pfnn, frames: int = 600) -> tuple[np.ndarray, np.ndarray]:
-    """Heights of the hips and the largest movement of a joint in each frame, before foot placement."""
-    character = ProceduralAnimation(network, foot_locking=False)
-    role = network.skeleton.role
+    """Heights of the hips and the largest movement of a joint in each frame, before foot placement.
+
+    Every half second the targets change at random.
+    """
+    character, rng = ProceduralAnimation(network, foot_locking=False), np.random.default_rng(4)
     kept = []
-    for velocity, facing in targets(frames):
+    for frame in range(frames):
+        if frame % 30 == 0:
+            velocity, facing = rng.uniform(-8, 8, 2) * rng.integers(2), rng.normal(size=2)
         character.next_pose(velocity, facing, "jog")
         kept.append(character.state.joint_position[0].copy())
     positions = np.array(kept)
-    return positions[:, role("hips"), 1], np.linalg.norm(np.diff(positions, axis=0), axis=-1).max(axis=1)
+    hips = positions[:, network.skeleton.role("hips"), 1]
+    return hips, np.linalg.norm(np.diff(positions, axis=0), axis=-1).max(axis=1)
 
 
 def test_wild_predictions_do_not_break_the_character(make_network) -> None:
@@ -59,6 +55,23 @@ def test_wild_predictions_do_not_break_the_character(make_network) -> None:
     free_hips, free_moved = run(wild)
     assert free_moved.max() > 20, "without bounds it should fall apart"
     assert np.ptp(free_hips) > np.ptp(hips)
+
+
+@pytest.mark.parametrize("value", [np.nan, 1e30])
+def test_a_prediction_that_is_not_finite_does_no_harm(network, value: float) -> None:
+    """One joint of one character is predicted so in a single frame."""
+    character = ProceduralAnimation(network, characters=2)
+    evaluate, column = character.predictor.evaluate, network.layout.y_joint_position.start
+
+    def broken(z, phase, y, memory) -> None:
+        evaluate(z, phase, y, memory)
+        y[1, column] = value
+
+    for frame in range(40):
+        character.predictor.evaluate = broken if frame == 20 else evaluate
+        pose = character.next_pose((0, 2.0))
+        assert np.isfinite(pose.positions).all()
+    assert np.abs(pose.positions[1] - pose.positions[0]).max() < 5
 
 
 def test_a_character_starts_in_the_start_frame(make_network) -> None:
@@ -94,24 +107,3 @@ def test_the_hips_keep_their_height_when_the_ground_is_switched(make_network, wi
         heights.append(y - ground(x, z))
     mean = network.y_mean[network.layout.y_joint_position].reshape(-1, 3)[hips, 1]
     assert 0.67 * mean - 1e-3 <= min(heights) <= max(heights) <= 1.175 * mean + 1e-3
-
-
-@pytest.mark.parametrize(
-    "part", ["position", "joint_position", "phase", "channel_values", "foot_lift", "joint_rotation"]
-)
-@pytest.mark.parametrize("value", [np.nan, 1e30])
-def test_a_state_that_is_not_finite_restarts_and_warns_once(hurtable, part: str, value: float) -> None:
-    character = ProceduralAnimation(hurtable, characters=2)
-    for _ in range(30):
-        healthy = character.next_pose((0, 2.0), injury={hurtable.channels["injury"][0]: 4.0})
-    getattr(character.state, part)[1] = value
-    with pytest.warns(RuntimeWarning, match="was not finite or too large for 1 characters") as warned:
-        poses = [character.next_pose((0, 2.0), terrain=lambda x, z: 0.1 * z) for _ in range(30)]
-    assert len(warned) == 1
-    assert all(np.isfinite(p.positions).all() and np.isfinite(p.rotations).all() for p in poses)
-    assert np.abs(poses[0].root[1] - healthy.root[1]).max() < 30, "it stays where it was"
-    np.testing.assert_allclose(poses[-1].channels["injury"][1][0], 4.0)
-    getattr(character.state, part)[0] = value
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        assert np.isfinite(character.next_pose((0, 2.0)).positions).all()

@@ -1,54 +1,24 @@
-"""The network: its spline, its phase modes, its files."""
+"""The phase-functioned network: its phase modes, its files, and its exports, which give the same numbers."""
 
 from pathlib import Path
 
 import numpy as np
+import onnxruntime
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hobble.models.forward import catmull_rom, weights_at
+from hobble.cli.__main__ import main
 from hobble.models.load import load_network
 from hobble.models.network import Network
+from hobble.models.pfnn import OPTIONS
 from hobble.models.pfnn.release import write_release
-
-ROWS = 7
-
-
-def spline(points: np.ndarray, phase: float) -> np.ndarray:
-    """The definition (Holden et al. 2017, eq. 7), written out: cyclic cubic Catmull-Rom in float64."""
-    k = len(points)
-    scaled = k * phase
-    n = int(np.floor(scaled))
-    w = scaled - n
-    a0, a1, a2, a3 = (points[(n + i) % k].astype(float) for i in (-1, 0, 1, 2))
-    return (
-        a1
-        + w * (a2 / 2 - a0 / 2)
-        + w**2 * (a0 - 5 / 2 * a1 + 2 * a2 - a3 / 2)
-        + w**3 * (3 / 2 * a1 - 3 / 2 * a2 + a3 / 2 - a0 / 2)
-    )
-
-
-def rows(network: Network, count: int = ROWS) -> tuple[np.ndarray, np.ndarray]:
-    rng = np.random.default_rng(1)
-    x = rng.normal(0, 20, (count, network.layout.x_size)).astype(np.float32)
-    return x, rng.random(count)
-
-
-@given(st.floats(0, 1, exclude_max=True), st.integers(4, 9))
-@settings(max_examples=60, deadline=None)
-def test_spline_weights_follow_the_definition(phase: float, points: int) -> None:
-    table = np.random.default_rng(points).normal(size=(points, 3))
-    np.testing.assert_allclose(weights_at(table, phase)[0], spline(table, phase), atol=1e-12)
-    assert sum(catmull_rom(phase)) == pytest.approx(1)
+from hobble.models.predict import write_phase_shares
 
 
 @given(st.floats(-2, 3))
 @settings(max_examples=50, deadline=None)
 def test_no_phase_reads_outside_the_table(phase: float) -> None:
-    from hobble.models.predict import write_phase_shares
-
     for blended, points in ((1, 50), (2, 10), (4, 4)):
         for p in (phase, 1.0, np.nextafter(1.0, 0.0), np.float64(np.float32(0.99999999))):
             # A number on each side, since compiled code does not check that an index is within the array.
@@ -66,10 +36,6 @@ def test_release_folder_round_trip(tmp_path: Path, network: Network, holden31) -
     back = load_network(tmp_path / "pfnn", holden31)
     for a, b in zip((*back.weights, *back.biases), (*network.weights, *network.biases), strict=True):
         np.testing.assert_allclose(a, b, atol=1e-6)
-    x, phase = rows(network)
-    np.testing.assert_allclose(
-        back.predictor().predict(x, phase), network.predictor().predict(x, phase), atol=1e-4
-    )
 
 
 @pytest.mark.shared
@@ -83,3 +49,41 @@ def test_the_released_network_predicts_its_published_rows(shared: Path) -> None:
     stored = network.predictor("constant", "int16").predict(data["X"], data["P"].astype(float))
     joints = network.layout.y_joint_position
     assert np.abs(stored - y)[:, joints].max() < 0.01  # 0.1 mm
+
+
+@pytest.mark.parametrize("points", [4, 6])
+@pytest.mark.parametrize("mode", OPTIONS.modes)
+def test_onnxruntime_predicts_the_same_as_the_runtime(
+    make_network, tmp_path: Path, mode: str, points: int
+) -> None:
+    network = make_network(control_points=points, scale=20.0)
+    assert "by at most" in network.export("onnx", tmp_path / "network.onnx", mode)
+    session = onnxruntime.InferenceSession(tmp_path / "network.onnx", providers=["CPUExecutionProvider"])
+    rng = np.random.default_rng(3)
+    for rows in (1, 7):
+        x = rng.normal(0, 20, (rows, network.layout.x_size)).astype(np.float32)
+        # Also before 0 and after 1, and between every two points.
+        phase = rng.uniform(-1, 2, rows).astype(np.float32)
+        (y,) = session.run(["y"], {"x": x, "phase": phase})
+        np.testing.assert_allclose(y, network.predictor(mode).predict(x, phase.astype(float)), atol=1e-4)
+
+
+def test_the_command_exports_onnx_and_bin(
+    network, tmp_path: Path, root: Path, capsys: pytest.CaptureFixture
+) -> None:
+    write_release(tmp_path / "pfnn", network)
+    skeleton = ["--skeleton", str(root / "config" / "skeletons" / "holden31.yaml")]
+    target = tmp_path / "out" / "network.onnx"
+    assert main(["export", "onnx", str(tmp_path / "pfnn"), str(target), "--mode", "linear", *skeleton]) == 0
+    assert "network.onnx: differs from" in capsys.readouterr().out
+    assert target.exists()
+    assert main(["export", "bin", str(tmp_path / "pfnn"), str(tmp_path / "copy"), *skeleton]) == 0
+    for path in (tmp_path / "pfnn").iterdir():
+        a, b = (np.fromfile(p, "<f4") for p in (path, tmp_path / "copy" / path.name))
+        np.testing.assert_allclose(a, b, atol=1e-6)
+    capsys.readouterr()
+    assert main(["export", "onnx", str(tmp_path), str(tmp_path / "x.onnx")]) == 1
+    assert "not a network" in capsys.readouterr().err
+    skeleton = ["--skeleton", str(root / "Makefile")]
+    assert main(["export", "bin", str(tmp_path / "pfnn"), str(tmp_path), *skeleton]) == 1
+    assert "Makefile" in capsys.readouterr().err

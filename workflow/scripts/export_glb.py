@@ -1,7 +1,7 @@
 """Creates results/<configuration>/export/character.glb: the body with bones and animations."""
 
 from hobble.models.load import load_network
-from hobble.runtime.glb import export_glb
+from hobble.runtime.generated import export_glb
 from hobble.runtime.options import Runtime
 from hobble.workflow.job import job
 

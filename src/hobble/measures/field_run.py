@@ -19,8 +19,8 @@ from hobble.models.load import load_network
 from hobble.models.network import Network
 from hobble.rows.clip_rows import captured_stretches, headings, rotate_by_yaw
 from hobble.runtime.animation import ProceduralAnimation
+from hobble.runtime.caller_targets import world_rotations
 from hobble.runtime.options import Runtime
-from hobble.runtime.pose import world_rotations
 
 if TYPE_CHECKING:
     from hobble.measures.field import Options

@@ -32,7 +32,7 @@ from hobble.report.raster import FPS, BodyRenderer, Camera, Picture, webp
 from hobble.report.stimuli import draw_loop
 from hobble.report.templates import load_template, page_style, questionnaire_script
 from hobble.runtime.animation import ProceduralAnimation
-from hobble.runtime.loops import make_loop
+from hobble.runtime.generated import make_loop
 from hobble.runtime.options import Runtime
 
 INJURY = "injury"  # the channel

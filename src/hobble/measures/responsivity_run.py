@@ -23,9 +23,9 @@ from hobble.measures.walks import FPS, foot_slide, mean_of_known, turns_between
 from hobble.models.load import load_network
 from hobble.models.network import Network
 from hobble.runtime.animation import ProceduralAnimation
+from hobble.runtime.caller_targets import world_rotations
 from hobble.runtime.controller import STEPS
 from hobble.runtime.options import Runtime
-from hobble.runtime.pose import world_rotations
 from hobble.runtime.waypoints import TRACK, Waypoint
 
 if TYPE_CHECKING:

@@ -19,7 +19,7 @@ from hobble.core.compiled import njit
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 from hobble.figure.mesh import body_mesh
-from hobble.runtime.export import restore_bone_lengths
+from hobble.runtime.generated import restore_bone_lengths
 
 Picture = NDArray[np.uint8]  # (height, width, 3) RGB
 FPS = 60  # frames a second of the motion

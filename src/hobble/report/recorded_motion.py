@@ -13,7 +13,7 @@ from hobble.figure.mesh import body_mesh, mesh_key
 from hobble.models.network import Network
 from hobble.rows.clip_rows import ClipRows, load_clip_rows, unbroken_stretches
 from hobble.runtime.animation import ProceduralAnimation
-from hobble.runtime.export import restore_bone_lengths
+from hobble.runtime.generated import restore_bone_lengths
 
 FPS = 20  # frame rate of the motion in the page
 UNIT = 0.01  # joint positions are stored as 16-bit integers in steps of this many cm

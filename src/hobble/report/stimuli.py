@@ -16,8 +16,7 @@ from hobble.core.files import write_bytes, write_json
 from hobble.core.quat import Array
 from hobble.models.network import Network
 from hobble.report.raster import GRID, BodyRenderer, Camera, Picture, webp
-from hobble.runtime.export import export_bvh, fitted_skeleton
-from hobble.runtime.loops import RepeatedWalk, make_loop
+from hobble.runtime.generated import RepeatedWalk, export_bvh, make_loop, skeleton_in_motion
 from hobble.runtime.options import Runtime
 
 QUALITY, EFFORT = 80, 3  # of the WebP images, see `webp`
@@ -53,10 +52,8 @@ def write_stimuli(
         loop = neutral
         if sample.values:
             loop = make_loop(network, {channel_name: dict(sample.values)}, runtime)
-        bvh_skeleton = skeleton
-        if "skeleton" not in network.meta:  # then the bone lengths are known only from the motion
-            bvh_skeleton = fitted_skeleton(skeleton, loop.positions, loop.rotations)
-        export_bvh(folder / f"{name}.bvh", name, bvh_skeleton, loop.positions, loop.rotations)
+        motion = loop.positions, loop.rotations
+        export_bvh(folder / f"{name}.bvh", name, skeleton_in_motion(network, *motion), *motion)
         colours = None
         if sample.coloured:
             values = np.array([sample.values.get(column, 0.0) for column in columns])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
@@ -17,12 +18,11 @@ from hobble.core.skeleton import Skeleton
 from hobble.models.load import load_network
 from hobble.models.network import Network
 from hobble.runtime.bounds import SpeedLimiter
-from hobble.runtime.caller_targets import Axes, CallerTargets
-from hobble.runtime.character import Character, Snapshot, start_characters
+from hobble.runtime.caller_targets import Axes, CallerTargets, Pose
+from hobble.runtime.character import Character, start_characters
 from hobble.runtime.controller import Controller
 from hobble.runtime.ground import as_ground
 from hobble.runtime.network_rows import ChannelValues
-from hobble.runtime.pose import Pose
 from hobble.runtime.trajectory import target_facing
 from hobble.runtime.variation import count_steps, vary_step
 from hobble.runtime.waypoints import Follower, Waypoint
@@ -97,7 +97,6 @@ class ProceduralAnimation:
             "rates": {name: channel(name).rate for name in network.channels} | dict(rates or {}),
             "foot_locking": foot_locking,
             "steering": steering,
-            "side": network.terrain_side,
         }
         self._predicted_by = (mode, storage)
         self.predictor = network.predictor(mode, storage)
@@ -175,24 +174,17 @@ class ProceduralAnimation:
             start_characters(self.network, count, np.array(places, float), yaws, self._channel_values.scales)
         )
 
-    def copies(self, of: np.ndarray) -> ProceduralAnimation:
-        """A new animation whose character i is a copy of character of[i] of this animation.
-
-        of: (C',) indices. The two animations share the network, but no state.
-        """
-        out = object.__new__(ProceduralAnimation)
-        seeds = self._seeds[of]
-        out.__dict__.update(self.__dict__, characters=len(of), _seeds=seeds, _terrain=(None, None))
-        out._targets = CallerTargets(self.network.gaits, self.axes, len(of))
-        out.follower = self.follower.copies(of) if self.follower else None
-        out._continue_from(self.state.copies(of))
-        return out
-
     def __copy__(self) -> ProceduralAnimation:
-        return self.copies(np.arange(self.characters))
+        return copy.deepcopy(self)
 
     def __deepcopy__(self, memo: dict[int, Any]) -> ProceduralAnimation:
-        return self.__copy__()
+        """A character that goes on from here by itself. The two share the network, but no state."""
+        memo |= {id(shared): shared for shared in (self.network, self._rig)}
+        out = object.__new__(ProceduralAnimation)
+        out.__dict__.update(copy.deepcopy(self.__getstate__(), memo), _terrain=(None, None))
+        out.predictor = self.predictor
+        out._continue_from(out.state)
+        return out
 
     def __getstate__(self) -> dict[str, Any]:
         """For pickle: all but the predictor and the controller, which are made anew. They hold no state."""
@@ -240,8 +232,8 @@ class ProceduralAnimation:
     def predicted_turns(self) -> tuple[Array, Array]:
         """Joint rotations (C, J, 3) predicted in the last frame, relative to the root, and root yaw (C,).
 
-        Both are copies, in the form that `hobble.runtime.pose.world_rotations` takes. Unlike in the pose,
-        there is no limit on how far a joint turns in a frame.
+        Both are copies, in the form that `hobble.runtime.caller_targets.world_rotations` takes. Unlike in
+        the pose, there is no limit on how far a joint turns in a frame.
         """
         controller = self._controller
         turns = controller.y[:, self.network.layout.y_joint_rotation].reshape(self.characters, -1, 3)
@@ -292,7 +284,9 @@ class ProceduralAnimation:
             if given is not None
         ]
         controller = self._controller
-        before = None if self._terrain[1] is None else Snapshot(self.state, controller.root, controller.yaw)
+        ground = self._terrain[1]
+        arrays = (*vars(self.state).values(), controller.root, controller.yaw)
+        before = [] if ground is None else [array.copy() for array in arrays]  # without ground nothing fails
         try:
             for columns, values in channel_targets:
                 self.state.channel_targets[:, columns] = values
@@ -300,10 +294,10 @@ class ProceduralAnimation:
                 self._limiter.limit(self.state.channel_values, velocity, shares)
             if self._variation:
                 self._vary(velocity)
-            controller.advance_frame((velocity, direction, strafe, shares), self._terrain[1])
+            controller.advance_frame((velocity, direction, strafe, shares), ground)
         except BaseException:
-            if before is not None:  # on flat ground nothing in a frame can fail
-                before.restore()
+            for array, saved in zip(arrays, before, strict=False):
+                array[...] = saved
             raise
         return self._pose()
 
@@ -329,15 +323,8 @@ class ProceduralAnimation:
             return self._targets.convert_velocity(velocity), ahead, gait
         if self.follower is None:
             return np.zeros((self.characters, 2)), ahead, gait
-        middle = self.network.layout.window
-        target, waypoints = self.follower.lead(self.state.position[:, middle])
-        ahead = target
-        if any(waypoint.facing is not None for waypoint in waypoints):
-            ahead = target.copy()
-            for c, waypoint in enumerate(waypoints):
-                if waypoint.facing is not None:
-                    ahead[c] = waypoint.facing
-        return target, ahead, [waypoint.gait for waypoint in waypoints] if gait is None else gait
+        target, ahead, gaits = self.follower.lead(self.state.position[:, self.network.layout.window])
+        return target, ahead, gaits if gait is None else gait
 
     def _pose(self) -> Pose:
         """The pose after the last frame, as copies in the caller's axes and unit."""

@@ -76,42 +76,17 @@ class Bounds:
 
 
 @njit
-def limit_rows(rows: Any, low: Any, high: Any, unsound: Any) -> bool:
+def limit_rows(rows: Any, low: Any, high: Any) -> None:
     """Limit the values of rows (C, N), in place, to the range from low (N,) to high (N,).
 
     A number that is not finite or is larger than LARGEST_SOUND becomes the middle of its column's range.
-    Writes into `unsound` (C,) whether a row had such a number. Returns whether any row had one.
     """
-    any_unsound = False
     for c in range(rows.shape[0]):
-        unsound[c] = False
         for k in range(rows.shape[1]):
             value = rows[c, k]
             if not abs(value) < LARGEST_SOUND:  # also true for NaN
-                unsound[c] = any_unsound = True
                 value = 0.5 * (low[k] + high[k])
             rows[c, k] = min(max(value, low[k]), high[k])
-    return any_unsound
-
-
-@njit
-def mark_unsound(state: tuple[Any, ...], unsound: Any) -> bool:
-    """Write into `unsound` (C,) whether each character's state has a number that is not finite or too large.
-
-    state: arrays (C, n), each with its own n. A character's numbers in an array are too large if the
-    mean of their absolute values is above LARGEST_SOUND. Returns whether any character is marked.
-    """
-    any_unsound = False
-    for c in range(unsound.shape[0]):
-        sound = True
-        for part in state:
-            total = 0.0
-            for value in part[c]:
-                total += abs(value)
-            sound &= total <= LARGEST_SOUND * part.shape[1]  # also False for a sum that is not finite
-        unsound[c] = not sound
-        any_unsound |= not sound
-    return any_unsound
 
 
 # Limits the target speed and gait of each character to what its hurt or sad body can do.

@@ -7,7 +7,7 @@ starts with the defaults of all channels.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -74,23 +74,6 @@ class Character:
     placed: np.ndarray
     step: Array
     memory: Array
-
-    def copies(self, of: np.ndarray) -> Character:
-        """A new state whose character i is a copy of character of[i] of this one. of: (C',) indices."""
-        return Character(**{field.name: getattr(self, field.name)[of] for field in fields(self)})
-
-
-class Snapshot:
-    """A copy of a state and of other arrays. It restores all of them if a frame fails."""
-
-    def __init__(self, state: Character, *other_arrays: Array) -> None:
-        arrays = (*(getattr(state, field.name) for field in fields(state)), *other_arrays)
-        self._arrays = [(array, array.copy()) for array in arrays]
-
-    def restore(self) -> None:
-        """Copy the values back into the same arrays."""
-        for array, saved in self._arrays:
-            array[...] = saved
 
 
 def start_characters(

@@ -5,26 +5,21 @@ one file, because numba compiles a cached function again only if its own file ch
 a function that it calls is not noticed.
 """
 
-import warnings
 from collections.abc import Callable, Mapping
-from dataclasses import fields
 from time import perf_counter
 from typing import Any
 
 import numpy as np
-from numba.extending import register_jitable
 
 from hobble.channels.channel import read_through_curve
 from hobble.core.compiled import njit
 from hobble.core.quat import Array
 from hobble.models.network import Predictor
 from hobble.rows.layout import BODY, RowLayout
-from hobble.runtime import feet, network_rows, rule, trajectory
-from hobble.runtime.bounds import Bounds, limit_rows, mark_unsound
-from hobble.runtime.character import Character, start_characters
-from hobble.runtime.trajectory import STILL, Trajectory
-
-phase_change, movement_share = register_jitable(rule.phase_change), register_jitable(rule.movement_share)
+from hobble.runtime import feet, network_rows, trajectory
+from hobble.runtime.bounds import Bounds, limit_rows
+from hobble.runtime.character import Character
+from hobble.runtime.trajectory import STILL, Trajectory, movement_share, phase_change
 
 # If the predicted poses are recorded frames (motion matching), the root's movement in a frame is changed
 # toward the target velocity. At right angles to the target, the change is at most this share of the
@@ -173,14 +168,6 @@ FPS = 60
 FEET_AHEAD = 4.0  # frames: a foot in the air is kept above the ground that it reaches in this time
 HIGHEST_GROUND = 1e7  # cm, 100 km above or below 0; at larger heights, floats are imprecise
 
-# In each frame the runtime checks that these arrays of the state are finite and not too large. The other
-# arrays are checked when the caller gives them, are computed anew in each frame, or stay within 0 to 1.
-CHECKED = (
-    "position", "direction", "gait", "joint_position", "joint_velocity", "joint_rotation", "phase",
-    "channel_values", "smoothed_velocity", "smoothed_direction", "correction", "foot_hold", "foot_lift",
-    "foot_added", "leg_shown", "body_lift", "memory",
-)  # fmt: skip
-
 Ground = Callable[[Array, Array], Array]  # x, z (N,), cm -> heights (N,), cm
 
 
@@ -189,8 +176,7 @@ class Controller:
 
     character: their state, changed in place. rates: channel -> largest change of its values per second.
     foot_locking: hold feet in contact where they landed. steering: gain with which the target velocity is
-    corrected while the character does not reach it; 0: no correction. side: cm from the path to the points at
-    its sides where the ground is looked up.
+    corrected while the character does not reach it; 0: no correction.
 
     After `advance_frame`, these are the pose for the caller: root (C, 3), yaw (C,), pose_position (C, J, 3)
     and pose_rotation (C, J, 4). The attributes x, z and y are the rows of inputs, of
@@ -205,13 +191,12 @@ class Controller:
         rates: Mapping[str, float],
         foot_locking: bool,
         steering: float,
-        side: float,
     ) -> None:
         network = predictor.network
         layout = network.layout
         count = len(character.phase)
         self.predictor, self.character, self.layout = predictor, character, layout
-        self.side, self.foot_locking, self.steering = side, foot_locking, steering
+        self.side, self.foot_locking, self.steering = network.terrain_side, foot_locking, steering
         self.seconds = np.zeros(len(STEPS))
         self.x = np.zeros((count, layout.x_size), np.float32)
         self.z = np.zeros_like(self.x)
@@ -220,11 +205,9 @@ class Controller:
         self.root = np.stack([here[:, 0], character.root_height, here[:, 1]], axis=1)
         self.yaw = np.arctan2(ahead[:, 0], ahead[:, 1])
         self.bounds = Bounds.of(network)
-        # An argument of `evaluate`, but only if the network has a memory.
         # Factors of the next change of phase and of the channel values, see `hobble.runtime.variation`.
         self.pace, self.shown = np.ones(count), np.ones(count)
-        self._memory = (character.memory,) if network.memory_size else ()
-        self._unsound = np.zeros(count, bool)
+        self._memory = character.memory if network.memory_size else None
         self.pose_position = character.joint_position.copy()
         self.pose_rotation = character.joint_rotation.copy()
         # x and z of the points left of the path, on it and right of it where the ground is looked up.
@@ -253,7 +236,6 @@ class Controller:
         # The joints under which the ground is looked up (heels, toes, hips), and the ground heights there.
         self._ground_joints = np.append(legs[:, 2:].reshape(-1), self._hips)
         self._ground_heights = np.zeros((count, len(self._ground_joints)))
-        self._warned = False
         self._group_arrays(character)
 
     def _group_arrays(self, c: Character) -> None:
@@ -269,54 +251,27 @@ class Controller:
         )
         self._contacts = self.y[:, self.layout.y_contacts]
         self._predicted_hips = self.y[:, self._y_joints + 3 * self._hips + 1]
-        self._checked = tuple(getattr(c, name).reshape(len(c.phase), -1) for name in CHECKED)
 
     def advance_frame(self, target: trajectory.Target, ground: Ground | None) -> None:
         """Run one frame. ground: function from x, z (N,) to heights (N,), cm; None: flat at 0."""
         clock = perf_counter
         t0 = clock()
         c = self.character
-        if mark_unsound(self._checked, self._unsound):
-            self._restart_unsound()
         self._prepare(target, ground)
         t1 = clock()
         self._input()
-        limit_rows(self.x, self.bounds.x_low, self.bounds.x_high, self._unsound)
+        limit_rows(self.x, self.bounds.x_low, self.bounds.x_high)
         t2 = clock()
         self.predictor.standardise(self.x, self.z)
         t3 = clock()
-        self.predictor.evaluate(self.z, c.phase, self.y, *self._memory)
-        if limit_rows(self.y, self.bounds.y_low, self.bounds.y_high, self._unsound):
-            self._warn_once(
-                "the network's prediction", "such numbers are replaced by the middle of their range"
-            )
+        self.predictor.evaluate(self.z, c.phase, self.y, self._memory)
+        limit_rows(self.y, self.bounds.y_low, self.bounds.y_high)
         t4 = clock()
         self._output(ground)
         t5 = clock()
         self._update(target[0])
         t6 = clock()
         self.seconds[:] = (t1 - t0, t2 - t1, t3 - t2, t4 - t3, t5 - t4, t6 - t5)
-
-    def _restart_unsound(self) -> None:
-        """Restart the characters marked in `_unsound` where they are, with the same channel targets."""
-        self._warn_once("the state", "they restart where they were, in the start pose")
-        marked = np.flatnonzero(self._unsound)
-        fresh = start_characters(
-            self.predictor.network, len(marked), self.root[marked][:, ::2], self.yaw[marked]
-        )
-        for field in fields(fresh):
-            if field.name != "channel_targets":
-                getattr(self.character, field.name)[marked] = getattr(fresh, field.name)
-
-    def _warn_once(self, what: str, remedy: str) -> None:
-        """Warn that `what` has unusable numbers, unless this controller has warned before."""
-        if not self._warned:
-            warnings.warn(
-                f"{what} was not finite or too large for {int(self._unsound.sum())} characters; {remedy}",
-                RuntimeWarning,
-                stacklevel=4,
-            )
-        self._warned = True
 
     def _prepare(self, target: trajectory.Target, ground: Ground | None) -> None:
         c = self.character

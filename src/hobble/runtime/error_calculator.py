@@ -15,7 +15,7 @@ from hobble.rows.clip_rows import (
     rotate_by_yaw,
     unbroken_stretches,
 )
-from hobble.runtime.pose import Pose, world_rotations
+from hobble.runtime.caller_targets import Pose, world_rotations
 
 # cm: a joint nearer than this to the root counts as this far from it, so that nothing is divided by 0.
 LEAST_DISTANCE = 1e-3

@@ -14,8 +14,7 @@ from hobble.core import quat
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 from hobble.motion.axes import rest_frame
-from hobble.runtime.caller_targets import Axes
-from hobble.runtime.pose import Pose
+from hobble.runtime.caller_targets import Axes, Pose
 
 NECK_SHARE = 0.4  # share of a look's turn that the neck takes; the head takes the rest
 

@@ -5,15 +5,13 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
-from numba.extending import register_jitable
 
 from hobble.channels import CHANNEL_NAMES, channel
 from hobble.channels.shown import channel_display
 from hobble.core.compiled import njit
 from hobble.core.quat import Array
 from hobble.models.network import Network
-from hobble.runtime import rule
-from hobble.runtime.trajectory import Trajectory
+from hobble.runtime.trajectory import Trajectory, joint_place
 
 
 class UnknownName(KeyError):
@@ -126,8 +124,6 @@ def _no_input(name: str) -> str:
 # Every array begins with an axis of the C characters.
 
 
-# The rule for a joint's new position, in a form that compiled functions can call.
-joint_place = register_jitable(rule.joint_place)
 # Largest turn of a joint, radians a frame (1500 degrees a second). No joint of a walking or running person
 # turns as fast, but a predicted joint may. If a joint has rotations in the clips that are half a turn apart,
 # as in hands, the network predicts their mean, which may be any rotation. A new target may also change the

@@ -8,6 +8,7 @@ runtime of Holden et al. (2017).
 from typing import Any
 
 import numpy as np
+from numba.extending import register_jitable
 
 from hobble.core.compiled import njit
 
@@ -27,6 +28,8 @@ MOST_CORRECTION = 1.0  # largest integral correction, as a share of the target v
 FURTHEST_TURN = np.radians(137)
 STRAFE_FROM = np.radians(45)  # the strafe share is 1 if facing and velocity are at least this far apart
 STILL = 0.1  # cm a frame: a slower target means standing
+CARRIED_SHARE = 0.5  # weight of `carried` and of `predicted` in a joint's new position
+STANDING_SHARE = 0.1  # share of the predicted change of phase that is applied to a standing character
 
 
 # Groups of arrays for compiled functions, which unpack them into names. They are plain tuples, because
@@ -44,6 +47,35 @@ Smoothed = tuple[Any, Any, Any, Any]
 # values, targets (C, K): present and target values of all channels' columns. steps (K,): largest change of a
 # value in a frame.
 Channels = tuple[Any, Any, Any]
+
+
+# How a network's prediction changes the character's state, as in the runtime of Holden et al. (2017). These
+# functions take numbers, numpy arrays or tensors: compiled functions, roll-outs and training call them. The
+# only other implementation is in C.
+
+
+@register_jitable
+def joint_place(carried: Any, predicted: Any) -> Any:
+    """New joint positions: the mean of `carried` (old position plus velocity) and `predicted`."""
+    return CARRIED_SHARE * (carried + predicted)
+
+
+@register_jitable
+def movement_share(stand: Any) -> Any:
+    """The share (0 to 1) of the root's predicted movement that is applied. It is 0 for a standing character.
+
+    stand: share of the gait "stand". At 0.9375, half of the movement is still applied.
+    """
+    return np.maximum(0.0, 1.0 - stand) ** 0.25
+
+
+@register_jitable
+def phase_change(share: Any, predicted: Any) -> Any:
+    """The change of phase that is applied, cycles.
+
+    share: from `movement_share`. predicted: the change that the network predicts, cycles.
+    """
+    return ((1.0 - STANDING_SHARE) * share + STANDING_SHARE) * predicted
 
 
 @njit

@@ -53,6 +53,7 @@ class Follower:
         self.track, self.arrived = tuple(track), arrived
         self.places = np.array([w.position for w in self.track], float)
         self._speeds = np.array([w.speed for w in self.track], float)
+        self._facings = np.array([w.facing or (0.0, 0.0) for w in self.track], float)
         self.reached = np.zeros(characters, int)
         self.off_path = np.zeros(characters)
 
@@ -62,16 +63,11 @@ class Follower:
         ahead = self.places[0] - self.places[-1]
         return self.places[-1].copy(), float(np.arctan2(ahead[0], ahead[1]))
 
-    def copies(self, of: np.ndarray) -> Follower:
-        """A follower whose character i is as far on the track as character of[i] of this one."""
-        out = Follower(self.track, len(of), self.arrived)
-        out.reached[:], out.off_path[:] = self.reached[of], self.off_path[of]
-        return out
+    def lead(self, position: Array) -> tuple[Array, Array, list[str]]:
+        """The velocity (C, 2), cm a frame, of each character toward its next waypoint, its facing, its gait.
 
-    def lead(self, position: Array) -> tuple[Array, list[Waypoint]]:
-        """The velocity (C, 2), cm a frame, of each character toward its next waypoint, and these C waypoints.
-
-        position: (C, 2) x and z of the characters, cm. Updates `reached` and `off_path`.
+        A facing (C, 2) of zero is the direction of movement. position: (C, 2) x and z of the characters, cm.
+        Updates `reached` and `off_path`.
         """
         count = len(self.track)
         ahead = self.places[self.reached % count] - position
@@ -85,4 +81,4 @@ class Follower:
         self.off_path[:] = np.sqrt(np.sum(off * off, axis=1))
         distance = np.sqrt(np.sum(ahead * ahead, axis=1))
         velocity = ahead * (self._speeds[n] / np.maximum(distance, 1e-6))[:, None]
-        return velocity, [self.track[i] for i in n.tolist()]
+        return velocity, self._facings[n], [self.track[i].gait for i in n.tolist()]

@@ -13,7 +13,7 @@ from torch import Tensor
 from hobble.core.quat import Array
 from hobble.database.reader import Database
 from hobble.rows.layout import GAITS, blocks_without_terrain, lower_joints
-from hobble.runtime.rule import joint_place
+from hobble.runtime.trajectory import joint_place
 from hobble.training.batches import TRAIN, SampleBatch
 from hobble.training.options import Training
 
