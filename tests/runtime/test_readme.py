@@ -18,13 +18,14 @@ PYTHON = list(blocks(ROOT, "python"))
 
 
 @pytest.fixture
-def loaded(hurtable: Network, monkeypatch: pytest.MonkeyPatch) -> list[str]:
-    """The paths that were loaded. Each gives the same untrained network."""
+def loaded(request: Any, hurtable: Network, make_network: Any, monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """The paths that were loaded. Each gives the same untrained network, on the page of moods one with moods."""
     paths: list[str] = []
+    network = make_network(links=5, channel="mood") if "moods" in request.node.name else hurtable
 
     def load(path: str, **options: Any) -> ProceduralAnimation:
         paths.append(path)
-        return ProceduralAnimation(hurtable, **options)
+        return ProceduralAnimation(network, **options)
 
     monkeypatch.setattr(ProceduralAnimation, "load", load)
     monkeypatch.chdir(ROOT)
@@ -32,15 +33,8 @@ def loaded(hurtable: Network, monkeypatch: pytest.MonkeyPatch) -> list[str]:
 
 
 @pytest.mark.parametrize("page", sorted({block.page for block in PYTHON}))
-def test_the_code_of_a_page_runs(
-    loaded: list[str], make_network: Any, page: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_code_of_a_page_runs(loaded: list[str], page: str) -> None:
     """Its blocks one after another, with fewer frames and with untrained networks."""
-    if "moods" in page:
-        mood = make_network(links=5, channel="mood")
-        monkeypatch.setattr(
-            ProceduralAnimation, "load", lambda p: [loaded.append(p), ProceduralAnimation(mood)][1]
-        )
     names: dict[str, Any] = {}
     for block in PYTHON:
         if block.page == page:

@@ -26,7 +26,6 @@ from numpy.typing import NDArray
 
 from hobble.core.compiled import njit
 from hobble.core.quat import Array
-from hobble.models.blend import BlendedNetwork
 from hobble.models.forward import catmull_rom
 from hobble.models.network import Predictor
 
@@ -101,9 +100,9 @@ class Stack:
 class BlendPredictor(Predictor):
     """A `Predictor` of a blended stack. mode: one of the network's. storage: as in `Stack`."""
 
-    network: BlendedNetwork
+    network: Any  # a `BlendedNetwork`
 
-    def __init__(self, network: BlendedNetwork, mode: str, storage: str) -> None:
+    def __init__(self, network: Any, mode: str, storage: str) -> None:
         super().__init__(network)
         weights, biases, self._shares = network.prepare(mode)
         self._stack = Stack(weights, biases, storage, network.y_mean, network.y_std)
