@@ -19,7 +19,7 @@ PYTHON = list(blocks(ROOT, "python"))
 
 @pytest.fixture
 def loaded(request: Any, hurtable: Network, make_network: Any, monkeypatch: pytest.MonkeyPatch) -> list[str]:
-    """The paths that were loaded. Each gives the same untrained network, on the page of moods one with moods."""
+    """The paths that were loaded. Each gives the same untrained network, one with moods on their page."""
     paths: list[str] = []
     network = make_network(links=5, channel="mood") if "moods" in request.node.name else hurtable
 
