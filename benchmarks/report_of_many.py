@@ -18,10 +18,9 @@ from pathlib import Path
 from hobble.core.files import read_json
 from hobble.core.processors import processor_name
 from hobble.models.load import load_network
-from hobble.report.character import playable_with_recogniser
+from hobble.report.character import packed_comparisons, playable_with_recogniser
 from hobble.report.gather import gather
 from hobble.report.page import render_report
-from hobble.report.recorded_motion import packed_comparisons
 from hobble.runtime.options import Runtime
 
 REPORTS = {"motion": "motion", "labels": "labels", "channels": "channels/injury"}

@@ -17,10 +17,10 @@ from hobble.measures.measure import all_measures
 from hobble.models.network import Network
 from hobble.report import sections, templates
 from hobble.report.bundle import bundle_page_scripts, install_npm_packages
+from hobble.report.character import TURN, UNIT, packed_comparisons, packed_motion
 from hobble.report.gather import ReportMaterial
 from hobble.report.page import render_report
-from hobble.report.parts import json_data
-from hobble.report.recorded_motion import TURN, UNIT, packed_comparisons, packed_motion
+from hobble.report.parts import embedded
 from tests.report.browser import Browser, opened
 from tests.report.conftest import CLIP
 
@@ -137,7 +137,7 @@ def hostile(material: ReportMaterial, character: dict[str, Any], network: Networ
     link = network.trained_labels("injury")[0]
 
     def renamed(value: Any) -> Any:
-        text = json.dumps(json_data(value))
+        text = json.dumps(json.loads(embedded(value)))
         for name in (CLIP, link):
             text = text.replace(json.dumps(name), json.dumps(HOSTILE))
         return json.loads(text)

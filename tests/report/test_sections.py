@@ -21,7 +21,6 @@ from hobble.report.page import hints, key_figures
 from hobble.report.parts import (
     Chart,
     ChartGroup,
-    ChartPair,
     Column,
     PageSection,
     Paragraph,
@@ -29,7 +28,6 @@ from hobble.report.parts import (
     Table,
     embedded,
     join_sections,
-    json_data,
 )
 from hobble.report.sections import TURN_EDGES
 from hobble.report.templates import drawn_by_script, load_template
@@ -43,10 +41,10 @@ def chart(name: str) -> Chart:
 def test_sections_are_joined_escaped_and_their_charts_and_long_tables_found() -> None:
     rows = [[f"clip {i}", i / 3] for i in range(11)]
     columns = [Column("clip"), Column.number("error")]
-    guest = PageSection("errors", [SectionPart(20, chart("b"), tall=True), SectionPart(5, None)])
+    guest = PageSection("errors", [SectionPart(20, chart("b")), SectionPart(5, None)])
     parts = [SectionPart(30, Table("long", columns, rows)), SectionPart(10, Paragraph("<b>"))]
     owner = PageSection("errors", parts, title="<S>", order=10, nav="E", long=True)
-    pair, family = ChartPair([chart("a"), None]), ChartGroup("f", "F", "", [chart("c"), chart("d")])
+    pair, family = ChartGroup([chart("a"), None]), ChartGroup([chart("c"), chart("d")], "f", "F")
     alone = PageSection("laps", [SectionPart(0, pair), SectionPart(1, family)], order=5)
     short = PageSection("laps", [SectionPart(2, Table("short", columns, rows[:10]))])
     nothing = PageSection("none", [SectionPart(0, None)], title="None")
@@ -54,7 +52,7 @@ def test_sections_are_joined_escaped_and_their_charts_and_long_tables_found() ->
     assert (first.name, first.title, first.nav) == ("laps", "Laps", "Laps")
     assert (second.title, second.nav, second.order, second.long) == ("<S>", "E", 10, True)
     assert [part.content.kind for part in second.parts if part.content] == ["words", "chart", "table"]
-    drawn = drawn_by_script(joined)
+    drawn = drawn_by_script(part for section in joined for part in section.parts)
     assert set(drawn["charts"]) == set("abcd")
     assert list(drawn["tables"]) == ["long"]
     assert drawn["tables"]["long"][1] == ["clip 1", ["0.3333333333333333", "0.333"]]
@@ -62,7 +60,6 @@ def test_sections_are_joined_escaped_and_their_charts_and_long_tables_found() ->
     assert "<p>&lt;b&gt;</p>" in text
     assert "<h2>&lt;S&gt;</h2>" in text
     assert text.count("<figure") == 3
-    assert 'class="plot tall" tabindex="0" data-chart="b"' in text
 
 
 @settings(max_examples=80, deadline=None)
@@ -71,10 +68,10 @@ def test_embedded_json_comes_back_and_cannot_end_its_element(value: dict) -> Non
     text = str(embedded(value))
     assert json.loads(text) == value
     assert not set("<>&") & set(text)
-    assert json_data({"a": np.array([1.0, np.nan]), "b": np.float32("inf")}) == {"a": [1.0, None], "b": None}
-    (trace,) = Chart("c", "t", "", [{"y": ["<b>a & b"], "hovertemplate": "%{y}<extra></extra>"}]).spec()[
-        "traces"
-    ]
+    numbers = {"a": np.array([1.0, np.nan]), "b": np.float32("inf")}
+    assert json.loads(embedded(numbers)) == {"a": [1.0, None], "b": None}
+    texts = Chart("c", "t", "", [{"y": ["<b>a & b"], "hovertemplate": "%{y}<extra></extra>"}])
+    (trace,) = texts.spec()["options"][0]["traces"]
     assert trace == {"y": ["&lt;b>a &amp; b"], "hovertemplate": "%{y}<extra></extra>"}, "plotly reads HTML"
 
 
@@ -197,16 +194,6 @@ def test_findings_are_said_with_what_to_do(
     assert [hint for hint in found if hint.kind in ("warn", "note") and not REMEDY.search(hint.text)] == []
 
 
-def test_the_time_of_a_frame_is_a_median(material: ReportMaterial) -> None:
-    times = {"predict": 0.17, "total": 0.17, "spread": {"median": 0.025, "p99": 0.163}}
-    responsivity = {**material.measurements["responsivity"], "milliseconds": times}
-    slow = changed(material, name="holden", responsivity=responsivity)
-    figure = next(f for f in key_figures(slow) if f.label == "Time per frame")
-    assert (figure.value, figure.unit) == ("0.025", "ms")
-    assert "667 characters" in figure.note
-    assert "mean 0.17 ms, published mean 0.376 ms" in figure.note
-
-
 def test_missing_data_comes_before_longer_training(material: ReportMaterial) -> None:
     """If nobody stands in the clips and the error still falls, the hint on the clips comes first."""
     bare = replace(material, measurements={}, pipeline={}, history={}, motion=[], labels=[], channels=[])
@@ -214,10 +201,8 @@ def test_missing_data_comes_before_longer_training(material: ReportMaterial) -> 
     assert [hint.head for hint in hints(bare)] == ["No clips were held out."]
     labels = [{"clip": "a", "seconds": {"walk": 30.0}, "curves": {}}]
     found = hints(replace(material, labels=labels, history=FALLING, resolved={}))
-    heads = [
-        hint.head for hint in found if hint.head.startswith("Nobody stands") or "still fell" in hint.head
-    ]
-    assert [head.startswith("Nobody") for head in heads] == [True, False]
+    heads = [hint.head for hint in found if "Nobody stands" in hint.head or "still fell" in hint.head]
+    assert ["Nobody" in head for head in heads] == [True, False]
 
 
 def test_clips_without_turns_are_reported(material: ReportMaterial) -> None:

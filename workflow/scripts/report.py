@@ -5,10 +5,9 @@ from pathlib import Path
 from hobble.core.files import write_text
 from hobble.measures.measure import all_measures
 from hobble.models.load import load_network
-from hobble.report.character import opening_slider, playable_with_recogniser
+from hobble.report.character import packed_comparisons, playable_with_recogniser
 from hobble.report.gather import gather
 from hobble.report.page import render_report
-from hobble.report.recorded_motion import packed_comparisons
 from hobble.runtime.options import Runtime
 from hobble.workflow.job import Inputs, job
 
@@ -41,8 +40,7 @@ with job(snakemake):
     network = load_network(files.weights)
     runtime = Runtime.model_validate(material.resolved["configuration"]["runtime"])
     character = playable_with_recogniser(network, runtime)
-    opening = opening_slider(character, material.measurements.values())
     captured_and_predicted = packed_comparisons(network, rows, params.splits)
     bundle = Path(files.bundle).read_text(encoding="utf-8")
-    page = render_report(material, character, captured_and_predicted, bundle, opening)
+    page = render_report(material, character, captured_and_predicted, bundle)
     write_text(snakemake.output.html, page)

@@ -67,8 +67,8 @@ def section(found: Json, material: ReportMaterial) -> PageSection:
         SectionPart(
             9, parts.Paragraph(parts.words("accuracy.caveat", duration=duration, dataset=material.dataset))
         ),
-        SectionPart(10, published_table(found, material), open=True, short=True),
-        SectionPart(30, clip_boxes(found, material), tall=True),
+        SectionPart(10, published_table(found, material), open=True),
+        SectionPart(30, clip_boxes(found, material)),
         SectionPart(60, of_clips),
         SectionPart(90, parts.TemplatePart("captured.html.j2")),
     ]
@@ -152,9 +152,7 @@ def published_table(found: Json, material: ReportMaterial) -> parts.Table:
         "source": "source",
     }
     rows = [*ours, *material.published_records("accuracy")]
-    return parts.table(
-        f"{material.name}-published", rows, heads, parts.words("accuracy.published"), long=["source"]
-    )
+    return parts.table(f"{material.name}-published", rows, heads, parts.words("accuracy.published"))
 
 
 def figures(found: Json, material: ReportMaterial) -> Iterator[parts.KeyFigure]:

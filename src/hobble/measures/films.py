@@ -30,7 +30,7 @@ from hobble.models.network import Network
 from hobble.report.parts import embedded
 from hobble.report.raster import FPS, BodyRenderer, Camera, Picture, webp
 from hobble.report.stimuli import draw_loop
-from hobble.report.templates import load_template, page_style, questionnaire_script
+from hobble.report.templates import load_template, own_file
 from hobble.runtime.animation import ProceduralAnimation
 from hobble.runtime.generated import make_loop
 from hobble.runtime.options import Runtime
@@ -220,8 +220,8 @@ def write_questionnaire(
     solution = {"study": study, "configuration": configuration, "parts": PARTS[parts], "films": solutions}
     on_page = {"questions": QUESTIONS, "parts": PARTS[parts], "films": films_on_page, "size": size}
     page = load_template("questionnaire.html.j2").render(
-        style=page_style(),
-        script=questionnaire_script(),
+        style=own_file("page.css"),
+        script=own_file("questionnaire.js"),
         embedded=embedded({"study": study, **on_page}),
         count=len(films),
         questions=len(QUESTIONS) + 1,

@@ -89,15 +89,17 @@ def _parts(found: Json, material: ReportMaterial) -> list[parts.SectionPart]:
     ]
     ranges = range_records([row for row in rows if row["link"] not in untrained], published["one_link"])
     return [
-        parts.SectionPart(0, parts.ChartPair([effect_chart(responses, *each) for each in EFFECTS])),
+        parts.SectionPart(0, parts.ChartGroup([effect_chart(responses, *each) for each in EFFECTS])),
         parts.SectionPart(10, say("injury-responses", flat)),
         parts.SectionPart(15, strip_chart(found["strips"], skeleton)),
         parts.SectionPart(20, sweep_charts(rows, found["falling"], untrained) if rows else None),
-        parts.SectionPart(25, say("injury-ranges", ranges), open=True, short=True),
+        parts.SectionPart(25, say("injury-ranges", ranges), open=True),
         parts.SectionPart(42, second_sweep_chart(sweep, published)),
-        parts.SectionPart(45, say("second-thresholds", found["second_thresholds"]), open=True, short=True),
+        parts.SectionPart(45, say("second-thresholds", found["second_thresholds"]), open=True),
         parts.SectionPart(51, say("second-sweep", sweep)),
-        parts.SectionPart(60, parts.ChartPair([divided_chart(found["divided"]), jog_chart(jogs, untrained)])),
+        parts.SectionPart(
+            60, parts.ChartGroup([divided_chart(found["divided"]), jog_chart(jogs, untrained)])
+        ),
         parts.SectionPart(65, say("into-a-jog", jogs)),
         parts.SectionPart(70, say("injury", rows)),
     ]
@@ -138,7 +140,7 @@ def compared_section(compared: parts.Compared) -> parts.PageSection:
     means = parts.table("compare-injury", rows, title=parts.told("injury.means")["title"])
     content = [
         parts.SectionPart(0, parts.Paragraph(parts.words("injury.introduction"))),
-        parts.SectionPart(10, means, open=True, short=True),
+        parts.SectionPart(10, means, open=True),
     ]
     return parts.PageSection("injury", content if summaries else [], title="Injury response", order=20)
 
@@ -238,7 +240,7 @@ def sweep_charts(
         }
         charts.append(parts.Chart(f"sweep-{name}", title, "", layout=layout, height=230, options=options))
     caption = parts.words("sweeps.caption", "sweeps.falling", *(["sweeps.untrained"] if untrained else []))
-    return parts.ChartGroup("sweeps", parts.words("sweeps.title"), caption, charts, "Link and gait")
+    return parts.ChartGroup(charts, "sweeps", parts.words("sweeps.title"), caption, "Link and gait")
 
 
 def effect_chart(

@@ -68,10 +68,6 @@ OFF_TRACK = 100.0  # cm from the line between two waypoints; places farther away
 TIME_AXIS = parts.axis("ms per frame", rangemode="tozero")
 FEWEST_STEPS = 10  # if the character takes fewer steps, the mean foot slide is not shown
 FRAME_BUDGET_MS = 1000 / 60  # the time that a frame may take at 60 Hz
-# What the table of laps shows of a lap, besides times.
-OF_LAP: tuple[str, ...] = ("lap", "finished", "waypoints_reached", "seconds", "frames")
-OF_LAP += ("path_distance_cm", "path_overshoot_cm", "steps", "foot_slide_cm")
-OF_LAP += ("predicted_turn_degrees", "largest_turn_degrees", "turns_held_back")
 FLIP_DEGREES = 60  # if a joint turns by more than this in one frame, it flips visibly
 
 
@@ -84,7 +80,7 @@ def section(found: Json, material: ReportMaterial) -> PageSection:
         SectionPart(10, parts.KeyFigures(track_figures(found))),
         SectionPart(15, track_chart(found)),
         SectionPart(20, lap_chart(found, material)),
-        SectionPart(30, speed_table(found, material), open=True, short=True),
+        SectionPart(30, speed_table(found, material), open=True),
         SectionPart(60, lap_table(found, material.name)),
     ]
     title, nav = "Steering and time per frame", "Steering and time"
@@ -107,7 +103,7 @@ def hints(found: Json, material: ReportMaterial) -> Iterator[Hint]:
     """Whether a frame fits into 1/60 s, and whether the character followed the track."""
     if found.get("laps"):
         yield _speed_hint(found)
-        yield from parts.with_order(40, _track_hints(found))
+        yield from _track_hints(found)
 
 
 def lap_chart(found: Json, material: ReportMaterial) -> Chart:
@@ -180,16 +176,12 @@ def track_chart(found: Json) -> Chart:
 
 
 def lap_table(found: Json, name: str) -> parts.Table:
-    """A row per lap: how it went, the mean time of each step of a frame, and the median time of a frame."""
+    """A row per lap: how it went, and the median time of a frame."""
     records = [
-        {key: lap[key] for key in OF_LAP}
-        | ({"foot_slide_cm": None} if lap["steps"] < FEWEST_STEPS else {})
-        | {f"{step}, mean ms": lap["milliseconds"][step] for step in STEPS}
-        | {"whole frame, median ms": median_time(lap)}
+        {**lap, "median": median_time(lap)} | ({"foot_slide_cm": None} if lap["steps"] < FEWEST_STEPS else {})
         for lap in found["laps"]
     ]
-    show = {"finished": lambda finished: "yes" if finished else "no"}
-    return parts.table(f"{name}-responsivity", records, show=show)
+    return parts.told_table(f"{name}-responsivity", records, "laps.table")
 
 
 def track_figures(found: Json) -> list[KeyFigure]:
@@ -243,7 +235,7 @@ def speed_table(found: Json, material: ReportMaterial) -> parts.Table:
         "source": "source",
     }
     title = "Comparison with published results"
-    return parts.table(f"{material.name}-published-speed", rows, heads, title, long=["source"])
+    return parts.table(f"{material.name}-published-speed", rows, heads, title)
 
 
 def median_time(found: Json) -> float:
@@ -273,14 +265,14 @@ def _track_hints(found: Json) -> Iterator[Hint]:
     reached, total = found["waypoints_reached"], found["waypoints"]
     if reached < total:
         head = f"The character reached {reached} of {total} waypoints."
-        yield Hint("warn", head, parts.words("speed.circles"))
+        yield Hint("warn", head, parts.words("speed.circles"), 40)
     drawn, predicted = found["largest_turn_degrees"], found["predicted_turn_degrees"]
     if drawn > FLIP_DEGREES:
         head = f"A joint turned by {drawn:.0f} degrees in one frame."
-        yield Hint("warn", head, parts.words("speed.flipped"))
+        yield Hint("warn", head, parts.words("speed.flipped"), 40)
     elif predicted > FLIP_DEGREES:
         head = f"The network predicted a turn of a joint by {predicted:.0f} degrees in one frame."
-        yield Hint("note", head, parts.words("speed.flips", drawn=f"{drawn:.0f}"))
+        yield Hint("note", head, parts.words("speed.flips", drawn=f"{drawn:.0f}"), 40)
 
 
 # The lines of time over size: whose times, in which phase mode, of what, and over which count of weights and
@@ -451,7 +443,7 @@ def compared_values(compared: Compared) -> Iterator[parts.ComparedValue]:
     yield value(32, number("largest turn, °"), turns)
     yield value(40, number("ms per frame, median"), frames, "Fastest", of_time)
     yield value(41, parts.Column.count("parameters of one frame"), counts)
-    yield value(110, parts.Column.size("in memory"), stored, "Smallest", of_size)
+    yield value(110, parts.Column("in memory", parts.format_bytes, "n"), stored, "Smallest", of_size)
 
 
 def in_exact_mode(compared: Compared) -> dict[str, Any]:

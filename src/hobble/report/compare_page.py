@@ -1,17 +1,16 @@
 """Renders the page that compares configurations into one self-contained HTML file."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from hobble.figure.pack import packed_body
 from hobble.report import parts
 from hobble.report.character import body_channel, skeleton_of
 from hobble.report.sections import own_section, passes_axis, published_curve, stage_charts
-from hobble.report.templates import compared_by, compressed, drawn_by_script, render_page
+from hobble.report.templates import compressed, render_page
 
-LARGEST_PAGE = 19_850_000  # bytes; the page must stay under 20 MB
-RESERVED = 60_000  # bytes of LARGEST_PAGE that are kept free for the page's text, style and tables
-NAME = "compare"  # the page's name
+# Bytes of the characters in a page together, at most; with scripts and charts it stays under 20 MB.
+LARGEST_CHARACTERS = 14_000_000
 
 
 def render_comparison(
@@ -27,72 +26,51 @@ def render_comparison(
     the page are left out. bundle: all scripts of the page as one script. measures: all measurements, for what
     they show.
     """
-    values = [value for each in compared_by(measures, "compared_values", compared) for value in each]
-    stages = {
-        name: [stage for stage in compared["stages"] if stage["configuration"] == name]
-        for name in parts.configuration_names(compared)
+    shown = {
+        name: [show(compared) for measure in measures if (show := measure.function(name)) is not None]
+        for name in ("compared_values", "compared_section")
     }
-    costs = stage_charts(stages, "compare", parts.words("stages.once"), parts.configuration_colours(compared))
-    overview = parts.PageSection("summary", [parts.SectionPart(0, configuration_table(compared, values))])
-    sections = parts.join_sections(
-        [
-            *compared_by(measures, "compared_section", compared),
-            own_section("training", training_curves(compared)),
-            own_section("costs", parts.ChartPair(costs)),
-            own_section(
-                "published",
-                parts.Paragraph(parts.words("published.read")),
-                published_table(compared),
-                long=True,
-            ),
-            own_section("origin", parts.TemplatePart("origin.html.j2")),
-        ]
-    )
-    playables = {name: spec for name, spec in (playables or {}).items() if spec}
-    names = parts.configuration_names(compared)
-    drawn = drawn_by_script([overview, *sections])
-    # Configurations with the same skeleton share a body. Its key is in the entry `body` of a character.
-    bodies = {spec["body"]: packed_body(skeleton_of(spec)) for spec in playables.values()}
-    used = sum(map(len, (bundle.encode(), compressed(bodies), *map(compressed, drawn.values()))))
-    on_page, left_out = select_fitting(playables, LARGEST_PAGE - RESERVED - used)
-    bodies = {spec["body"]: bodies[spec["body"]] for spec in on_page.values()}
+    values = sorted((v for each in shown["compared_values"] for v in each), key=lambda value: value.order)
+    names, on_page, left_out, used = parts.configuration_names(compared), {}, [], 0
+    for name, spec in (playables or {}).items():
+        size = len(compressed(spec))
+        if spec and used + size <= LARGEST_CHARACTERS:
+            used, on_page[name] = used + size, spec
+        elif spec:
+            left_out.append(name)
     return render_page(
-        "compare.html.j2",
-        {"name": NAME, **drawn, "playable": on_page, "bodies": bodies},
+        "compare",
+        [parts.SectionPart(0, configuration_table(compared, values), open=True)],
+        parts.join_sections([*shown["compared_section"], *own_sections(compared)]),
+        {
+            "playable": on_page,
+            # Configurations with the same skeleton share a body. Its key is in the entry `body`.
+            "bodies": {spec["body"]: packed_body(skeleton_of(spec)) for spec in on_page.values()},
+        },
         bundle,
-        name=NAME,
-        sections=sections,
-        overview=overview,
-        verdicts=sorted((v for v in values if v.verdict), key=lambda value: value.order),
         title=" and ".join(names) if len(names) < 3 else f"{len(names)} configurations",
         eyebrow="Hobble report · comparison of configurations",
         lead="The same measurements of " + ", ".join(names) + ", compared with published results.",
+        opening=None,
+        hints=[value.verdict for value in values if value.verdict],
         playable=list(on_page),
         left_out=left_out,
         hurts=any(body_channel(spec) for spec in on_page.values()),
     )
 
 
-def select_fitting(
-    playables: Mapping[str, Mapping[str, Any]], largest: int
-) -> tuple[dict[str, Mapping[str, Any]], list[str]]:
-    """The characters that fit into `largest` bytes together, and the names of those that are left out.
-
-    Characters are taken in order. After one that does not fit, a smaller one may still fit.
-
-    >>> select_fitting({"a": {"x": 1}, "b": {"x": "long" * 9}, "c": {"x": 2}}, 40)
-    ({'a': {'x': 1}, 'c': {'x': 2}}, ['b'])
-    """
-    kept: dict[str, Mapping[str, Any]] = {}
-    left_out, used = [], 0
-    for name, spec in playables.items():
-        needed = len(compressed(spec))
-        if used + needed > largest:
-            left_out.append(name)
-        else:
-            used += needed
-            kept[name] = spec
-    return kept, left_out
+def own_sections(compared: parts.Compared) -> Iterator[parts.PageSection]:
+    """The sections of a comparison that no measurement has."""
+    colours = parts.configuration_colours(compared)
+    stages = {
+        name: [stage for stage in compared["stages"] if stage["configuration"] == name] for name in colours
+    }
+    costs = stage_charts(stages, "compare", parts.words("stages.once"), colours)
+    read = parts.Paragraph(parts.words("published.read"))
+    yield own_section("training", training_curves(compared))
+    yield own_section("costs", parts.ChartGroup(costs))
+    yield own_section("published", read, published_table(compared), long=True)
+    yield own_section("origin", parts.TemplatePart("origin.html.j2"))
 
 
 # Column of a configuration's training history -> title of the horizontal axis.
@@ -136,7 +114,7 @@ def training_curves(compared: parts.Compared) -> parts.Chart | None:
 
 
 def configuration_table(compared: parts.Compared, measured: Sequence[parts.ComparedValue]) -> parts.Table:
-    """A row for each configuration: its settings, and the columns `measured` of its measurements."""
+    """A column for each configuration, with its settings and the values `measured`."""
     entries = {entry["configuration"]: entry for entry in compared["configurations"]}
 
     def by_name(key: str) -> dict[str, Any]:
@@ -144,7 +122,7 @@ def configuration_table(compared: parts.Compared, measured: Sequence[parts.Compa
         return {name: entry[key] for name, entry in entries.items()}
 
     channel_names = {name: ", ".join(channels) or "none" for name, channels in by_name("channels").items()}
-    columns = [
+    values = [
         *measured,
         parts.ComparedValue(50, parts.Column("channels"), channel_names),
         parts.ComparedValue(60, parts.Column("data set"), by_name("dataset")),
@@ -152,10 +130,12 @@ def configuration_table(compared: parts.Compared, measured: Sequence[parts.Compa
         parts.ComparedValue(90, parts.Column.count("units"), by_name("units")),
         parts.ComparedValue(100, parts.Column.number("passes"), by_name("passes")),
     ]
-    columns.sort(key=lambda column: column.order)
-    rows = [[name, *(column.values.get(name) for column in columns)] for name in entries]
-    heads = [parts.Column("configuration"), *(column.column for column in columns)]
-    return parts.Table("compare-configurations", heads, rows, "The configurations")
+    rows = [
+        [value.column.label, *(value.shown(name) for name in entries)]
+        for value in sorted(values, key=lambda value: value.order)
+    ]
+    heads = [parts.Column("value"), *(parts.Column(name, kind="n") for name in entries)]
+    return parts.Table("compare-configurations", heads, rows, "The configurations", first=len(rows))
 
 
 def published_table(compared: parts.Compared) -> parts.Table:

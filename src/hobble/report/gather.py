@@ -10,9 +10,6 @@ from hobble.models.load import load_network
 from hobble.report.parts import citation
 
 PUBLISHED = Path(__file__).with_name("published.yaml")
-# Columns of the training history. Each further column has the held-out error of one block of the network's
-# output Y. A block is a group of columns of Y, such as the joint positions.
-GENERAL_COLUMNS = ("pass", "section", "samples", "seconds", "train_mse", "held_out_mse")
 
 
 @dataclass(frozen=True)
@@ -67,42 +64,25 @@ class ReportMaterial:
             for entry in self.published[name]
         ]
 
-    @property
-    def blocks(self) -> list[str]:
-        """The columns of the history with the held-out error of one block of the output Y each."""
-        return [name for name in self.history if name not in GENERAL_COLUMNS]
 
+def gather(measures: Sequence[Any] = (), **given: Any) -> ReportMaterial:
+    """Read the files of a report.
 
-def gather(
-    *,
-    name: str,
-    dataset: str,
-    title: str | None,
-    splits: Mapping[str, str],
-    measures: Sequence[Any] = (),
-    **files: Any,
-) -> ReportMaterial:
-    """Read the files of a report. name, dataset, title, splits, measures: see `ReportMaterial`.
-
-    files: paths, with the keys `configuration`, `pipeline`, `history` and `weights`, one path each, and
-    `measurements`, `motion`, `labels`, `channels`, `terrain` and `rows`, some paths each. Raises InputError,
-    which names the file, if one cannot be read.
+    measures: all measurements. given: `name`, `dataset`, `title` and `splits` as in `ReportMaterial`; and
+    paths: under `configuration`, `pipeline`, `history` and `weights` one each, and under `measurements`,
+    `motion`, `labels`, `channels`, `terrain` and `rows` some each. Raises InputError, which names the file,
+    if one cannot be read.
     """
     return ReportMaterial(
-        name=name,
-        dataset=dataset,
-        title=title,
-        splits=dict(splits),
-        resolved=read_yaml(files["configuration"]) or {},
-        measurements={Path(path).stem: read_json(path) for path in files["measurements"]},
-        pipeline=read_json(files["pipeline"]),
-        history=read_numbers(files["history"]),
-        network=describe_network(files["weights"]),
-        motion=list(map(read_json, files["motion"])),
-        labels=list(map(read_json, files["labels"])),
-        channels=list(map(read_json, files["channels"])),
-        terrain_files=list(files.get("terrain", ())),
-        row_files=list(files.get("rows", ())),
+        **{key: given[key] for key in ("name", "dataset", "title", "splits")},
+        resolved=read_yaml(given["configuration"]) or {},
+        measurements={Path(path).stem: read_json(path) for path in given["measurements"]},
+        pipeline=read_json(given["pipeline"]),
+        history=read_numbers(given["history"]),
+        network=describe_network(given["weights"]),
+        **{key: list(map(read_json, given[key])) for key in ("motion", "labels", "channels")},
+        terrain_files=list(given["terrain"]),
+        row_files=list(given["rows"]),
         published=read_yaml(PUBLISHED),
         measures=measures,
     )
@@ -113,7 +93,7 @@ def describe_network(path: str | Path) -> dict[str, Any]:
 
     Keys of the result: `described`: the kind of network in words. `sizes`: of its layers, empty if it has
     none. `inputs`, `outputs`: numbers of columns of X and Y. `parameters`: their number. `bytes`: size of the
-    file. `skeleton`: a dict, empty if the file has none. `channels`: channel -> its columns.
+    file. `skeleton`: a dict, empty if the file has none.
     """
     network = load_network(path)
     return {
@@ -124,5 +104,4 @@ def describe_network(path: str | Path) -> dict[str, Any]:
         "parameters": network.parameter_count,
         "bytes": Path(path).stat().st_size,
         "skeleton": network.meta.get("skeleton") or {},
-        "channels": {name: list(columns) for name, columns in network.channels.items()},
     }

@@ -12,10 +12,9 @@ from hobble.figure.mesh import mesh_key
 from hobble.figure.pack import packed_body
 from hobble.report import parts
 from hobble.report import sections as own
-from hobble.report.character import body_channel, opening_channel, opening_slider
+from hobble.report.character import body_channel, ground_pictures, opening_channel, opening_slider
 from hobble.report.gather import ReportMaterial
-from hobble.report.recorded_motion import ground_pictures
-from hobble.report.templates import drawn_by_script, measured_by, render_page
+from hobble.report.templates import measured_by, render_page
 
 # Degrees a second: slower turning is not counted, because the body sways that much in a straight walk.
 TURNING = 40.0
@@ -29,56 +28,47 @@ def render_report(
     playable: Mapping[str, Any] | None = None,
     captured_and_predicted: Mapping[str, Any] | None = None,
     bundle: str = "",
-    hero: Mapping[str, Any] | None = None,
 ) -> str:
     """The report as one HTML document.
 
-    playable: from `character.playable_data` or
-    `character.playable_with_recogniser`. captured_and_predicted: from `recorded_motion.packed_comparisons`.
-    bundle: the page's scripts, from `bundle.bundle_page_scripts`. hero: the top of the page, from
-    `character.opening_slider`. A section without data is left out. Without `hero`, the characters at the top
-    begin in the network's start frame.
+    playable: from `character.playable_data` or `character.playable_with_recogniser`. captured_and_predicted:
+    from `character.packed_comparisons`. bundle: the page's scripts, from `bundle.bundle_page_scripts`.
+    A section without data is left out.
     """
     terrain = own.some_files(material.terrain_files, own.MOST_SHOWN)
     # Seconds of data at each speed, turning speed and channel value.
     counted = own.seconds_of_data(material.row_files, material.splits)
-    sections = parts.join_sections(
-        [*measured_by(material, "section"), *own.own_sections(material, counted, terrain)]
-    )
     playable, compared = playable or {}, captured_and_predicted or {}
     grounds = ground_pictures(terrain, material.network["skeleton"])
-    opening = hero or opening_slider(playable, material.measurements.values())
-    for_scripts = {
-        **drawn_by_script(sections),
-        "bodies": _bodies(material),
-        "hero": opening,
-        "grounds": grounds,
-        "name": material.name,
-        "playable": {material.name: playable} if playable else {},
-        "compare": compared,
-    }
+    opening = opening_slider(playable, material.measurements.values())
+    on_page = {material.name: playable} if playable else {}
     return render_page(
-        "page.html.j2",
-        for_scripts,
+        material.name,
+        [parts.SectionPart(0, parts.KeyFigures(key_figures(material)))],
+        parts.join_sections(
+            [*measured_by(material, "section"), *own.own_sections(material, counted, terrain)]
+        ),
+        {
+            "bodies": _bodies(material),
+            "hero": opening,
+            "grounds": grounds,
+            "playable": on_page,
+            "compare": compared,
+        },
         bundle,
-        material=material,
-        name=material.name,
+        dataset=material.dataset,
         title=material.title or material.name,
-        titled=bool(material.title),
+        headline=material.title,
         eyebrow=f"Hobble report · configuration {material.name} · data set {material.dataset}",
         lead=lead_text(material),
-        shown_part=opening["part"],
+        opening=opening,
         hurts=body_channel(playable) is not None,  # whether the reader can hurt parts of the body
         shown_channel=opening_channel(playable),
-        sections=sections,
-        figures=key_figures(material),
         hints=hints(material, counted["both"]),
-        playable=for_scripts["playable"],
+        playable=list(on_page),
         captured_and_predicted=[clip["name"] for clip in compared.get("clips", ())],
         grounds=[picture["name"] for picture in grounds["pictures"]],
-        configuration=yaml.safe_dump(
-            parts.json_data(dict(material.resolved)), sort_keys=False, allow_unicode=True
-        ),
+        configuration=yaml.safe_dump(dict(material.resolved), sort_keys=False, allow_unicode=True),
     )
 
 
@@ -158,7 +148,6 @@ def hints(material: ReportMaterial, both: Mapping[str, Array] | None = None) -> 
         *_gait_hints(material),
         *_turning_hints(both or {}),
         *_repair_hints(material),
-        *_cost_hints(material),
     ]
     return sorted(found, key=lambda each: (KIND_ORDER.index(each.kind), each.order))
 
@@ -217,13 +206,3 @@ def _repair_hints(material: ReportMaterial) -> Iterator[parts.Hint]:
     warned = {report["clip"] for report in reports if report.get("warnings")}
     if repaired or warned:
         yield parts.hint("hints.repaired", repaired=len(repaired), warned=len(warned))
-
-
-def _cost_hints(material: ReportMaterial) -> Iterator[parts.Hint]:
-    """The stage that took more than half of the time, if any."""
-    total = material.pipeline.get("total_seconds") or 0
-    for stage in material.pipeline.get("stages") or ():
-        if stage["seconds"] > 0.5 * total > 0:
-            name = "training-time" if stage["stage"] == "training" else "stage-time"
-            percent = f"{100 * stage['seconds'] / total:.0f}"
-            yield parts.hint(f"hints.{name}", stage=stage["stage"], percent=percent)

@@ -7,14 +7,13 @@ Measurements import from here what their sections need. A colour such as "@accen
 from __future__ import annotations
 
 import functools
-import json
 import math
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, ClassVar
 
-import numpy as np
+import pydantic_core
 import yaml
 from markupsafe import Markup
 
@@ -55,26 +54,16 @@ def format_number(value: float | None, digits: int = 3) -> str:
     return f"{value:,.{places}f}"
 
 
-def json_data(value: Any) -> Any:
-    """`value` as plain JSON data: tuples and arrays become lists, NaN and infinities become None."""
-    if isinstance(value, dict):
-        return {str(key): json_data(item) for key, item in value.items()}
-    if isinstance(value, np.ndarray | np.generic):
-        return json_data(value.tolist())
-    if isinstance(value, list | tuple):
-        return [json_data(item) for item in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
-
-
 def embedded(value: Any) -> Markup:
     """JSON that is safe inside a <script> element, whatever its strings contain.
 
+    Arrays become lists, NaN and infinities become null.
     "<", ">" and "&" are written as escapes, so that no string can end the element or open a comment.
 
     >>> embedded({"clip": "</script><b>"})
     Markup('{"clip":"\\\\u003c/script\\\\u003e\\\\u003cb\\\\u003e"}')
     """
-    text = json.dumps(json_data(value), separators=(",", ":"), allow_nan=False, ensure_ascii=True)
+    text = pydantic_core.to_json(value, inf_nan_mode="null", fallback=lambda array: array.tolist()).decode()
     return Markup(text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026"))
 
 
@@ -103,32 +92,30 @@ class Chart:
     option_layouts: Mapping[str, Mapping[str, Any]] = field(repr=False, default_factory=dict)
 
     def spec(self) -> dict[str, Any]:
-        """What the page's script needs to draw the chart: its id, traces, layout and menu."""
-        traces = list(self.traces) or list(next(iter(self.options.values()), ()))
+        """What the page's script needs to draw the chart: its id, layout, and the traces of each option."""
         return {
             "name": self.name,
-            "traces": _escaped(traces),
             "layout": _escaped({"height": self.height, **self.layout}),
             "options": [
-                {"label": key, "traces": _escaped(list(value)), "layout": self.option_layouts.get(key)}
-                for key, value in self.options.items()
+                {"traces": _escaped(list(value)), "layout": self.option_layouts.get(key)}
+                for key, value in (self.options or {"": self.traces}).items()
             ],
         }
 
 
 @dataclass(frozen=True)
 class ChartGroup:
-    """Small charts that share a title and a caption.
+    """Charts side by side, if the window is wide enough. None: there is nothing to show in this place.
 
-    name: the group's id in the page. choose: label of a menu that selects one of the `options` of all charts;
-    "" for no menu.
+    Small charts may share a title and a caption; then name is the group's id in the page. choose: label of a
+    menu that selects one of the `options` of all charts; "" for no menu.
     """
 
     kind: ClassVar[str] = "family"
-    name: str
-    title: str
-    caption: str
-    charts: Sequence[Chart] = field(repr=False)
+    charts: Sequence[Chart | None] = field(repr=False)
+    name: str = ""
+    title: str = ""
+    caption: str = ""
     choose: str = ""
 
 
@@ -230,18 +217,14 @@ class Column:
         """A column of whole numbers."""
         return cls(label, lambda value: f"{value:,.0f}", "n")
 
-    @classmethod
-    def size(cls, label: str) -> Column:
-        """A column of bytes."""
-        return cls(label, lambda value: format_bytes(float(value)), "n")
-
 
 @dataclass(frozen=True)
 class Table:
     """A table.
 
     name: of its CSV file, without ".csv". rows: a value for each column; None for an empty cell. title: the
-    line above the table; a click on it folds or unfolds the table.
+    line above the table; a click on it folds or unfolds the table. first: how many rows a page shows before
+    its script adds the others.
     """
 
     kind: ClassVar[str] = "table"
@@ -249,7 +232,7 @@ class Table:
     columns: Sequence[Column]
     rows: Sequence[Sequence[Any]] = field(repr=False)
     title: str = "Table of the values"
-    first: ClassVar[int] = 10  # rows that a page shows at first; its script adds the others
+    first: int = 10
 
     @property
     def cells(self) -> list[list[tuple[str, str, str]]]:
@@ -294,11 +277,6 @@ class Hint:
     order: int = 50
 
 
-def with_order(order: int, hints: Iterable[Hint]) -> Iterator[Hint]:
-    """The hints, each with this `order` instead of its own."""
-    return (replace(hint, order=order) for hint in hints)
-
-
 def citation(row: Mapping[str, Any], sources: Mapping[str, str]) -> str:
     """Source and table of a published number. If its publication also gives another value, this is added.
 
@@ -333,14 +311,6 @@ class KeyFigures:
 
 
 @dataclass(frozen=True)
-class ChartPair:
-    """Charts side by side, if the window is wide enough. None: there is nothing to show in this place."""
-
-    kind: ClassVar[str] = "pair"
-    charts: Sequence[Chart | None]
-
-
-@dataclass(frozen=True)
 class TemplatePart:
     """A part that a script of the page draws. template: file name of its HTML in this folder."""
 
@@ -348,7 +318,7 @@ class TemplatePart:
     template: str
 
 
-Content = Chart | ChartGroup | Table | Paragraph | KeyFigures | ChartPair | TemplatePart
+Content = Chart | ChartGroup | Table | Paragraph | KeyFigures | TemplatePart
 
 
 @dataclass(frozen=True)
@@ -356,15 +326,12 @@ class SectionPart:
     """One part of a section.
 
     order: its place in the section, from 0 (top) to 100 (end). content: None if there is nothing to show.
-    tall: whether the content is a chart with a row for each clip. open: whether the content is a table that
-    is unfolded at first. short: whether it is a table that needs no scroll bar.
+    open: whether the content is a table that is unfolded at first, and then has no scroll bar.
     """
 
     order: int
     content: Content | None = field(repr=False)
-    tall: bool = False
     open: bool = False
-    short: bool = False
 
 
 @dataclass(frozen=True)
@@ -468,7 +435,7 @@ class ComparedValue:
 
     >>> seconds = {"a": 2.0, "b": 3.0}
     >>> sentence = "a frame of {name} takes {value} s"
-    >>> ComparedValue(1, Column.number("s", 2), seconds, "Fastest", sentence).verdict
+    >>> ComparedValue(1, Column.number("s", 2), seconds, "Fastest", sentence).verdict.text
     'A frame of a takes 2.0 s; a frame of b takes 3.0 s.'
     """
 
@@ -479,28 +446,28 @@ class ComparedValue:
     sentence: str = ""
     more: str = ""
 
-    @property
-    def ranked(self) -> list[str]:
-        """The configurations with a value, if there is a verdict on it, the lowest first."""
-        known = {name: value for name, value in self.values.items() if value is not None}
-        return sorted(known, key=lambda name: (known[name], name)) if self.best else []
+    def shown(self, name: str) -> str | None:
+        """The value of a configuration as text; None if there is none."""
+        value = self.values.get(name)
+        return None if value is None else self.column.show(value)
 
     @property
-    def verdict(self) -> str:
-        """The lowest value compared with the second; "" if fewer than two configurations have a value."""
-        if len(self.ranked) < 2:
-            return ""
+    def verdict(self) -> Hint | None:
+        """The lowest value compared with the second; None if fewer than two configurations have a value."""
+        known = sorted((value, name) for name, value in self.values.items() if value is not None)
+        if not self.best or len(known) < 2:
+            return None
+        (low, best), (other, _), *_ = known
         first, second = (
-            self.sentence.format(name=name, value=self.column.show(self.values[name]))
-            for name in self.ranked[:2]
+            self.sentence.format(name=name, value=self.column.show(value)) for value, name in known[:2]
         )
-        low, other = (self.values[name] for name in self.ranked[:2])
-        text = f"{first}; {'almost equal: ' if other <= low * (1 + EQUAL) else ''}{second}.{self.more}"
-        return text[0].upper() + text[1:]
+        almost = "almost equal: " if other <= low * (1 + EQUAL) else ""
+        text = f"{first}; {almost}{second}.{self.more}"
+        return Hint("good", f"{self.best}: {best}.", text[0].upper() + text[1:])
 
 
 Records = Sequence[Mapping[str, Any]]  # rows of a table: key -> value
-LONG = 80  # a text of more characters is broken into lines
+LONG = 50  # a text of more characters is broken into lines
 CAPTIONS = Path(__file__).with_name("captions.yaml")
 
 
@@ -560,12 +527,11 @@ def table(
     heads: Mapping[str, str] | None = None,
     title: str = "",
     show: Mapping[str, Callable[[Any], str]] | None = None,
-    long: Collection[str] = (),
 ) -> Table:
     """A table with a row for each record. Whole numbers are shown in full, others with three digits.
 
     heads: key of a record -> heading of its column; by default all keys of the first record, in words.
-    show: key -> function from a value to its text. long: keys of long texts.
+    show: key -> function from a value to its text.
     """
     heads = heads or {key: in_words(key) for key in (records[0] if records else ())}
     columns = {}
@@ -576,7 +542,7 @@ def table(
         elif isinstance(value, bool):
             columns[key] = Column(head, lambda is_so: "yes" if is_so else "no")
         elif isinstance(value, str):
-            is_long = key in long or any(len(r.get(key) or "") > LONG for r in records)
+            is_long = any(len(r.get(key) or "") > LONG for r in records)
             columns[key] = Column(head, kind="long" if is_long else "text")
         else:
             columns[key] = Column.count(head) if isinstance(value, int) else Column.number(head)

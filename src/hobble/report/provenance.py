@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import pandas
+import psutil
 
 from hobble.core.errors import InputError
 from hobble.core.files import read_json, read_numbers
@@ -39,15 +40,11 @@ def versions() -> dict[str, str]:
 
 def machine() -> dict[str, Any]:
     """System, processor, cores and memory of this machine, but not the name of the host or the user."""
-    try:
-        memory_gb = round(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") / 1e9, 1)
-    except (ValueError, OSError, AttributeError):
-        memory_gb = None
     return {
         "system": f"{platform.system()} {platform.machine()}",
         "processor": processor_name(),
         "cores": os.cpu_count(),
-        "memory_gb": memory_gb,
+        "memory_gb": round(psutil.virtual_memory().total / 1e9, 1),
     }
 
 

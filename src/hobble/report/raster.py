@@ -4,7 +4,6 @@ The triangles are drawn by a compiled function. It releases Python's global lock
 can be drawn at once.
 """
 
-import functools
 import io
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -37,30 +36,6 @@ def corner_normals(corners: Array, faces: Any) -> Array:
     normal = np.repeat(np.cross(b - a, c - a), 3, axis=0)
     out = np.stack([np.bincount(faces.ravel(), axis, len(corners)) for axis in normal.T], axis=1)
     return out / np.maximum(np.linalg.norm(out, axis=1, keepdims=True), 1e-12)
-
-
-@njit(nogil=True)
-def draw_ground(
-    place: Array, seen: Array, wide: Array, x: float, z: float, cell: float, colours: Array
-) -> Array:  # pragma: no cover
-    """RGB (H, W, 3), from 0 to 1, of the ground with a grid of lines every `cell` cm.
-
-    place: (H, W, 2) the point of the ground that each pixel shows, relative to (x, z), cm. seen: (H, W) share
-    of the ground's colour in each pixel; the background has the remaining share. wide: (H, W) half the width
-    of a line, cm. colours: (3, 3) RGB of background, ground and lines.
-    """
-    out = np.empty((*seen.shape, 3))
-    for i in range(seen.shape[0]):
-        for j in range(seen.shape[1]):
-            a, b = (place[i, j, 0] + x) / cell, (place[i, j, 1] + z) / cell
-            # Distance to the nearest line, cm.
-            near = cell * min(abs(a - np.round(a)), abs(b - np.round(b)))
-            # The share of the line's colour. It falls smoothly to 0, so that lines have no jagged edges.
-            line = 0.30 * min(max(1.4 - near / wide[i, j], 0.0), 1.0) * seen[i, j]
-            for k in range(3):
-                paper, ground, lines = colours[0, k], colours[1, k], colours[2, k]
-                out[i, j, k] = paper + seen[i, j] * (ground - paper) + line * (lines - ground)
-    return out
 
 
 @njit(nogil=True)
@@ -97,39 +72,12 @@ def draw_triangles(
                         picture[y, x, n] = u * colours[i, n] + v * colours[j, n] + w * colours[k, n]
 
 
-@njit(nogil=True)
-def finish_picture(picture: Array, depth: Array, background: Array, scale: int) -> Any:  # pragma: no cover
-    """The finished picture: RGB bytes (H, W, 3).
-
-    Each of its pixels is the mean of a square of `scale` by `scale` pixels of `picture`. Where nothing was
-    drawn, the background shows. picture: (scale * H, scale * W, 3) RGB from 0 to 1. depth: (scale * H,
-    scale * W), infinite where nothing was drawn. background: (H, W, 3) RGB from 0 to 1.
-    """
-    height, width = background.shape[:2]
-    out = np.empty((height, width, 3), np.uint8)
-    count = scale * scale
-    for i in range(height):
-        for j in range(width):
-            drawn, red, green, blue = 0, 0.0, 0.0, 0.0
-            for y in range(scale * i, scale * i + scale):
-                for x in range(scale * j, scale * j + scale):
-                    if depth[y, x] < np.inf:
-                        drawn += 1
-                        red += picture[y, x, 0]
-                        green += picture[y, x, 1]
-                        blue += picture[y, x, 2]
-            for k, total in enumerate((red, green, blue)):
-                value = total / count + (1 - drawn / count) * background[i, j, k]
-                out[i, j, k] = np.uint8(min(max(np.round(255 * value), 0.0), 255.0))
-    return out
-
-
 SUPERSAMPLING = 2  # rendered pixels per picture pixel, in each direction
 # Colours: red, green and blue from 0 to 1. LINE: the grid on the ground. A part of the body can be coloured
 # by a value, such as the severity of an injury: BODY for value 0, MIDDLE for 0.5, HIGHEST for 1.
-BACKGROUND = np.array([0.953, 0.945, 0.925])
-GROUND = np.array([0.905, 0.888, 0.850])
-LINE = np.array([0.60, 0.61, 0.62])
+BACKGROUND = np.float32([0.953, 0.945, 0.925])
+GROUND = np.float32([0.905, 0.888, 0.850])
+LINE = np.float32([0.60, 0.61, 0.62])
 BODY = np.array([0.70, 0.735, 0.765])
 MIDDLE, HIGHEST = np.array([0.914, 0.725, 0.286]), np.array([0.761, 0.220, 0.169])
 GRID = 50.0  # cm between the lines on the ground
@@ -218,14 +166,11 @@ class BodyRenderer:
         rim_light = np.array([0.9 * np.sin(camera.yaw + 2.5), 0.35, 0.9 * np.cos(camera.yaw + 2.5)])
         # The shadow: the body's corners, moved along the key light to the ground. The body is closed, so the
         # triangles on one side of it cover all of its shadow.
-        on_ground = corners - key_light * (corners[:, 1:2] / key_light[1])
-        on_ground, size = camera.project(on_ground), camera.size
-        dark, shadow = np.zeros((size, size, 3), np.float32), np.full((size, size), np.inf, np.float32)
-        draw_triangles(on_ground, np.zeros_like(corners), self._body.faces, dark, shadow)
-        background = _ground(camera)
-        background *= (
-            1 - 0.42 * gaussian_filter(np.isfinite(shadow).astype(np.float32), size / 130)[..., None]
-        )
+        on_ground, size = corners - key_light * (corners[:, 1:2] / key_light[1]), camera.size
+        dark, depth = np.zeros((size, size, 3), np.float32), np.full((size, size), np.inf, np.float32)
+        draw_triangles(camera.project(on_ground), np.zeros_like(corners), self._body.faces, dark, depth)
+        shadow = gaussian_filter(np.isfinite(depth).astype(np.float32), size / 130)
+        background = _ground(camera) * (1 - 0.42 * shadow[..., None])
         normal = corner_normals(corners, self._body.faces)
         # Light from the sky, weaker where the body covers itself; then the key light and the rim light.
         brightness = (
@@ -233,11 +178,12 @@ class BodyRenderer:
             + 0.58 * np.maximum(normal @ key_light, 0)
             + 0.16 * np.maximum(normal @ rim_light, 0) ** 2
         )
-        colours = self._colours(values) * brightness[:, None]
-        fine = camera.size * SUPERSAMPLING
-        picture, depth = np.zeros((fine, fine, 3), np.float32), np.full((fine, fine), np.inf, np.float32)
+        colours = np.minimum(self._colours(values) * brightness[:, None], 1.0)
+        picture = np.repeat(np.repeat(background, SUPERSAMPLING, axis=0), SUPERSAMPLING, axis=1)
+        depth = np.full(picture.shape[:2], np.inf, np.float32)
         draw_triangles(camera.project(corners, SUPERSAMPLING), colours, self._body.faces, picture, depth)
-        return finish_picture(picture, depth, background, SUPERSAMPLING)
+        fine = Image.fromarray(np.uint8(255 * picture + 0.5))
+        return np.array(fine.reduce(SUPERSAMPLING))
 
     def _colours(self, values: Array | None) -> Array:
         """RGB (V, 3) of the corners, from BODY (grey) over MIDDLE (amber) to HIGHEST (red)."""
@@ -252,37 +198,25 @@ class BodyRenderer:
         return np.einsum("vk,vkc->vc", self._body.weights, bones[self._body.bones_of_corner])
 
 
-@functools.lru_cache(maxsize=4)
-def _ground_in_pixels(
-    yaw: float, pitch: float, distance: float, size: int, height: float
-) -> tuple[Array, Array, Array]:
-    """What each pixel shows of the ground.
-
-    height: of the camera's target, cm. The other arguments are those of `Camera`. Returns
-
-    - (size, size, 2) x and z of the point on the ground, relative to the point under the target, cm;
-    - (size, size) how much of the ground's colour the pixel has: 1 only ground, 0 only background;
-    - (size, size) half the width of a grid line at this point, cm.
-
-    The result does not depend on x and z of the target, so it is kept for the next frames of a film.
-    """
-    camera = Camera(np.array([0.0, height, 0.0]), yaw, pitch, distance, size)
-    pixel = np.arange(size) + 0.5 - size / 2
-    x, y = np.meshgrid(pixel, -pixel)
-    rays = np.stack([x, y, np.full_like(x, size * 1.75)], axis=-1) @ camera.axes
-    # The rays are in pixels. A ray times this factor reaches the ground.
-    cm_per_pixel = camera.eye[1] / np.maximum(-rays[..., 1], 1e-6)
-    place = camera.eye[[0, 2]] + rays[..., [0, 2]] * cm_per_pixel[..., None]
-    seen = np.clip(1.25 - np.linalg.norm(place, axis=-1) / FADE, 0, 1)
-    half_width = 0.35 + 96 * np.maximum(cm_per_pixel / size, 1e-5)
-    return place, np.where(rays[..., 1] < -1e-6, seen, 0.0), half_width  # rays upwards meet no ground
-
-
 def _ground(camera: Camera) -> Array:
     """RGB (size, size, 3) of the ground at height 0 with its grid, fading into the background far away."""
-    x, height, z = (float(v) for v in camera.target)
-    pixels = _ground_in_pixels(camera.yaw, camera.pitch, camera.distance, camera.size, height)
-    return draw_ground(*pixels, x, z, GRID, np.array([BACKGROUND, GROUND, LINE]))
+    pixel = np.arange(camera.size, dtype=np.float32) + 0.5 - camera.size / 2
+    rays = np.stack(
+        [*np.meshgrid(pixel, -pixel), np.full((camera.size,) * 2, 1.75 * camera.size, np.float32)]
+    )
+    x, y, z = np.tensordot(camera.axes.T.astype(np.float32), rays, axes=1)
+    # The rays are in pixels. A ray times this factor reaches the ground; rays upwards meet no ground.
+    eye, cm_per_pixel = camera.eye.astype(np.float32), np.float32(camera.eye[1]) / np.maximum(-y, 1e-6)
+    x, z = eye[0] + x * cm_per_pixel, eye[2] + z * cm_per_pixel
+    away = np.hypot(x - np.float32(camera.target[0]), z - np.float32(camera.target[2]))
+    seen = np.where(y < -1e-6, np.clip(1.25 - away / FADE, 0, 1), 0)[
+        ..., None
+    ]  # share of the ground's colour
+    to_line = np.minimum(*(np.abs(way - GRID * np.round(way / GRID)) for way in (x, z)))
+    # The share of the line's colour. It falls smoothly to 0, so that lines have no jagged edges.
+    half_width = 0.35 + 96 * np.maximum(cm_per_pixel / camera.size, 1e-5)
+    line = 0.30 * np.clip(1.4 - to_line / half_width, 0, 1)[..., None] * seen
+    return BACKGROUND + seen * (GROUND - BACKGROUND) + line * (LINE - GROUND)
 
 
 def webp(pictures: Sequence[Picture], loop: int, quality: int, effort: int) -> bytes:

@@ -30,6 +30,9 @@ SPEED_EDGES = np.arange(0, 6.01, 0.2)  # edges of the bins of speeds, metres a s
 TURN_EDGES = np.arange(-220, 221, 20.0)  # of turning speeds, degrees a second, positive to the left
 TENTHS = np.arange(1, 11)  # middles of the bins of channel values, in tenths of the channel's highest value
 BLOCK_COLOURS = ("@g1", "@g2", "@g3", "@g4", "@g5", "@g0", "@predicted")
+# Columns of the training history. Each further column has the held-out error of one block of the network's
+# output Y. A block is a group of columns of Y, such as the joint positions.
+GENERAL_COLUMNS = ("pass", "section", "samples", "seconds", "train_mse", "held_out_mse")
 # The network's output consists of blocks. The names of these blocks do not say that they belong to the path,
 # so the page uses other names.
 PATH_PARTS = {"position": "path position", "direction": "path direction"}
@@ -58,10 +61,10 @@ def own_sections(
     missing = ", ".join(material.pipeline.get("missing") or ())
     fits = fit_table(terrain)
     on_hills = [parts.TemplatePart("terrain.html.j2"), parts.Paragraph(parts.words("terrain.table")), fits]
-    yield own_section("training", learning_curve(material), history_table(material))
+    yield own_section("training", learning_curve(material))
     yield own_section(
         "data",
-        parts.ChartPair([gait_chart(material), speed_and_turn_chart(counted)]),
+        parts.ChartGroup([gait_chart(material), speed_and_turn_chart(counted)]),
         *channel_charts(counted, shown_names(material.network["skeleton"])),
         remarks_table(material),
         clip_table(material),
@@ -70,7 +73,7 @@ def own_sections(
     yield own_section("terrain", *(on_hills if fits.rows else [parts.Paragraph(parts.words("terrain.flat"))]))
     yield own_section(
         "costs",
-        parts.ChartPair(costs),
+        parts.ChartGroup(costs),
         stage_table(material),
         parts.Paragraph(parts.words("stages.missing", files=missing)) if missing else None,
     )
@@ -138,10 +141,11 @@ def learning_curve(material: ReportMaterial) -> parts.Chart:
     traces = [parts.line_trace("training", x, history.get("train_mse", []), "@muted")]
     if has_held_out:
         traces.append(parts.line_trace("held out", x, history["held_out_mse"], "@accent", width=3))
-    known = {name: [v for v in history[name] if v is not None] for name in material.blocks}
-    last = {name: values[-1] for name, values in known.items() if values}
+    known = {name: [v for v in history[name] if v is not None] for name in history}
+    last = {name: v[-1] for name, v in known.items() if v and name not in GENERAL_COLUMNS}
     for i, name in enumerate(sorted(last, key=lambda name: last[name], reverse=True)):
-        label = f"{part_in_words(name.removeprefix('held_out_'))}, {parts.format_number(last[name])}"
+        block = name.removeprefix("held_out_")
+        label = f"{PATH_PARTS.get(block, block.replace('_', ' '))}, {parts.format_number(last[name])}"
         colour = BLOCK_COLOURS[i % len(BLOCK_COLOURS)]
         traces.append(parts.line_trace(label, x, history[name], colour, width=1.1))
     more = ["held-out" if has_held_out else "none-held-out"]
@@ -152,26 +156,6 @@ def learning_curve(material: ReportMaterial) -> parts.Chart:
     errors = parts.log_axis("mean squared error", [v for t in traces for v in t["y"]])
     layout = {"xaxis": parts.axis("pass", rangemode="tozero"), "yaxis": errors}
     return parts.chart("learning-curve", traces, layout, 440, more=more)
-
-
-def part_in_words(name: str) -> str:
-    """A block of the output in words, such as "joint velocity" or "path position"."""
-    return PATH_PARTS.get(name, name.replace("_", " "))
-
-
-def history_table(material: ReportMaterial) -> parts.Table:
-    """A row for each section (part of a pass) of training, as in history.csv."""
-
-    def head(name: str) -> str:
-        held_out = "held out " if name.startswith("held_out_") else ""
-        return held_out + part_in_words(name.removeprefix("held_out_"))
-
-    rows = zip(*material.history.values(), strict=False)
-    records = [dict(zip(material.history, row, strict=True)) for row in rows]
-    whole = {"pass", "section", "samples"}
-    records = [{k: int(v) if k in whole and v is not None else v for k, v in r.items()} for r in records]
-    heads = {name: head(name) for name in material.history}
-    return parts.table(f"{material.name}-history", records, heads, parts.words("sections.training.table"))
 
 
 def fit_table(paths: Iterable[str | Path]) -> parts.Table:
@@ -332,7 +316,8 @@ def speed_and_turn_chart(counted: Mapping[str, Any]) -> parts.Chart | None:
         "zmin": 0,
     }
     turning = parts.axis("degrees per second (positive: to the left)", automargin=True)
-    return _coverage_chart("speed-turn", trace, {"xaxis": parts.axis("m/s"), "yaxis": turning}, 300, counted)
+    layout = {"xaxis": parts.axis("m/s"), "yaxis": turning}
+    return parts.chart("speed-turn", [trace], layout, 300, estimate=counted["estimate"])
 
 
 def channel_charts(counted: Mapping[str, Any], shown_name: Callable[[str], str] = str) -> list[parts.Chart]:
@@ -352,26 +337,10 @@ def channel_charts(counted: Mapping[str, Any], shown_name: Callable[[str], str] 
         trace |= {"colorscale": [[0, "@hurt-low"], [1, "@hurt-high"]], "xgap": 3, "ygap": 3}
         across = parts.axis(definition.value_word, dtick=tenth, range=[0.4 * tenth, 10.6 * tenth])
         layout, height = {"xaxis": across, "yaxis": {"automargin": True}}, 120 + 24 * len(columns)
-        values = {"of": definition.title, "value": definition.value_word, "entry": "coverage"}
-        charts.append(_coverage_chart(f"{name}-coverage", trace, layout, height, counted, **values))
+        values = {"of": definition.title, "value": definition.value_word, "estimate": counted["estimate"]}
+        name = f"{name}-coverage"
+        charts.append(parts.chart(name, [trace], layout, height, entry="coverage", **values))
     return charts
-
-
-def _coverage_chart(
-    name: str,
-    trace: parts.Trace,
-    layout: Mapping[str, Any],
-    height: int,
-    counted: Mapping[str, Any],
-    **values: Any,
-) -> parts.Chart:
-    """A chart of the seconds that were counted, with empty cells where there are none.
-
-    If only a part of the data was read, the rest may have data for a cell that is empty.
-    """
-    estimate = counted["estimate"]
-    amount = "little or no" if estimate else "no"
-    return parts.chart(name, [trace], layout, height, amount=amount, estimate=estimate, **values)
 
 
 def _seconds_trace(x: Sequence, y: Sequence, seconds: Array, hover: str) -> parts.Trace:

@@ -12,15 +12,7 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined, Template, sel
 from markupsafe import Markup, escape
 
 from hobble.report.gather import ReportMaterial
-from hobble.report.parts import (
-    Chart,
-    PageSection,
-    Table,
-    embedded,
-    format_bytes,
-    format_duration,
-    format_number,
-)
+from hobble.report.parts import Chart, PageSection, SectionPart, Table, embedded
 from hobble.report.provenance import git_commit, machine, versions
 
 FOLDER = Path(__file__).parent
@@ -36,7 +28,6 @@ def load_template(name: str) -> Template:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters.update(duration=format_duration, size=format_bytes, number=format_number)
     environment.filters.update(hash_source=hash_source, code=with_code)
     return environment.get_template(name)
 
@@ -46,40 +37,51 @@ def with_code(text: str) -> Markup:
     return Markup(re.sub("`([^`]*)`", r"<code>\1</code>", str(escape(text))))
 
 
-def render_page(template: str, for_scripts: Mapping[str, Any], bundle: str, **values: Any) -> str:
+def render_page(
+    name: str,
+    summary: Iterable[SectionPart],
+    sections: Iterable[PageSection],
+    for_scripts: Mapping[str, Any],
+    bundle: str,
+    **values: Any,
+) -> str:
     """A page as one HTML document, with style, scripts and data inside.
 
-    template: its file. for_scripts: part -> JSON data for the scripts. bundle: all scripts as one script.
-    values: the template's other values.
+    name: of the folder of results. summary: parts that are always open, before the sections. for_scripts:
+    part -> JSON data for the scripts. bundle: all scripts as one script. values: the template's other values.
 
     Texts from the user's files cannot become HTML: the template escapes every value, and the data for the
     scripts is JSON without any "<". Parts that are not needed at once are compressed. The browser runs only
     scripts whose hash is in the page's policy.
     """
-    at_once = AT_ONCE if "hero" in for_scripts else ()
-    return load_template(template).render(
-        embedded={name: embedded(part) for name, part in for_scripts.items() if name in at_once},
-        compressed={name: compressed(part) for name, part in for_scripts.items() if name not in at_once},
-        style=page_style(),
+    summary, sections = list(summary), list(sections)
+    parts = [*summary, *(part for section in sections for part in section.parts)]
+    given = {"name": name, **for_scripts, **drawn_by_script(parts)}
+    at_once = AT_ONCE if "hero" in given else ()
+    return load_template("page.html.j2").render(
+        name=name,
+        summary=summary,
+        sections=sections,
+        embedded={key: embedded(part) for key, part in given.items() if key in at_once},
+        compressed={key: compressed(part) for key, part in given.items() if key not in at_once},
+        style=own_file("page.css"),
         bundle=mark_safe("the bundle", bundle),
-        policy=policy(bundle, page_style()),
+        policy=policy(bundle, own_file("page.css")),
         provenance={"commit": git_commit(FOLDER), "machine": machine(), "versions": versions()},
         **values,
     )
 
 
-def drawn_by_script(sections: Iterable[PageSection]) -> dict[str, dict[str, Any]]:
+def drawn_by_script(parts: Iterable[SectionPart]) -> dict[str, dict[str, Any]]:
     """The data of charts and long tables for the page's script: {"charts": name -> data, "tables": ...}.
 
     The page itself has the first rows of a table.
     """
-    contents = [part.content for section in sections for part in section.parts]
-    found = [one for content in contents for one in getattr(content, "charts", [content])]
+    found = [one for part in parts for one in getattr(part.content, "charts", [part.content])]
+    tables = [one for one in found if isinstance(one, Table) and len(one.rows) > one.first]
     return {
         "charts": {one.name: one.spec() for one in found if isinstance(one, Chart)},
-        "tables": {
-            one.name: one.spec() for one in found if isinstance(one, Table) and len(one.rows) > one.first
-        },
+        "tables": {one.name: one.spec() for one in tables},
     }
 
 
@@ -106,14 +108,9 @@ def hash_source(text: str) -> str:
     return f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'"
 
 
-def page_style() -> Markup:
-    """The pages' style sheet."""
-    return mark_safe("page.css", (FOLDER / "page.css").read_text(encoding="utf-8"))
-
-
-def questionnaire_script() -> Markup:
-    """The script of the questionnaire. Unlike the pages' scripts, it is a single file without imports."""
-    return mark_safe("questionnaire.js", (FOLDER / "questionnaire.js").read_text(encoding="utf-8"))
+def own_file(name: str) -> Markup:
+    """The style sheet of the pages, page.css, or the script of the questionnaire, a file without imports."""
+    return mark_safe(name, (FOLDER / name).read_text(encoding="utf-8"))
 
 
 def mark_safe(name: str, text: str) -> Markup:
@@ -131,11 +128,3 @@ def measured_by(material: ReportMaterial, name: str) -> Iterator[Any]:
     for measure in material.measures:
         if (show := measure.function(name)) is not None:
             yield show(material.results_of(measure.name), material)
-
-
-def compared_by(measures: Iterable[Any], name: str, compared: Mapping[str, Any]) -> list[Any]:
-    """What the function `name` of each measurement returns for compare.json.
-
-    measures: of the type `hobble.measures.measure.Measure`, which says what functions there are.
-    """
-    return [show(compared) for measure in measures if (show := measure.function(name)) is not None]

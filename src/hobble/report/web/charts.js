@@ -55,14 +55,13 @@ export const startCharts = () => {
     const spec = material.charts[element.dataset.chart];
     if (!spec) return;
     const narrow = element.clientWidth < 520;
-    const chosen = spec.options.length ? spec.options[chosenOptions.get(element) || 0] : null;
+    const chosen = spec.options[chosenOptions.get(element) || 0];
     const config = {
       displaylogo: false, responsive: true, displayModeBar: narrow ? false : "hover",
       modeBarButtonsToRemove: ["select2d", "lasso2d", "autoScale2d", "sendChartToCloud", "sendDataToCloud"],
       toImageButtonOptions: { format: "svg", filename: spec.name },
     };
-    const traces = resolve(chosen ? chosen.traces : spec.traces);
-    const fullLayout = layout(chosen && chosen.layout ? merge(spec, { layout: chosen.layout }) : spec, narrow);
+    const traces = resolve(chosen.traces), fullLayout = layout(merge(spec, { layout: chosen.layout ?? {} }), narrow);
     const first = !chosenOptions.has(element);
     if (first) chosenOptions.set(element, 0);
     globalThis.Plotly.react(element, traces, fullLayout, config);

@@ -8,7 +8,7 @@ const TURN = 32767; // a component of a rotation that is 1 is stored as this int
 const UNIT = .01; // cm; positions are stored in steps of this length
 const STEPS_PER_CM = 10; // of lengths on a fitted ground
 
-// root, pose, turn: from `hobble.report.recorded_motion.packed_motion`. In the result, frames: their number. roots: positions of the root,
+// root, pose, turn: from `hobble.report.character.packed_motion`. In the result, frames: their number. roots: positions of the root,
 // three numbers a frame, cm.
 const createMotion = ({ root, pose, turn }, boneCount) => {
   const roots = new Float32Array(bytes(root)), steps = new Int16Array(bytes(pose)), turns = Float32Array.from(new Int16Array(bytes(turn)), (v) => v / TURN);
