@@ -75,9 +75,9 @@ def draw_triangles(
 SUPERSAMPLING = 2  # rendered pixels per picture pixel, in each direction
 # Colours: red, green and blue from 0 to 1. LINE: the grid on the ground. A part of the body can be coloured
 # by a value, such as the severity of an injury: BODY for value 0, MIDDLE for 0.5, HIGHEST for 1.
-BACKGROUND = np.float32([0.953, 0.945, 0.925])
-GROUND = np.float32([0.905, 0.888, 0.850])
-LINE = np.float32([0.60, 0.61, 0.62])
+BACKGROUND = np.array([0.953, 0.945, 0.925], np.float32)
+GROUND = np.array([0.905, 0.888, 0.850], np.float32)
+LINE = np.array([0.60, 0.61, 0.62], np.float32)
 BODY = np.array([0.70, 0.735, 0.765])
 MIDDLE, HIGHEST = np.array([0.914, 0.725, 0.286]), np.array([0.761, 0.220, 0.169])
 GRID = 50.0  # cm between the lines on the ground
