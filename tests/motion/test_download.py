@@ -20,29 +20,27 @@ SHA256 = hashlib.sha256(CONTENT).hexdigest()
 
 
 @pytest.fixture
-def fetch(server, tmp_path: Path, monkeypatch) -> Callable[..., Path]:
-    def run() -> Path:
-        path = tmp_path / "kept/walk.bvh"
+def fetch(server, tmp_path: Path, monkeypatch) -> Callable[..., bytes]:
+    """Download what the server has. `waits`: the pauses; nothing but the whole file is left."""
+    path, waits = tmp_path / "kept/walk.bvh", list[float]()
+
+    def run(url: str = "") -> bytes:
         server.content = server.content or CONTENT
-        download_clip(server.url, path, SHA256, "data/mine")
-        return path
+        try:
+            download_clip(url or server.url, path, SHA256, "data/mine")
+        finally:
+            assert set(path.parent.iterdir()) <= {path}
+        return path.read_bytes()
 
-    run.waits = []
-    run.folder = tmp_path / "kept"
-    monkeypatch.setattr(module.time, "sleep", run.waits.append)
+    run.waits, run.path = waits, path
+    monkeypatch.setattr(module.time, "sleep", waits.append)
     return run
-
-
-def test_a_downloaded_file_is_complete_and_no_partial_file_is_left(server, fetch):
-    path = fetch()
-    assert path.read_bytes() == CONTENT
-    assert [p.name for p in path.parent.iterdir()] == ["walk.bvh"]  # no part is left
-    assert (server.requests, fetch.waits) == (1, [])
 
 
 @pytest.mark.parametrize(
     ("faults", "announces", "waits"),
     [
+        ([], True, []),
         ([503, 500], True, [1, 2]),
         ([70_000, 50_000], True, [1, 2]),
         ([70_000], False, [1]),  # its checksum shows that it was cut
@@ -50,75 +48,68 @@ def test_a_downloaded_file_is_complete_and_no_partial_file_is_left(server, fetch
 )
 def test_a_download_with_faults_becomes_complete(server, fetch, faults, announces, waits):
     server.faults, server.announces = faults, announces
-    assert fetch().read_bytes() == CONTENT
+    assert fetch() == CONTENT
     assert fetch.waits == waits
 
 
 def test_checksum_lists_may_have_either_line_ending(server, fetch):
     server.content = CONTENT.replace(b"\n", b"\r\n")
-    assert fetch().read_bytes() == server.content
+    assert fetch() == server.content
 
 
-def test_a_wrong_checksum_is_refused_and_the_file_is_deleted(server, fetch):
+def test_a_wrong_checksum_is_refused(server, fetch):
     server.content = CONTENT + b"."
-    found = hashlib.sha256(server.content).hexdigest()
     with pytest.raises(InputError) as refused:
         fetch()
     assert str(refused.value) == (
-        f"{server.url}: cannot be downloaded: the server has another file: its SHA-256 is {found}, in the "
-        f"manifest it is {SHA256}, 2 times. Run the same command again later, or "
-        "put walk.bvh into data/mine yourself."
+        f"{server.url}: cannot be downloaded: the server has another file: its SHA-256 is "
+        f"{hashlib.sha256(server.content).hexdigest()}, in the manifest it is {SHA256}, 2 times. "
+        "Run the same command again later, or put walk.bvh into data/mine yourself."
     )
-    assert list(fetch.folder.iterdir()) == []
     assert server.requests == 2
+    assert not fetch.path.exists()
 
 
 @pytest.mark.parametrize(
-    ("status", "said", "requests", "waits"),
+    ("status", "most", "said", "waits"),
     [
-        (404, r"cannot be downloaded: the server says 404 Not Found\. Run", 1, []),
-        (500, "500 Internal Server Error, 5 times", 5, [1, 2, 4, 8]),
+        (404, 10**6, r"cannot be downloaded: the server says 404 Not Found\. Run", []),
+        (500, 10**6, "500 Internal Server Error, 5 times", [1, 2, 4, 8]),
+        (0, 50_000, r"larger than 0\.05 MB, which is the most that a clip may be", []),
     ],
 )
-def test_a_file_that_is_not_served_is_refused(server, fetch, status, said, requests, waits):
-    server.faults = [status] * 9
+@pytest.mark.parametrize("announces", [True, False])
+def test_a_file_that_is_not_served_or_too_large_is_refused(
+    server, fetch, monkeypatch, status, most, said, waits, announces
+):
+    monkeypatch.setattr(module, "MOST_BYTES", most)
+    server.faults, server.announces = [status] * 9, announces
     with pytest.raises(InputError, match=said):
         fetch()
-    assert (server.requests, fetch.waits) == (requests, waits)
+    assert (server.requests, fetch.waits) == (len(waits) + 1, waits)
+    assert not fetch.path.exists()
 
 
-def test_without_a_network_the_message_says_so(tmp_path, monkeypatch):
-    monkeypatch.setattr(module.time, "sleep", lambda seconds: None)
+def test_without_a_network_the_message_says_so(fetch):
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         port = free.getsockname()[1]
     with pytest.raises(InputError, match=r"connection failed: .*, 5 times\. .*put walk\.bvh into data/mine"):
-        download_clip(f"http://127.0.0.1:{port}/walk.bvh", tmp_path / "walk.bvh", SHA256, "data/mine")
+        fetch(f"http://127.0.0.1:{port}/walk.bvh")
 
 
 ANSWER = b"HTTP/1.1 200 OK\r\n"
 
 
-class Babbler(threading.Thread):
-    """A server that sends `begin`, and then `more` a hundred times a second until the client closes."""
-
-    def __init__(self, begin: bytes, more: bytes) -> None:
-        super().__init__(daemon=True)
-        self.begin, self.more = begin, more
-        self.socket = socket.create_server(("127.0.0.1", 0))
-        self.url = f"http://127.0.0.1:{self.socket.getsockname()[1]}/walk.bvh"
-        self.start()
-
-    def run(self) -> None:
-        with contextlib.suppress(OSError):
-            while True:
-                connection, _ = self.socket.accept()
-                with connection, contextlib.suppress(OSError):
-                    connection.recv(10_000)
-                    connection.sendall(self.begin)
-                    while True:
-                        connection.sendall(self.more)
-                        time.sleep(0.01)
+def babble(listener: socket.socket, begin: bytes, more: bytes) -> None:
+    """Answer with `begin`, and then `more` a hundred times a second until the client closes."""
+    with contextlib.suppress(OSError):
+        connection, _ = listener.accept()
+        connection.recv(10_000)
+        connection.sendall(begin)
+        while True:
+            connection.sendall(more)
+            time.sleep(0.01)
 
 
 @pytest.mark.parametrize(
@@ -126,20 +117,11 @@ class Babbler(threading.Thread):
     [(b"", b"H"), (ANSWER, b"X"), (ANSWER + b"Content-Length: 9999\r\n\r\n", b"1")],
     ids=["before it answers", "in its headers", "in the file"],
 )
-def test_a_server_that_sends_too_slowly_is_given_up(tmp_path, monkeypatch, begin: bytes, more: bytes):
+def test_a_server_that_sends_too_slowly_is_given_up(fetch, monkeypatch, begin: bytes, more: bytes):
     monkeypatch.setattr(module, "DEADLINE", 0.3)
-    before = time.monotonic()
+    listener, before = socket.create_server(("127.0.0.1", 0)), time.monotonic()
+    threading.Thread(target=babble, args=(listener, begin, more), daemon=True).start()
     with pytest.raises(InputError, match=r"cannot be downloaded: not done within 0\.3 seconds"):
-        download_clip(Babbler(begin, more).url, tmp_path / "walk.bvh", SHA256, "data/mine")
+        fetch(f"http://127.0.0.1:{listener.getsockname()[1]}/walk.bvh")
     assert time.monotonic() - before < 3
     assert signal.getitimer(signal.ITIMER_REAL) == (0, 0)
-
-
-@pytest.mark.parametrize("announces", [True, False])
-def test_a_file_that_is_too_large_is_refused_and_deleted(server, fetch, monkeypatch, announces: bool):
-    monkeypatch.setattr(module, "MOST_BYTES", 50_000)
-    server.announces = announces
-    with pytest.raises(InputError, match=r"larger than 0\.05 MB, which is the most that a clip may be"):
-        fetch()
-    assert list(fetch.folder.iterdir()) == []
-    assert server.requests == 1

@@ -9,9 +9,7 @@ from hobble.motion.read import frame_rate
 
 def test_the_frame_rate_can_be_set(walk, bvh, make):
     path = bvh(walk, edit=lambda s: s.replace("0.00833333", "0.06666667"))
-    wrong, report = make(path)
-    assert report["source_fps"] == 15.0
-    assert len(wrong) == 961
+    assert (make(path)[1]["source_fps"], len(make(path)[0])) == (15.0, 961)
     right, report = make(path, source_fps=120.0)
     assert report["source_fps"] == 120.0
     np.testing.assert_allclose(right.root, walk.root[::2], atol=1e-6)
@@ -20,9 +18,7 @@ def test_the_frame_rate_can_be_set(walk, bvh, make):
 @pytest.mark.parametrize(
     ("text", "fps"),
     [
-        ("0.008333", 120), ("0.0083333", 120), ("0.00833333", 120), ("0.0166667", 60), ("0.016667", 60),
-        ("0.0333333", 30), ("0.0333", 30), ("0.033333", 30), ("0.04", 25), ("0.0416667", 24),
-        ("0.02", 50),
+        ("0.0083333", 120), ("0.0166667", 60), ("0.0333", 30), ("0.04", 25), ("0.0416667", 24), ("0.02", 50),
         ("0.01", 100), ("0.0111111", 90), ("0.066667", 15), ("8.33333e-3", 120), ("0.005", 200),
     ],
 )  # fmt: skip
@@ -30,12 +26,10 @@ def test_rounded_frame_times_mean_standard_rates(text, fps):
     assert frame_rate(float(text), text) == pytest.approx(fps, rel=1e-5)
 
 
-@pytest.mark.parametrize("rate", [24, 25, 30, 50, 90, 120])
+@pytest.mark.parametrize("rate", [24, 50, 90])
 def test_resampling_keeps_time_and_rotates_the_shorter_way(walk, rate):
-    times = sample_times(len(walk), 120, rate)
-    assert len(times) == int(240 * rate / 120) + 1
-    new = resample(walk, rate)
-    rotations = new.rotations
-    assert np.abs(np.linalg.norm(rotations, axis=-1) - 1).max() < 1e-12
-    assert np.sum(rotations[1:] * rotations[:-1], axis=-1).min() > 0
+    times, new = sample_times(len(walk), 120, rate), resample(walk, rate)
+    assert len(times) == len(new) == int(240 * rate / 120) + 1
+    assert np.abs(np.linalg.norm(new.rotations, axis=-1) - 1).max() < 1e-12
+    assert np.sum(new.rotations[1:] * new.rotations[:-1], axis=-1).min() > 0
     np.testing.assert_allclose(new.root[-1], walk.root[round(times[-1])], atol=1e-9)

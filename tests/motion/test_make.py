@@ -43,11 +43,10 @@ def test_the_unit_can_be_set_and_is_in_doubt_for_a_rig_of_no_known_size(walk, bv
     np.testing.assert_allclose(giant.positions, make(bvh(walk))[0].positions, atol=0.5)
 
 
-@pytest.mark.parametrize("proportions", ["skeleton", "clip"])
-def test_a_leg_of_length_0_is_refused(walk, bvh, make, proportions):
+def test_a_leg_of_length_0_is_refused(walk, bvh, make):
     path = bvh(walk, edit=lambda s: re.sub(r"(JOINT RightLeg\s*\{\s*OFFSET).*", r"\1 0 0 0", s))
     with pytest.raises(InputError, match=r"walk.bvh: the bone from RightUpLeg to RightLeg has no length"):
-        make(path, proportions=proportions)
+        make(path)
 
 
 def carried(clip, turn, place):
@@ -73,16 +72,8 @@ def test_a_joint_above_the_hips_is_merged_into_them_and_reported(walker, bvh, ma
     made, report = make(bvh(carried(clip, turn, place), name="carried"))
     alone, without = make(bvh(clip))
     np.testing.assert_allclose(made.positions, alone.positions, atol=1e-4)
-    assert (
-        report["notes"][0] == "The joints above Hips (Reference) were left out; their motion was added to it."
-    )
+    assert report["notes"] == [
+        "The joints above Hips (Reference) were left out; their motion was added to it."
+    ]
     assert report["rig"] == without["rig"] == rig
-    assert report["repairs"] == without["repairs"] == []
     assert made.translations is None
-
-
-@pytest.mark.parametrize("declared", [240, 242])
-def test_a_wrong_frame_count_is_told(walk, bvh, make, declared):
-    clip, report = make(bvh(walk, edit=lambda s: s.replace("Frames: 241", f"Frames: {declared}")))
-    assert len(clip) == 121
-    assert f"declares {declared} frames and has 241" in report["repairs"][0]

@@ -14,21 +14,13 @@ from hobble.motion.look import summarise_clips
 from hobble.motion.options import ClipMotion
 
 
-def of_values(change):
-    """An edit of a file's table of values; the first three columns are the root's position."""
-
-    def edit(text: str) -> str:
-        head, body = text.split("Frame Time:")
-        first, _, rows = body.partition("\n")
-        values = change(np.array([[float(x) for x in row.split()] for row in rows.splitlines()]))
-        lines = "\n".join(" ".join(f"{x:.7f}" for x in row) for row in values)
-        return f"{head}Frame Time:{first}\n{lines}\n"
-
-    return edit
-
-
-def root(factor: float):
-    return of_values(lambda values: np.concatenate([values[:, :3] * factor, values[:, 3:]], axis=1))
+def with_values(text: str, change) -> str:
+    """A file with a changed table of values; the first three columns are the root's position."""
+    head, body = text.split("Frame Time:")
+    first, _, rows = body.partition("\n")
+    values = change(np.array([[float(x) for x in row.split()] for row in rows.splitlines()]))
+    lines = "\n".join(" ".join(f"{x:.7f}" for x in row) for row in values)
+    return f"{head}Frame Time:{first}\n{lines}\n"
 
 
 def on_a_curve(walk: Clip) -> Clip:
@@ -46,7 +38,7 @@ def on_a_curve(walk: Clip) -> Clip:
     [(2.54, r"2\.\d+"), (1 / 2.54, r"0\.\d+"), (100, "1.."), (0.7, r"0\.[67]\d"), (1.3, r"1\.[234]\d")],
 )
 def test_a_root_in_another_unit_than_the_bones_is_refused(bvh, walk, make, factor, said):
-    path = bvh(walk, "other", edit=root(factor))
+    path = bvh(replace(walk, root=walk.root * factor), "other")
     with pytest.raises(InputError, match=rf"other.bvh: the hips go .*{said} times as fast .*OFFSETs"):
         make(path)
     make(path, defects="leave")
@@ -81,11 +73,6 @@ def test_who_sits_with_the_knees_apart_is_not_refused(bvh, walk, make):
     assert not any("knee" in doubt for doubt in make(bvh(sitting))[1]["unsure"])
 
 
-def test_feet_that_slide_a_little_are_noted(bvh, walk, make):
-    unsure = make(bvh(walk, edit=root(0.82)))[1]["unsure"]
-    assert any("slide" in doubt for doubt in unsure)
-
-
 def shaking(walk: Clip) -> Clip:
     rng = np.random.default_rng(1)
     noise = gaussian_filter1d(rng.normal(size=walk.rotations.shape), 3, axis=0) * 0.03
@@ -95,21 +82,21 @@ def shaking(walk: Clip) -> Clip:
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        (shaking, ["of the frames. Noise"]),
-        (lambda walk: replace(walk, root=walk.root * [0, 1, 0]), ["hardly moves the hips"]),
+        (shaking, "of the frames. Noise"),
+        (lambda walk: replace(walk, root=walk.root * [0, 1, 0]), "hardly moves the hips"),
+        (lambda walk: replace(walk, root=walk.root * [1, 1, 0.82]), "the hips go 0.89 times"),
     ],
 )
-def test_feet_that_seldom_stand_and_a_walk_in_place_are_noted(bvh, walk, make, change, said):
-    unsure = make(bvh(change(walk)))[1]["unsure"]
-    assert any(all(part in doubt for part in said) for doubt in unsure)
+def test_feet_that_seldom_stand_or_slide_and_a_walk_in_place_are_noted(bvh, walk, make, change, said):
+    assert said in " ".join(make(bvh(change(walk)))[1]["unsure"])
 
 
 def in_radians(text: str) -> str:
-    return of_values(lambda rows: np.concatenate([rows[:, :3], np.radians(rows[:, 3:])], axis=1))(text)
+    return with_values(text, lambda rows: np.concatenate([rows[:, :3], np.radians(rows[:, 3:])], axis=1))
 
 
 def positions_alone(text: str) -> str:
-    text = of_values(lambda rows: np.tile(rows[:, :3], 31))(text)
+    text = with_values(text, lambda rows: np.tile(rows[:, :3], 31))
     return re.sub(r"CHANNELS .*", "CHANNELS 3 Xposition Yposition Zposition", text)
 
 

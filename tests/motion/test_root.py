@@ -8,29 +8,17 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hobble.core import quat
-from hobble.motion.root import (
-    RootFrames,
-    extend_root,
-    local_pose,
-    root_frames,
-)
-
-
-def turned(clip, angle, shift):
-    """The whole clip, turned about the vertical and moved on the ground."""
-    turn = quat.yaw(angle)
-    rotations = clip.rotations.copy()
-    rotations[:, 0] = quat.mul(turn, rotations[:, 0])
-    return replace(
-        clip, rotations=rotations, root=quat.rotate(turn, clip.root) + np.array([shift, 0, -shift])
-    )
+from hobble.motion.root import RootFrames, extend_root, local_pose, root_frames
 
 
 @settings(max_examples=15, deadline=None)
 @given(angle=st.floats(-3.1, 3.1), shift=st.floats(-500, 500))
 def test_rows_do_not_depend_on_place_and_heading(walk, angle, shift):
-    clip = replace(walk, rotations=walk.rotations[:40], root=walk.root[:40])
-    other = turned(clip, angle, shift)
+    clip, turn = walk.part(slice(40)), quat.yaw(angle)
+    rotations = clip.rotations.copy()
+    rotations[:, 0] = quat.mul(turn, rotations[:, 0])
+    root = quat.rotate(turn, clip.root) + np.array([shift, 0, -shift])
+    other = replace(clip, rotations=rotations, root=root)
     ours, theirs = root_frames(clip, 5), root_frames(other, 5)
     for a, b in zip(local_pose(clip, ours), local_pose(other, theirs), strict=True):
         np.testing.assert_allclose(a, b, atol=1e-7)
@@ -40,9 +28,7 @@ def test_rows_do_not_depend_on_place_and_heading(walk, angle, shift):
 @pytest.mark.shared
 def test_root_frames_equal_those_of_the_original_rows(shared, make):
     """Frame 95 is the first of the original's rows: line 1 of the footsteps begins at frame 191 at 120 Hz."""
-    clip, report = make(shared / "mocap/pfnn/LocomotionFlat09_000.bvh", proportions="clip")
-    assert report["repairs"] == []
-    assert len(clip) == 925
+    clip, _ = make(shared / "mocap/pfnn/LocomotionFlat09_000.bvh", proportions="clip")
     rows = np.load(shared / "reference/original_rows_LocomotionFlat09_000.npz")
     n = int(rows["cycle_length"][0])
     x, y = rows["X"][:n], rows["Y"][:n]
@@ -66,8 +52,6 @@ def test_the_root_goes_straight_on_past_both_ends():
     direction = np.stack([np.sin(yaw), 0 * n, np.cos(yaw)], axis=1)
     root = RootFrames(position, direction, quat.yaw(-yaw), np.full(39, 0.02))
     longer = extend_root(root, 7)
-    assert len(longer) == 54
-    assert len(longer.turn) == 53
     for name in ("position", "direction", "rotation"):
         np.testing.assert_array_equal(getattr(longer, name)[7:47], getattr(root, name))
     k = np.arange(1.0, 8)

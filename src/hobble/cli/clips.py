@@ -46,7 +46,7 @@ from hobble.labels.label_files import SourceTime, footsteps_text, gait_text
 from hobble.labels.options import LabelOptions
 from hobble.motion.edit import loop_clip, mirror_clip, resample
 from hobble.motion.limbs import Doubt, find_body
-from hobble.motion.look import format_table, picture_of_file, summarise_clips
+from hobble.motion.look import draw_retargeting, format_table, summarise_clips
 from hobble.motion.make import clip_problems, load_source, make_clip
 from hobble.motion.options import accept
 from hobble.motion.other_formats import read_motion
@@ -93,7 +93,7 @@ def look(options: argparse.Namespace) -> int:
     settings, target = motion_options(options), find_skeleton(options.skeleton)
     folder = options.skeletons or skeleton_folder()
     if options.picture:
-        write_text(options.picture, picture_of_file(options.folder, target, folder, settings))
+        draw_retargeting(options.picture, options.folder, target, folder, settings)
     summaries, notes = summarise_clips(options.folder, target, folder, settings, progress)
     clips = [{key: value for key, value in vars(clip).items() if key != "digest"} for clip in summaries]
     print_result(options, {"clips": clips, "notes": notes}, format_table(summaries, notes))

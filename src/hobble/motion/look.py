@@ -12,9 +12,11 @@ import numpy as np
 from hobble.core.clip import Clip
 from hobble.core.clip_files import clips_in, unused_file_notes
 from hobble.core.errors import HobbleError, InputError
+from hobble.core.files import atomic_path
 from hobble.core.messages import group_messages, in_words
 from hobble.core.quat import Array
 from hobble.core.skeleton import path_between
+from hobble.motion.axes import UP
 from hobble.motion.duplicates import ClipDigest, clip_digest, duplicate_pairs
 from hobble.motion.edit import resample
 from hobble.motion.make import fit_skeleton, load_source, make_clip
@@ -293,85 +295,57 @@ def _row(summary: ClipSummary, labels: Mapping[str, Any], foot_down: float | Non
 # Draws a clip beside the retargeted motion, as stick figures from the side and from the front.
 
 PICTURES = 6  # poses of the clip in each row of the picture
-WIDE, HIGH, EDGE = 150, 260, 46  # pixels: width and height of one figure, and the margin for captions
 COLOUR, WRONG = "#2b6cb0", "#d62828"  # of a bone, and of the bones that differ most
 
 
-def picture_of_file(bvh: Path, skeleton: Path, skeleton_folder: Path, options: ClipMotion) -> str:
-    """The picture (SVG) of a BVH file's motion and of the result of retargeting.
+def draw_retargeting(
+    picture: Path, bvh: Path, skeleton: Path, skeleton_folder: Path, options: ClipMotion
+) -> None:
+    """Draw a BVH file's motion and the result of retargeting into an SVG file.
 
-    It is drawn even if the workflow refuses the result because it differs too much from the source.
+    It is drawn even if the workflow refuses the result because it differs too much from the source. The joint
+    or limb that differs most is red.
 
     skeleton: the file of the skeleton that gets the motion. skeleton_folder: the folder with all skeleton
     files, with which the rig of the BVH file is recognised. Raises InputError for a BVH file that cannot be
     read or that has this skeleton's bones already.
     """
+    from matplotlib import rc_context
+    from matplotlib.figure import Figure  # here, because the import takes half a second
+
     target = load_skeleton(skeleton, skeleton.stem)
     source = load_source(read_motion(bvh, options.animation), target, skeleton_folder, options)
-    made, scale, _, _ = fit_skeleton(source, target.skeleton, options)
+    result, scale, _, _ = fit_skeleton(source, target.skeleton, options)
     if scale is None:
         problem = f"already has the bones of {target.skeleton.name}, so there is no retargeting to draw"
         raise InputError(bvh, problem)
     before = resample(source.clip, options.fps)
-    return retarget_picture(before, made, *most_different(compare_motions(before, made)))
+    part, degrees = most_different(compare_motions(before, result))
+    frames = np.linspace(0, min(len(before), len(result)) - 1, PICTURES).round().astype(int)
+    figure = Figure(figsize=(1.6 * PICTURES, 12), layout="constrained")
+    figure.suptitle(f"{before.name}: the {part} is {degrees:.0f} degrees off its source on average (red)")
+    grid = figure.subplots(4, PICTURES, sharex=True, sharey=True)
+    rows = [(view, name) for view in ("side", "front") for name in ("source", "result")]
+    for (view, name), places in zip(rows, grid, strict=True):
+        for place, frame in zip(places, frames, strict=True):
+            _draw_figure(place, before if name == "source" else result, frame, view, part)
+            place.set_title(f"{name}, from the {view}, {frame / result.fps:.1f} s", fontsize=7)
+    with rc_context({"svg.fonttype": "none"}), atomic_path(picture) as temporary:
+        figure.savefig(temporary, format="svg")
 
 
-def retarget_picture(source: Clip, result: Clip, part: str, degrees: float) -> str:
-    """An SVG of four rows of PICTURES figures: source and result from the side, then both from the front.
-
-    source, result: the clip before and after retargeting, both with roles and at the same frame rate. part:
-    the joint or limb that differs most, such as "left knee"; its bones are drawn in red. degrees: by how much
-    it differs on average.
-    """
-    frames = np.linspace(0, min(len(source), len(result)) - 1, PICTURES).round().astype(int)
-    both = (("source", source), ("result", result))
-    rows = [(name, clip, view) for view in ("side", "front") for name, clip in both]
-    width, height = PICTURES * WIDE + 2 * EDGE, len(rows) * HIGH + 2 * EDGE
-
-    def write(x: float, y: float, text: str) -> str:
-        return f'<text x="{x:g}" y="{y:g}">{html.escape(text)}</text>'
-
-    title = f"{source.name}: the {part} is {degrees:.0f} degrees off its source on average (red)"
-    lines = [write(EDGE, 28, title)]
-    for k, frame in enumerate(frames):
-        lines.append(write(EDGE + WIDE * (k + 0.25), height - 14, f"{frame / result.fps:.2f} s"))
-    for n, (name, clip, view) in enumerate(rows):
-        lines.append(write(EDGE, EDGE + n * HIGH + 16, f"{name}, from the {view}"))
-        for k, figure in enumerate(_draw_figures(clip, frames, part, view)):
-            x, y = EDGE + WIDE * (k + 0.5), EDGE + (n + 1) * HIGH - 14
-            lines.append(f'<g transform="translate({x:g},{y})">{figure}</g>')
-    return (
-        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height}" width="{width}" '
-        'font-family="sans-serif" font-size="14"><rect width="100%" height="100%" fill="white"/>'
-        + "\n".join([*lines, "</svg>\n"])
-    )
-
-
-def _draw_figures(clip: Clip, frames: Array, part: str, view: str) -> list[str]:
-    """For each of the `frames`, the SVG elements of the figure in that frame.
-
-    A figure's lowest point is at y = 0, and its hips are at x = 0. part: the joint or limb in red. view:
-    "side" or "front".
-    """
-    skeleton, positions = clip.skeleton, clip.positions[frames]
-    ahead = facing_directions(skeleton, positions, 0.0)
-    rightward = ahead if view == "side" else np.cross([0.0, 1.0, 0.0], ahead)  # to the right in the picture
-    heights = positions[..., 1]
-    scale = (HIGH - 50) / max(float(np.median(np.ptp(heights, axis=1))), 1e-9)  # pixels a cm
-    x = np.sum((positions - positions[:, [skeleton.role("hips")]]) * rightward[:, None], axis=-1) * scale
-    y = (heights.min(axis=1, keepdims=True) - heights) * scale  # y points down in an SVG
+def _draw_figure(place: Any, clip: Clip, frame: int, view: str, part: str) -> None:
+    """Draw a pose into axes of matplotlib. view: "side" or "front". part: the joint or limb in red."""
+    skeleton, p = clip.skeleton, clip.positions[frame]
+    ahead = facing_directions(skeleton, p[None], 0.0)[0]
+    x = (p - p[skeleton.role("hips")]) @ (ahead if view == "side" else np.cross(UP, ahead))
+    y = p[:, 1] - p[:, 1].min()
     side, _, name = part.partition(" ")
     ends = [role if role == "head" else f"{side}_{role}" for role in {**ANGLES, **BONES}[name]]
     red = path_between(skeleton.parents, skeleton.role(ends[0]), skeleton.role(ends[-1]))
-    out = []
-    for k in range(len(frames)):
-        bones = []
-        for j, p in enumerate(skeleton.parents):
-            if p >= 0:
-                colour, thick = (WRONG, 6) if j in red and p in red else (COLOUR, 3)
-                bones.append(
-                    f'<line x1="{x[k, p]:.1f}" y1="{y[k, p]:.1f}" x2="{x[k, j]:.1f}" y2="{y[k, j]:.1f}" '
-                    f'stroke="{colour}" stroke-width="{thick}" stroke-linecap="round"/>'
-                )
-        out.append("".join(bones))
-    return out
+    for j, parent in enumerate(skeleton.parents):
+        if parent >= 0:
+            colour, width = (WRONG, 3.5) if j in red and parent in red else (COLOUR, 1.8)
+            place.plot(x[[parent, j]], y[[parent, j]], color=colour, linewidth=width)
+    place.set_aspect("equal")
+    place.set_axis_off()

@@ -108,7 +108,7 @@ def _cut(file: Bvh, first: int, last: int) -> Bvh:
     if last > len(file):
         fix = "Correct `frames` in the clip's entry."
         raise InputError(file.path, f"frames {first} to {last} are wanted, but it has {len(file)}", fix=fix)
-    return replace(file, values=file.values[first - 1 : last], declared=last - first + 1)
+    return replace(file, values=file.values[first - 1 : last])
 
 
 def clip_problems(
@@ -203,10 +203,6 @@ def load_source(
     or for defects that cannot be repaired.
     """
     check_angles(file)
-    counted = []
-    if len(file) != file.declared:
-        problem = f"declares {file.declared} frames and has {len(file)}"
-        counted = [f"The file {problem}. The {len(file)} frames are used."]
     still = accept(file.path, [_no_motion_problem(file, options)], options)
     source = _load_rig(file, target, skeleton_folder, options)
     clip, first, mended, unsure = source.clip, 0, list[str](), [*file.unsure, *still, *source.unsure]
@@ -215,7 +211,7 @@ def load_source(
         if options.ground == "flat":
             clip, moved, doubts = put_on_floor(clip)
             mended, unsure = mended + moved, unsure + doubts
-    found, repairs = {**source.found, "source_start": first}, counted + source.repairs + mended
+    found, repairs = {**source.found, "source_start": first}, source.repairs + mended
     return replace(source, clip=clip, found=found, repairs=repairs, unsure=unsure)
 
 

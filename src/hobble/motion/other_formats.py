@@ -217,7 +217,7 @@ class _Scene:
             columns.append(np.degrees(quat.to_euler(local, ORDER)))
         values = np.concatenate(columns, axis=1)
         joints = tuple(self.names), tuple(self.parents), offsets, tuple(channels)
-        return Bvh(path, *joints, values, 1 / fps, "", {}, frames)
+        return Bvh(path, *joints, values, 1 / fps, "", {})
 
     def _world(self, when: Array | None) -> tuple[Array, Array]:
         """Positions (F, J, 3) and rotations (F, J, 4) in the world at F times; at rest for None."""

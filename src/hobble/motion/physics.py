@@ -109,19 +109,15 @@ def find_balance(clip: Clip) -> Balance | None:
 
 
 def centre_of_mass(at: dict[str, Array]) -> Array:
-    """(..., 3) centre of mass of a body. Segments whose joints are missing are left out.
-
-    at: role -> positions (..., 3).
-    """
+    """(..., 3) centre of mass of a body. at: role -> positions (..., 3)."""
     hips, shoulders = (0.5 * (at[f"left_{part}"] + at[f"right_{part}"]) for part in ("hip", "shoulder"))
     total = TRUNK * (hips + TRUNK_CENTRE * (shoulders - hips)) + HEAD * at["head"]
     mass = TRUNK + HEAD
     for share, start, end, centre in SEGMENTS:
         for side in SIDES:
-            a, b = at.get(f"{side}_{start}"), at.get(f"{side}_{end}")
-            if a is not None and b is not None:
-                total = total + share * (a + centre * (b - a))
-                mass += share
+            a, b = at[f"{side}_{start}"], at[f"{side}_{end}"]
+            total = total + share * (a + centre * (b - a))
+            mass += share
     return np.asarray(total / mass)
 
 

@@ -33,7 +33,6 @@ LONGEST_LINE = 1 << 22  # bytes, in a file with an error; 4096 joints with six l
 MOST_JOINT_POSES = 50_000_000  # frames times joints
 CHANNELS = tuple(f"{axis}{kind}" for kind in ("position", "rotation") for axis in "XYZ")
 EXPORT = "Export the clip again."  # advice in most errors
-CUT = "Cut the file into shorter clips."
 # Frames a second. Of two rates that fit a file equally well, the one that is listed first is taken.
 STANDARD_RATES = (120, 60, 30, 24, 25, 50, 100, 90, 48, 72, 144, 180, 200, 240, 250, 300, 15, 20, 12, 10)
 # If all angles of a file are below 2 pi and one of them changes by more than this, they are in radians: as
@@ -54,7 +53,6 @@ class Bvh:
     unit.
     frame_time: seconds from frame to frame. frame_time_text: the same, as it is written in the file.
     end_sites: name of a joint -> offsets (x, y, z) of its end sites, in the file's unit.
-    declared: the number of frames that the file declares. F may differ by one (see `read_bvh`).
     sha256, bytes: hash and size of the file.
     unsure: sentences on what else might have been meant by the file.
     """
@@ -68,7 +66,6 @@ class Bvh:
     frame_time: float
     frame_time_text: str
     end_sites: dict[str, list[tuple[float, float, float]]] = field(repr=False)
-    declared: int
     sha256: str = ""
     bytes: int = 0
     unsure: tuple[str, ...] = ()
@@ -106,7 +103,6 @@ def read_bvh(path: str | Path) -> Bvh:
         frame_time,
         time_text,
         joints.end_sites,
-        declared,
         hashlib.sha256(raw).hexdigest(),
         len(raw),
     )
@@ -139,9 +135,8 @@ def _clean_text(path: Path, data: bytes) -> bytes:
 def refuse_pointer(path: Path, data: bytes) -> None:
     """Raise InputError for what stands for a file in a repository that was cloned without Git LFS."""
     if data.startswith(b"version https://git-lfs"):
-        raise InputError(
-            path, "this is a pointer of Git LFS, not the file", fix="Fetch it with `git lfs pull`."
-        )
+        problem = "this is a pointer of Git LFS, not the file"
+        raise InputError(path, problem, fix="Fetch it with `git lfs pull`.")
 
 
 def _find_motion(path: Path, data: bytes) -> int:
@@ -158,9 +153,9 @@ def _find_motion(path: Path, data: bytes) -> int:
 class _Joints:
     """The joints of a file, read statement by statement: without recursion, so that hierarchies may be deep.
 
-    names, parents, offsets, channels, end_sites: as in `Bvh`. line: number of the current line. open: stack
-    of the joints whose braces are open, -1 for an end site. pending: the joint, or -1 for an end site, that
-    still needs its opening brace. placed: those of the open joints and end sites that have their OFFSET.
+    names, parents, offsets, channels, end_sites: as in `Bvh`; offsets are empty until they are read. line:
+    number of the current line. open: stack of the joints whose braces are open, -1 for an end site. pending:
+    the joint, or -1 for an end site, that still needs its opening brace.
     """
 
     def __init__(self, path: Path, data: bytes) -> None:
@@ -173,8 +168,6 @@ class _Joints:
         self.end_sites: dict[str, list[tuple[float, float, float]]] = {}
         self.open: list[int] = []
         self.pending: list[int] = []  # none or one
-        self.placed: set[int] = set()
-        self.lines: dict[str, int] = {}  # name -> number of its line
         try:
             text = data.decode("utf-8")
         except UnicodeDecodeError:
@@ -203,40 +196,31 @@ class _Joints:
         elif keyword == "END":
             self.need(bool(self.open), "an end site outside of any joint")
             self.pending = [-1]
-            self.placed.discard(-1)
         elif word == "{":
             self.need(bool(self.pending), "an opening brace without a joint")
             self.open.append(self.pending.pop())
         elif word == "}":
             self.need(bool(self.open), "a closing brace too many")
             joint = self.open.pop()
-            what = f"joint {self.names[joint]!r}" if joint >= 0 else "an end site"
-            self.need(joint in self.placed, f"{what} has no OFFSET")
+            self.need(joint < 0 or bool(self.offsets[joint]), f"joint {self.names[joint]!r} has no OFFSET")
         elif keyword == "OFFSET":
             self.read_offset(rest)
         elif keyword == "CHANNELS":
             self.read_channels(rest)
         else:
-            self.need(
-                False, f"{word[:40]!r} is not known here; expected is a joint, OFFSET, CHANNELS or a brace"
-            )
+            self.need(False, f"{word[:40]!r} is no joint, OFFSET, CHANNELS or brace")
 
     def read_joint(self, name: str) -> None:
         """Begin a joint."""
         self.need(bool(name), "a joint without a name")
-        too_long = f"a joint's name has {len(name)} characters, more than {LONGEST_NAME}"
-        self.need(len(name) <= LONGEST_NAME, too_long)
-        self.need(
-            name not in self.lines, f"joint {name!r} occurs twice (first in line {self.lines.get(name)})"
-        )
-        second_root = f"a second root, {name!r}, although a file may have only one figure"
-        self.need(bool(self.open) or not self.names, second_root)
+        self.need(len(name) <= LONGEST_NAME, f"a joint's name has more than {LONGEST_NAME} characters")
+        self.need(name not in self.names, f"joint {name!r} occurs twice")
+        self.need(bool(self.open) or not self.names, f"a second root, {name!r}: a file has only one figure")
         self.need(len(self.names) < MOST_JOINTS, f"more than {MOST_JOINTS} joints")
-        self.lines[name] = self.line
         self.pending = [len(self.names)]
         self.names.append(name)
         self.parents.append(self.open[-1] if self.open else -1)
-        self.offsets.append((0.0, 0.0, 0.0))
+        self.offsets.append(())
         self.channels.append(())
 
     def read_offset(self, words: list[str]) -> None:
@@ -247,7 +231,6 @@ class _Joints:
         self.need(numbers, f"OFFSET needs three numbers, not {text!r}")
         x, y, z = map(float, words)
         self.need(bool(np.isfinite((x, y, z)).all()), f"OFFSET is not finite: {text!r}")
-        self.placed.add(self.open[-1])
         if self.open[-1] >= 0:
             self.offsets[self.open[-1]] = (x, y, z)
         else:
@@ -305,13 +288,13 @@ def _check_size(path: Path, declared: int, width: int, joints: int, left: int, l
     if declared < 1:
         problem = f"declares {declared} frames, but needs one"
     elif not width:
-        raise InputError(path, "no joint has a channel", fix=EXPORT)
+        problem = "no joint has a channel"
     # Each value takes at least two bytes: a digit and a blank. One frame may be missing.
     elif (declared - 1) * width * 2 > left + 2:
         problem = f"truncated: declares {declared} frames of {width} values, more than the file can hold"
     elif declared * joints > MOST_JOINT_POSES:
-        most = f"more than {MOST_JOINT_POSES} joint poses (frames times joints)"
-        problem, fix = f"declares {declared} frames of {joints} joints: {most}", CUT
+        problem = f"declares {declared} frames of {joints} joints: {MOST_JOINT_POSES} poses are the most"
+        fix = "Cut the file into shorter clips."
     if problem:
         raise InputError(path, problem, line=line, fix=fix)
 
@@ -477,15 +460,11 @@ def _judge_channels(bvh: Bvh, local: Array, has_channel: Array) -> tuple[Array, 
     offsets, repairs = bvh.offsets.copy(), []
     offsets[wrong] = median[wrong]
     if added:
-        repairs.append(
-            f"The position channels of {_list_names(bvh, added)} are about zero, but the OFFSETs are not. "
-            "The channels were added to the OFFSETs."
-        )
+        zero = f"The position channels of {_list_names(bvh, added)} are about zero"
+        repairs.append(f"{zero}, but not the OFFSETs, to which they were added.")
     if wrong:
-        repairs.append(
-            f"The OFFSET of {_list_names(bvh, wrong)} contradicts its position channels, which never change. "
-            "The values of the channels were used."
-        )
+        contradicts = f"The OFFSET of {_list_names(bvh, wrong)} contradicts its position channels"
+        repairs.append(f"{contradicts}, which never change and were used.")
     return offsets, local if moving else None, repairs
 
 

@@ -240,7 +240,7 @@ def body_in_file(path: Path, raw: Clip, known: RigMatch | None, handedness: str)
         draft = f"`hobble rig {path.name} --to config/skeletons/<name>.yaml`"
         fix = f"Hands, animals and mechanisms cannot be used. For a person, {draft} drafts a file to correct."
         raise InputError(path, problem, fix=fix) from None
-    notes = ["No skeleton file describes this rig. Structure, motion and names told the parts of the body."]
+    notes = []
     if not sided:
         unsided = "its joint names do not tell left from right"
         if handedness == "auto":

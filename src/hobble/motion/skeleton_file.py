@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import yaml
 from pydantic import ValidationError
 
 from hobble.core.errors import InputError
@@ -172,21 +173,12 @@ def draft_skeleton_file(rig: Skeleton, roles: Mapping[str, str]) -> str:
     roles: role -> name of its joint. The roles that are not in `roles` are left out if they are optional.
     Otherwise they get `?` as their joint.
     """
-    lines = ["# Role: joint. Fill in each ?. Leave out roles that the rig does not have.", "roles:"]
     known = {role: "?" for role in ROLES if role not in OPTIONAL} | dict(roles)
-    lines += [f"  {role}: {_quoted(known[role])}" for role in ROLES if role in known]
-    lines.append("joints:")
-    for name, parent, offset in zip(rig.joints, rig.parents, rig.offsets, strict=True):
-        parent_name = "null" if parent < 0 else _quoted(rig.joints[parent])
-        # x + 0.0 turns -0.0 into 0.0.
-        numbers = ", ".join(f"{x + 0.0:.6g}" for x in (offset if parent >= 0 else 0 * offset))
-        lines.append(f"  {_quoted(name)}: {{parent: {parent_name}, offset: [{numbers}]}}")
-    return "\n".join(lines) + "\n"
-
-
-def _quoted(name: str) -> str:
-    """A name as a YAML string in single quotes."""
-    return "'" + name.replace("'", "''") + "'"
+    lines = {"roles": {role: known[role] for role in ROLES if role in known}}
+    advice = "# Role: joint. Fill in each ?. Leave out roles that the rig does not have.\n"
+    how: dict[str, Any] = {"sort_keys": False, "allow_unicode": True, "width": 1000}
+    joints = yaml.safe_dump({"joints": rig.to_dict()["joints"]}, default_flow_style=None, **how)
+    return advice + yaml.safe_dump(lines, **how) + joints
 
 
 def skeleton_folder() -> Path:
