@@ -62,7 +62,7 @@ def measure_recipe(
     lap = measure_responsivity(
         character, Laps(laps=1, modes=()), configuration="", runtime=Runtime(), track=track
     )
-    whole = HeldOutErrors(database, torch.device("cpu"), 0).errors_on_every_row(state.network)[0]
+    whole = HeldOutErrors(database, torch.device("cpu"), 0).errors(state.network, every_row=True)[0]
     strayed = " ".join(f"{entry['held_out']['position_error_cm']:5.2f}" for entry in rolled["lengths"])
     laps = f"{lap['waypoints_reached']}/{lap['waypoints']} {lap['laps'][0]['seconds']:4.0f}"
     laps += f" {lap['path_overshoot_cm']:5.0f} {lap['largest_turn_degrees']:4.0f}"

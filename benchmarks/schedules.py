@@ -72,11 +72,11 @@ def trained(name: str, database: Path, threads: int) -> Curve:
             data, network=network, training=training, checkpoints=Path(folder), threads=threads
         )
     log.removeHandler(clock)
-    whole = HeldOutErrors(data, torch.device("cpu"), 0).errors_on_every_row(state.network)[0]
+    whole = HeldOutErrors(data, torch.device("cpu"), 0).errors(state.network, every_row=True)[0]
     wall, error = ([row[column] for row in state.history] for column in (3, 5))
     print(
         f"{name:12} {state.samples:11,} samples, {state.adam.steps:9,} steps, {wall[-1]:7.1f} s "
-        f"({clock.seconds[-1]:.1f} s CPU): held out {whole:.4f}, at best {state.best_mse:.4f}",
+        f"({clock.seconds[-1]:.1f} s CPU): held out {whole:.4f}, at best {min(state.held_out_errors):.4f}",
         flush=True,
     )
     return Curve(name, wall, clock.seconds, error, whole)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -18,9 +18,9 @@ from hobble.rows.clip_rows import ClipRows
 from hobble.rows.layout import RowLayout
 from hobble.training.augment import Augmentation, RollOut
 from hobble.training.batches import SampleBatch
-from hobble.training.optimiser import Update
+from hobble.training.checkpoint import State
 from hobble.training.options import Training
-from hobble.training.train import run
+from hobble.training.train import run, train
 
 SPLITS = {"walk": "train", "hop": "train", "turn": "held_out"}
 
@@ -102,24 +102,23 @@ def training() -> Recipe:
     return Recipe(passes=2, sections=3, learning_rate=1e-3, memory_mb=64, device="cpu")
 
 
+@pytest.fixture
+def go(data: Database, network: PfnnOptions, training: Recipe, tmp_path: Path) -> Callable[..., State]:
+    """Trains with some settings changed. folder: of the checkpoints. start: another checkpoint."""
+
+    def go(
+        folder: str = "checkpoints", start: Path | None = None, kind: Any = network, **changes: Any
+    ) -> State:
+        options = {"network": kind, "training": training | changes, "checkpoints": tmp_path / folder}
+        return train(data, **options, threads=1, start=start)
+
+    return go
+
+
 def change(
     augmentation: Augmentation, x: torch.Tensor, p: Any = None, clip: Any = None, y: Any = None
 ) -> None:
     """Let an augmentation change a batch of inputs x, and take note of it."""
-    augmentation.change(SampleBatch(x, y, p, clip, np.empty(0), len(x)))
+    augmentation.change(SampleBatch(x, y, p, clip, len(x)))
     if not isinstance(augmentation, RollOut):  # which the tests tell its errors
         augmentation.after(x)
-
-
-@pytest.fixture
-def given(monkeypatch: pytest.MonkeyPatch) -> list[torch.Tensor]:
-    """The inputs (B, X) of each step that training takes in this test."""
-    inputs: list[torch.Tensor] = []
-
-    def noted(self: Update, x: torch.Tensor, *rest: Any) -> torch.Tensor:
-        inputs.append(x.clone())
-        return plain(self, x, *rest)
-
-    plain = Update.__call__
-    monkeypatch.setattr(Update, "__call__", noted)
-    return inputs

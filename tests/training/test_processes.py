@@ -2,13 +2,11 @@
 
 import json
 import os
-import shutil
 import signal
 import subprocess
 import sys
 import threading
 import time
-import zlib
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -17,7 +15,7 @@ import numpy as np
 import pytest
 
 from hobble.core.errors import HobbleError
-from hobble.core.files import load_npz, read_json
+from hobble.core.files import load_npz
 from hobble.database.write import write_database
 from hobble.training.options import Machines
 from hobble.workflow.training_processes import command, on_machines, train_together
@@ -92,24 +90,11 @@ def test_several_processes_train_like_one(database: Path, tmp_path: Path) -> Non
 def together(database: Path, network: Any, training: Recipe, tmp_path: Path) -> Callable[..., dict[str, Any]]:
     """Train in several processes as the workflow does, and return the content of the checkpoint."""
 
-    def go(
-        processes: int, folder: str = "checkpoints", data: Path = database, **changes: Any
-    ) -> dict[str, Any]:
+    def go(processes: int, folder: str = "checkpoints", **changes: Any) -> dict[str, Any]:
         machines = Machines(processes=processes)
         typed = on_machines(training | HARD | {"sections": 3} | changes, machines, gpus=False)
-        train_together(
-            machines,
-            processes,
-            tmp_path / "log",
-            {
-                "database": data,
-                "network": network,
-                "training": typed,
-                "checkpoints": tmp_path / folder,
-                "start": None,
-                "code": None,
-            },
-        )
+        given = {"database": database, "network": network, "training": typed, "start": None, "code": None}
+        train_together(machines, processes, tmp_path / "log", {**given, "checkpoints": tmp_path / folder})
         return load_npz(next((tmp_path / folder).glob("*/checkpoint.npz")))
 
     return go
@@ -154,30 +139,6 @@ def test_after_a_crash_another_number_of_processes_can_resume(
     assert f"after section {reached} of" in (tmp_path / "log").read_text()
 
 
-@pytest.mark.slow
-def test_the_message_about_broken_rows_comes_from_their_process(
-    together: Callable[..., dict[str, Any]], database: Path, tmp_path: Path
-) -> None:
-    shutil.copytree(database, tmp_path / "db")
-    spoil(tmp_path / "db")
-    with pytest.raises(HobbleError, match=r"rows of the database are not finite: .*(hop|walk) frame \d+"):
-        together(3, data=tmp_path / "db")
-
-
-def spoil(database: Path) -> None:
-    """Make one Y of one row NaN, as if the database had been built with it."""
-    manifest = read_json(database / "manifest.json")
-    chunk = manifest["chunks"]["train"][-1]
-    file = database / manifest["folder"] / chunk["file"]
-    data = bytearray(file.read_bytes())
-    length = int.from_bytes(data[:8], "little")
-    start = 8 + length + json.loads(data[8 : 8 + length])["y"]["data_offsets"][0]
-    data[start : start + 4] = np.float32(np.nan).tobytes()
-    file.write_bytes(data)
-    chunk["crc32"] = zlib.crc32(data)
-    (database / "manifest.json").write_text(json.dumps(manifest))
-
-
 def test_several_machines_need_slurm(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     machines = Machines(nodes=4, gpus=8)
     monkeypatch.delenv("SLURM_JOB_ID", raising=False)
@@ -192,10 +153,10 @@ def test_several_machines_need_slurm(monkeypatch: pytest.MonkeyPatch, tmp_path: 
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"gpus": 2, "processes": 2}, "not both"),
-        ({"gpus": 2, "device": "cpu"}, "needs `device"),
-        ({"nodes": 5, "processes": 8}, "40 processes share a batch of 32"),
-        ({"stretches": 33}, "must not be more than `batch`"),
+        ({"gpus": 2, "processes": 2}, "one process for each GPU"),
+        ({"gpus": 2, "device": "cpu"}, "no `device: cpu`"),
+        ({"nodes": 5, "processes": 8}, "one sample for each of 40 processes"),
+        ({"stretches": 33}, "one sample for each of 33 processes or stretches"),
         ({"stretches": 4, "processes": 3}, "must be a multiple of the 3 processes"),
         ({"schedule": "cosine", "continues": "holden"}, "`continues` needs `schedule: constant`"),
     ],

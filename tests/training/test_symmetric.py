@@ -1,5 +1,6 @@
 """A network that is kept symmetric gives mirrored outputs for mirrored inputs."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -7,18 +8,19 @@ import numpy as np
 import pytest
 import torch
 
-from hobble.core.errors import HobbleError
 from hobble.core.skeleton import Skeleton
 from hobble.database.reader import Database
 from hobble.database.write import write_database
 from hobble.models.blend import TrainableBlend
-from hobble.models.mann import MannOptions
 from hobble.models.model import Options
 from hobble.models.pfnn import PfnnOptions
 from hobble.models.plain import PlainOptions
 from hobble.rows.layout import mirror_of_x, mirror_of_y
-from hobble.training.train import train
-from training.conftest import SPLITS, Recipe, clip_rows, figure
+from hobble.training.checkpoint import State
+
+from .conftest import SPLITS, clip_rows, figure
+
+Run = Callable[..., State]
 
 NETWORKS = [
     PfnnOptions(units=24),
@@ -59,36 +61,13 @@ def apart(network: TrainableBlend, data: Database) -> float:
 
 
 @pytest.mark.parametrize("network", NETWORKS, ids=str)
-def test_a_network_trained_so_mirrors_its_output(
-    data: Database, network: Options, training: Recipe, tmp_path: Path
-) -> None:
-    recipe = training | {"rollout": 3, "batch": 64}
-    free = train(data, network=network, training=recipe, checkpoints=tmp_path)
-    kept = train(data, network=network, training=recipe | {"symmetric": True}, checkpoints=tmp_path)
+def test_a_network_trained_so_mirrors_its_output(data: Database, network: Options, go: Run) -> None:
+    free, kept = (go(f"{way}", rollout=3, batch=64, symmetric=way) for way in (False, True))
     assert apart(kept.network, data) < 1e-5
     assert apart(free.network, data) > 1e-2
 
 
-def test_a_training_that_goes_on_ends_with_the_same_bytes(
-    data: Database, network: PfnnOptions, training: Recipe, tmp_path: Path
-) -> None:
-    recipe = training | {"symmetric": True, "batch": 32}
-    straight = train(data, network=network, training=recipe, checkpoints=tmp_path / "a")
-    train(data, network=network, training=recipe | {"passes": 1}, checkpoints=tmp_path / "b")
-    resumed = train(data, network=network, training=recipe, checkpoints=tmp_path / "b")
-    assert torch.equal(straight.network.flat, resumed.network.flat)
-
-
-@pytest.mark.parametrize(
-    ("network", "message"),
-    [
-        (MannOptions(kind="mann", units=12, experts=2), "of kind mann cannot treat left and right alike"),
-        (PfnnOptions(units=12, control_points=5), "an even number of network.control_points, not 5"),
-    ],
-    ids=str,
-)
-def test_networks_that_cannot_be_symmetric_are_refused(
-    data: Database, network: Options, training: Recipe, tmp_path: Path, message: str
-) -> None:
-    with pytest.raises(HobbleError, match=message):
-        train(data, network=network, training=training | {"symmetric": True}, checkpoints=tmp_path)
+def test_a_symmetric_training_that_goes_on_ends_with_the_same_bytes(go: Run) -> None:
+    straight = go("a", symmetric=True)
+    go("b", symmetric=True, passes=1)
+    assert torch.equal(straight.network.flat, go("b", symmetric=True).network.flat)

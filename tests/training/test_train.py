@@ -1,7 +1,9 @@
-"""Training learns, logs, is reproducible, and stops when it diverges."""
+"""Training learns, logs, is reproducible, and stops when it diverges; what a network's file holds."""
 
 import csv
+import json
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -10,60 +12,55 @@ import pytest
 import torch
 
 from hobble.core import files
-from hobble.core.errors import HobbleError
-from hobble.database.reader import Block, Database
-from hobble.training import checkpoint, train
-from hobble.training.batches import HostRows
-from hobble.training.checkpoint import State, columns, write_history
-from hobble.training.optimiser import Update
+from hobble.core.errors import HobbleError, InputError
+from hobble.core.skeleton import Skeleton
+from hobble.database.reader import Database
+from hobble.database.write import write_database
+from hobble.models.load import load_network
+from hobble.models.matching import MatchingOptions
+from hobble.models.network import TrainingFacts
+from hobble.rows.clip_rows import save_clip_rows
+from hobble.rows.layout import GAITS
+from hobble.training import checkpoint
+from hobble.training.batches import HeldOutErrors, HostRows
+from hobble.training.checkpoint import State, write_history
+from hobble.training.optimiser import Adam, Update
+from hobble.training.options import Training
+from tests.models.matching.example import FRAMES, clip
+
+from .conftest import run_in
 
 Settings = dict[str, Any]
 Run = Callable[..., State]
+CPU = torch.device("cpu")
 
 
-@pytest.fixture
-def run(data: Database, network: Settings, training: Settings, tmp_path: Path) -> Run:
-    """Train with some settings changed, checkpoints under `folder`."""
-
-    def go(folder: str = "checkpoints", begin: Path | None = None, **changes: Any) -> State:
-        return train.train(
-            data,
-            network=network,
-            training=training | changes,
-            checkpoints=tmp_path / folder,
-            threads=1,
-            start=begin,
-        )
-
-    return go
-
-
-def test_a_training_lowers_the_error_on_held_out_rows(run: Run) -> None:
-    state = run(passes=10, learning_rate=3e-3, dropout=0.0, l1=0.0)
+def test_a_training_lowers_the_error_on_held_out_rows(go: Run) -> None:
+    state = go(passes=10, learning_rate=3e-3, dropout=0.0, l1=0.0)
     first, last = state.history[0], state.history[-1]
     assert last[4] < 0.02 * first[4]
     assert last[5] < 0.8 * first[5]
-    assert state.best_mse == min(row[5] for row in state.history)
 
 
 @pytest.mark.parametrize("size", [32, 300])
 def test_batches_are_the_sections_samples_in_order(data: Database, size: int) -> None:
-    seen = list(HostRows(data, torch.device("cpu")).batches(1, 2, 3, seed=5, size=size))
+    seen = list(HostRows(data, CPU).batches(1, 2, 3, seed=5, size=size))
     blocks = list(data.blocks("train", 1, 2, 3, 5))
     assert [len(batch.p) for batch in seen[:-1]] == [size] * (len(seen) - 1)
     assert 0 < len(seen[-1].p) <= size
     *columns, whole = zip(*seen, strict=True)
-    for mine, theirs in zip(columns, zip(*blocks, strict=True), strict=True):
+    for mine, theirs in zip(columns, [*zip(*blocks, strict=True)][:4], strict=True):
         assert np.array_equal(np.concatenate(mine), np.concatenate(theirs))
     assert sum(len(batch.p) for batch in seen) == sum(whole) == data.section_sample_count("train", 2, 3)
 
 
-def test_history_counts_and_agrees_with_the_network(run: Run, data: Database, tmp_path: Path) -> None:
-    state = run()
-    path = tmp_path / "history.csv"
-    write_history(path, data.layout.blocks("y"), state.history)
+def test_history_counts_and_agrees_with_the_network(go: Run, data: Database, tmp_path: Path) -> None:
+    state = go()
+    path, blocks = tmp_path / "history.csv", data.layout.blocks("y")
+    write_history(path, blocks, state.history)
     rows = list(csv.DictReader(path.open()))
-    assert list(rows[0]) == columns(data.layout.blocks("y"))
+    first = ["pass", "section", "samples", "seconds", "train_mse", "held_out_mse"]
+    assert list(rows[0]) == [*first, *(f"held_out_{name}" for name in blocks)]
     assert [(row["pass"], row["section"]) for row in rows] == [(p, s) for p in "12" for s in "123"]
     assert [int(row["samples"]) for row in rows] == [766, 1533, 2300, 3066, 3833, 4600]
     seconds = [float(row["seconds"]) for row in rows]
@@ -73,55 +70,40 @@ def test_history_counts_and_agrees_with_the_network(run: Run, data: Database, tm
     y = state.network(torch.from_numpy(block.x), torch.from_numpy(block.p)).numpy()
     squares = (y - block.y) ** 2
     assert float(rows[-1]["held_out_mse"]) == pytest.approx(float(squares.mean()), rel=1e-5)
-    for name, part in data.layout.blocks("y").items():
+    for name, part in blocks.items():
         assert float(rows[-1][f"held_out_{name}"]) == pytest.approx(float(squares[:, part].mean()), rel=1e-5)
 
 
-def poisoned(data: Database, monkeypatch: pytest.MonkeyPatch, turn: int, value: float) -> None:
-    """Make row 40 of section `turn` wrong."""
+def test_divergence_stops_the_training_names_the_clips_and_keeps_the_last_checkpoint(
+    go: Run, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
     blocks = Database.blocks
 
-    def wrong(self: Database, split: str, p: int, section: int, sections: int, *rest: int) -> Any:
-        for block in blocks(self, split, p, section, sections, *rest):
-            if split == "train" and p * sections + section == turn:
-                block.y[40, 3] = value
+    def broken(self: Database, split: str, *place: int) -> Any:
+        for block in blocks(self, split, *place):
+            if (split, *place[:2]) == ("train", 1, 1):
+                block.y[40, 3] = np.nan
             yield block
 
-    monkeypatch.setattr(Database, "blocks", wrong)
-
-
-def test_a_row_that_is_not_finite_stops_training_and_is_named(
-    run: Run, data: Database, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
-    clean: Block = next(data.blocks("train", 1, 1, 3, 1))
-    poisoned(data, monkeypatch, 4, np.nan)
-    with pytest.raises(HobbleError) as error:
-        run()
-    text = str(error.value)
-    assert "pass 2 of 2, section 2 of 3, batch 2:" in text
-    assert f"{data.clips[clean.clip[40]]} frame {clean.frame[40]}" in text
+    monkeypatch.setattr(Database, "blocks", broken)
+    said = r"diverged in pass 2 of 2, section 2 of 3, batch 2: its error is nan\. .* frames of hop, walk\."
+    with pytest.raises(HobbleError, match=said):
+        go()
     kept = files.load_npz(next(tmp_path.glob("checkpoints/*/checkpoint.npz")))
     assert int(kept["sections"]) == 4
     assert np.isfinite(kept["weights"]).all()
 
 
-def test_divergence_stops_the_training_and_names_the_clips(run: Run) -> None:
-    with pytest.raises(
-        HobbleError, match=r"diverged in pass 1 of 2, section \d of 3, batch \d+: .*(walk, hop|hop, walk)"
-    ):
-        run(learning_rate=300.0)
-
-
-def test_cuda_without_a_gpu_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_cannot_be_trained_is_refused(go: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(torch.cuda, "is_available", lambda: False)
     assert checkpoint.choose_device("auto").type == "cpu"
     with pytest.raises(HobbleError, match=r"training\.device is cuda"):
         checkpoint.choose_device("cuda")
-
-
-def test_more_sections_than_samples_are_refused(run: Run) -> None:
     with pytest.raises(HobbleError, match=r"2300 training samples are fewer than training\.sections, 3000"):
-        run(sections=3000)
+        go(sections=3000)
+    monkeypatch.setattr(Database, "row_count", lambda self, split: 0)
+    with pytest.raises(HobbleError, match="no clip is held out"):
+        go(keep="best")
 
 
 @pytest.mark.parametrize(("major", "half"), [(7, False), (8, True)])
@@ -137,32 +119,25 @@ def test_bfloat16_is_chosen_where_a_device_has_it(
     rounds = checkpoint.rounds_to_bfloat16
     assert rounds(training | {"batch": 256}, torch.device("cuda")) is half
     assert rounds(training | {"batch": 32}, torch.device("cuda")) is False
-    assert rounds(training | {"batch": 32, "precision": "bfloat16"}, torch.device("cpu")) is True
-
-
-def test_a_resumed_training_keeps_the_precision_with_which_it_began(
-    run: Run, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """The first part ran on a machine that multiplies bfloat16, the second does not."""
-    half = {"batch": 256, "precision": "auto"}
-    monkeypatch.setattr(checkpoint, "multiplies_bfloat16", lambda: True)
-    whole = run("whole", **half)
-    run("cut", passes=1, **half)
-    monkeypatch.setattr(checkpoint, "multiplies_bfloat16", lambda: False)
-    resumed, other = run("cut", **half), run("other", **half)
-    assert resumed.half
-    assert torch.equal(resumed.network.flat, whole.network.flat)
-    assert not torch.equal(other.network.flat, whole.network.flat)
+    assert rounds(training | {"batch": 32, "precision": "bfloat16"}, CPU) is True
 
 
 @pytest.mark.parametrize(
     "asked", [{"other_paces": 1.2, "keep_channels": True}, {"other_poses": 0.5}, {"rollout": 4}]
 )
 def test_training_changes_batches_only_if_asked_and_never_channels(
-    run: Run, data: Database, given: list[torch.Tensor], asked: Settings
+    go: Run, data: Database, monkeypatch: pytest.MonkeyPatch, asked: Settings
 ) -> None:
+    given: list[torch.Tensor] = []
+    plain = Update.__call__
+
+    def noted(self: Update, x: torch.Tensor, *rest: Any) -> torch.Tensor:
+        given.append(x.clone())
+        return plain(self, x, *rest)
+
+    monkeypatch.setattr(Update, "__call__", noted)
     for number, options in enumerate(({}, asked)):
-        run(str(number), passes=1, sections=2, batch=90, **options)
+        go(str(number), passes=1, sections=2, batch=90, **options)
     half, injury = len(given) // 2, data.layout.x_channel("injury")
     changed = 0
     for without, other in zip(given[:half], given[half:], strict=True):
@@ -173,7 +148,7 @@ def test_training_changes_batches_only_if_asked_and_never_channels(
 
 @pytest.mark.parametrize("keep", [True, False])
 def test_dropout_keeps_the_channels_only_if_asked(
-    run: Run, data: Database, monkeypatch: pytest.MonkeyPatch, keep: bool
+    go: Run, data: Database, monkeypatch: pytest.MonkeyPatch, keep: bool
 ) -> None:
     dropped: list[float] = []
 
@@ -185,5 +160,162 @@ def test_dropout_keeps_the_channels_only_if_asked(
 
     of_update = Update._masks
     monkeypatch.setattr(Update, "_masks", drawn)
-    run(passes=1, sections=2, batch=90, dropout=0.2, keep_channels=keep)
+    go(passes=1, sections=2, batch=90, dropout=0.2, keep_channels=keep)
     assert (max(dropped) == 0) == keep
+
+
+def test_each_batch_has_the_rate_of_its_place(
+    go: Run, training: Settings, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Also in an interrupted run: the rate depends only on the number of samples so far."""
+    fast = {"schedule": "cosine", "warm_up": 0.5, "rollout": 4, "batch": 300}
+    rates: list[float] = []
+    step = Adam.step
+
+    def noted(self: Adam, gradients: list[torch.Tensor], rate: float = 1.0) -> None:
+        rates.append(rate)
+        if len(rates) == 10:
+            raise KeyboardInterrupt
+        step(self, gradients, rate)
+
+    monkeypatch.setattr(Adam, "step", noted)
+    with pytest.raises(KeyboardInterrupt):
+        go(**fast)
+    sizes = [300, 300, 166, 300, 300, 167, 300, 300, 167] * 2
+    seen = np.cumsum([0, *sizes])[: len(sizes)]
+    wanted = [(training | fast).learning_rate_share(samples / 2300) for samples in seen]
+    assert rates == pytest.approx(wanted[:10])
+    del rates[9:]  # the section that was cut short is done again
+    rates += [np.nan] * 3
+    go(**fast)
+    assert rates[12:] == pytest.approx(wanted[9:])
+
+
+def test_the_best_weights_are_written_and_the_checkpoint_keeps_the_last(
+    small_database: Path, network: Settings, training: Settings, tmp_path: Path
+) -> None:
+    # At this rate the error falls for some sections and then rises.
+    wild = training | {"passes": 6, "dropout": 0.0, "l1": 0.0, "learning_rate": 0.02}
+    best, last = (
+        run_in(tmp_path / keep, small_database, network, wild | {"keep": keep}) for keep in ("best", "last")
+    )
+    checkpoint = dict(np.load(last / "checkpoint.npz"))
+    for name, value in np.load(best / "checkpoint.npz").items():
+        if name not in ("seconds", "history"):
+            np.testing.assert_array_equal(value, checkpoint[name], err_msg=name)
+    assert not np.array_equal(checkpoint["weights"], checkpoint["best"])
+    meta = [json.loads(str(np.load(folder / "weights.npz")["meta"])) for folder in (best, last)]
+    errors = checkpoint["history"][:, 5]
+    assert meta[0]["best_section"] == int(errors.argmin()) + 1 < len(errors)
+    assert "best_section" not in meta[1]
+    assert meta[0]["held_out_mse"] == pytest.approx(errors.min(), rel=1e-5), "all held-out rows are measured"
+    assert meta[1]["held_out_mse"] == pytest.approx(errors[-1], rel=1e-5)
+
+
+# The weight of the phase in the loss, and channels whose inputs are divided.
+
+
+def block_of(data: Database) -> tuple[np.ndarray, np.ndarray]:
+    made = next(data.blocks("train", 0, 0, 1, 1, block_rows=10_000))
+    return made.x, made.y
+
+
+def test_only_the_error_of_the_phase_gets_the_weight(data: Database) -> None:
+    heavy = Database.open(data.path, 64, 8.0)
+    (x, y), (weighted_x, weighted_y) = block_of(data), block_of(heavy)
+    at = data.layout.y_phase_change.start
+    assert np.array_equal(weighted_x, x)
+    np.testing.assert_allclose(weighted_y[:, at], 8 * y[:, at], rtol=1e-4, atol=1e-5)
+    assert np.array_equal(np.delete(weighted_y, at, axis=1), np.delete(y, at, axis=1))
+    raw, weighted = (
+        values * each.statistics.y_std + each.statistics.y_mean
+        for values, each in ((y, data), (weighted_y, heavy))
+    )
+    np.testing.assert_allclose(weighted, raw, rtol=1e-4, atol=1e-5)
+    # Held-out errors, here of a network that predicts the means, do not depend on it.
+    means = lambda x, p: torch.zeros(len(x), data.layout.y_size)  # noqa: E731
+    errors = [HeldOutErrors(each, CPU, 0).errors(means, every_row=True) for each in (data, heavy)]
+    assert errors[0] == pytest.approx(errors[1], rel=1e-4)
+
+
+def test_only_the_inputs_of_a_divided_channel_are_smaller(data: Database) -> None:
+    """Raw values stay the same, so a network of the divided rows takes the same severities as any other."""
+    divided = Database.open(data.path, 64, scales={"injury": 5.0})
+    (x, y), (divided_x, divided_y) = block_of(data), block_of(divided)
+    columns = data.layout.x_channel("injury")
+    assert np.abs(x[:, columns]).max() > 0
+    np.testing.assert_allclose(5 * divided_x[:, columns], x[:, columns], rtol=2e-3, atol=1e-6)
+    assert np.array_equal(np.delete(divided_x, columns, axis=1), np.delete(x, columns, axis=1))
+    assert np.array_equal(divided_y, y)
+    raw = [block_of(d)[0] * d.statistics.x_std + d.statistics.x_mean for d in (data, divided)]
+    np.testing.assert_allclose(*raw, rtol=2e-3, atol=1e-3)
+    with pytest.raises(InputError, match="the channel mood is not in this database"):
+        Database.open(data.path, 64, scales={"mood": 2.0})
+
+
+# What the file of a network says about its training data.
+
+
+@pytest.mark.parametrize("memory", [64, 0])
+def test_the_ranges_cover_every_row_with_every_fit(small_database: Path, memory: int) -> None:
+    data = Database.open(small_database, memory)
+    s = data.statistics
+    seen = TrainingFacts.from_rows(data.layout, data.each_row("train"), s)
+    (block,) = data.blocks("train", 0, 0, 1, 0, data.sample_count("train"))
+    x, y = block.x * s.x_std + s.x_mean, block.y * s.y_std + s.y_mean
+    for name, values in (("x", x), ("y", y)):
+        np.testing.assert_array_equal(getattr(seen, f"{name}_low"), values.min(axis=0))
+        np.testing.assert_array_equal(getattr(seen, f"{name}_high"), values.max(axis=0))
+    same = np.flatnonzero((x == seen.start_x).all(axis=1))  # the row to start from, with one of its grounds
+    assert len(same)
+    assert block.p[same[0]] == np.float32(seen.start_phase)
+    columns = np.r_[data.layout.x_position, data.layout.x_direction]
+    columns = np.r_[columns, data.layout.x_joint_position, data.layout.x_joint_velocity]
+    far = np.square(block.x[:, columns]).mean(axis=1)
+    assert (far < far[same[0]] - 1e-6).mean() < 0.01  # of many grounds, another may be nearer to the mean
+
+
+def test_if_no_row_stands_a_character_starts_from_the_stillest(data: Database) -> None:
+    """The gait "stand" can be common in the mean without a row that stands for certain."""
+    stand = data.layout.x_gait.start + GAITS.index("stand") * data.layout.samples + data.layout.samples // 2
+    mean, std = data.statistics.x_mean.copy(), data.statistics.x_std.copy()
+    mean[stand], std[stand] = 0.3, 0.0  # each row stands to 30 %
+    s = replace(data.statistics, x_mean=mean, x_std=std)
+    seen = TrainingFacts.from_rows(data.layout, data.each_row("train"), s)
+    (block,) = data.blocks("train", 0, 0, 1, 0, data.sample_count("train"))
+    x, y = block.x * s.x_std + s.x_mean, block.y * s.y_std + s.y_mean
+    moved = np.square(x[:, data.layout.x_position]).sum(axis=1)
+    moved += np.square(y[:, data.layout.y_joint_velocity]).sum(axis=1)
+    start = np.square(seen.start_x[data.layout.x_position]).sum()
+    start += np.square(seen.start_y[data.layout.y_joint_velocity]).sum()
+    assert start == pytest.approx(moved.min(), rel=1e-3)
+
+
+def test_a_built_network_holds_the_training_clips_and_writes_the_same_files(
+    holden31: Skeleton, tmp_path: Path
+) -> None:
+    rows, splits = {}, {"clip-0": "train", "clip-1": "held_out"}
+    for number, name in enumerate(splits):
+        rows[name] = tmp_path / f"{name}.npz"
+        save_clip_rows(rows[name], clip(holden31, number))
+    write_database(tmp_path / "all", rows, splits, channels=["injury"], joint_weight=0.1)
+    recipe, made = Training(memory_mb=64, device="cpu"), []
+    for clips in (rows, dict(reversed(rows.items()))):
+        run_in(tmp_path, tmp_path / "all", MatchingOptions(), recipe, clips=clips)
+        made.append((tmp_path / "weights.npz").read_bytes())
+    assert made[0] == made[1]
+    network = load_network(tmp_path / "weights.npz")
+    assert network.frames.shape[0] == FRAMES[0]
+    assert network.channels["injury"]
+    (row,) = csv.DictReader((tmp_path / "history.csv").read_text().splitlines())
+    assert (row["pass"], row["section"], row["samples"]) == ("1", "1", str(FRAMES[0] + 1))
+    assert row["train_mse"] == ""
+    data = Database.open(tmp_path / "all", 64)
+    s, squares, count = data.statistics, 0.0, 0
+    for block in data.blocks("held_out", 0, 0, data.manifest.visits, 0, 64):
+        y = network.predict(block.x * s.x_std + s.x_mean, block.p)
+        squares += np.square((y - s.y_mean) / s.y_std - block.y).mean(axis=1).sum()
+        count += len(y)
+    assert float(row["held_out_mse"]) == pytest.approx(squares / count, rel=1e-4)
+    assert int(files.load_npz(tmp_path / "checkpoint.npz")["sections"]) == 0
+    assert not (tmp_path / "checkpoints").exists()

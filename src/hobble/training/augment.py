@@ -5,6 +5,7 @@ Each way to change them is an `Augmentation`. `augmentations` makes those that a
 
 import math
 from abc import ABC, abstractmethod
+from typing import Any
 
 import numpy as np
 import torch
@@ -12,7 +13,7 @@ from torch import Tensor
 
 from hobble.core.quat import Array
 from hobble.database.reader import Database
-from hobble.rows.layout import GAITS, blocks_without_terrain, lower_joints
+from hobble.rows.layout import GAITS, RowLayout, blocks_without_terrain, lower_joints
 from hobble.runtime.trajectory import joint_place
 from hobble.training.batches import TRAIN, SampleBatch
 from hobble.training.options import Training
@@ -58,16 +59,25 @@ def augmentations(
     database: Database, training: Training, places: range, device: torch.device
 ) -> list[Augmentation]:
     """The augmentations that the section `training` asks for, in the order in which they change a batch."""
-    found: list[Augmentation] = []
-    if training.other_paces > 1:
-        found.append(OtherPaces(database, training.other_paces, places, device))
-    if training.other_poses and database.layout.channels:
-        found.append(OtherPoses(database, training.other_poses, places, device))
-    if training.version_poses and database.sources:
-        found.append(VersionPoses(database, training.version_poses, places, device))
-    if training.rollout > 1:
-        found.append(RollOut(database, training.rollout, places, device))
-    return found
+    asked: list[tuple[Any, float, bool]] = [
+        (OtherPaces, training.other_paces, training.other_paces > 1),
+        (OtherPoses, training.other_poses, bool(training.other_poses and database.layout.channels)),
+        (VersionPoses, training.version_poses, bool(training.version_poses and database.sources)),
+        (RollOut, training.rollout, training.rollout > 1),
+    ]
+    return [kind(database, amount, places, device) for kind, amount, is_asked in asked if is_asked]
+
+
+def x_pose(layout: RowLayout) -> slice:
+    """The columns of the pose in X: positions, then velocities of the joints."""
+    return slice(layout.x_joint_position.start, layout.x_joint_velocity.stop)
+
+
+def channel_columns(layout: RowLayout, device: torch.device) -> Tensor:
+    """(n,) the columns of all channels in X."""
+    every = range(layout.x_size)
+    columns = [column for name, _ in layout.channels for column in every[layout.x_channel(name)]]
+    return torch.tensor(columns, dtype=torch.long, device=device)
 
 
 # Plays rows at other paces along smooth paths, so that neither speed nor path shows who walks.
@@ -109,16 +119,14 @@ class OtherPaces(Augmentation):
             torch.from_numpy(part).to(device, torch.float32)
             for part in (statistics.x_std, statistics.x_mean, statistics.y_std, statistics.y_mean)
         )
-        blocks = [layout.x_channel(name) for name, _ in layout.channels]
-        self.channel_columns = [torch.arange(block.start, block.stop, device=device) for block in blocks]
+        self.channels = channel_columns(layout, device)
         time = np.arange(layout.samples) / (layout.samples // 2) - 1.0  # -1 at the first sample, 0 now
         # Matrices that replace the samples of a path by the nearest parabola. The one for positions needs no
         # constant term, because they are 0 in the present frame.
+        powers = np.stack([time**0, time, time**2], axis=1)
         self.smooth_position, self.smooth_direction = (
-            torch.from_numpy(_projection(np.stack([time**k for k in powers], axis=1))).to(
-                device, torch.float32
-            )
-            for powers in ((1, 2), (0, 1, 2))
+            torch.from_numpy(columns @ np.linalg.pinv(columns)).to(device, torch.float32)  # by least squares
+            for columns in (powers[:, 1:], powers)
         )
 
     def change(self, batch: SampleBatch) -> None:
@@ -129,17 +137,16 @@ class OtherPaces(Augmentation):
         )
         # r and a of the class's docstring.
         pace, rise = torch.exp((2 * even_pace - 1) * self.log_factor), (2 * even_rise - 1) * RISE / 2
-        channels = [x[:, columns] for columns in self.channel_columns]
         # Channels get their old values back below. A channel that never varies is standardised by so large a
         # deviation that multiplying and dividing by it loses the value.
+        channels = x[:, self.channels]
         raw_x, raw_y = x * self.x_std + self.x_mean, y * self.y_std + self.y_mean
         self._play_window(raw_x, raw_y, pace, rise)
         self._play_frame(raw_x, raw_y, pace)
         self._smooth(raw_x, smoothness)
         x.copy_((raw_x - self.x_mean) / self.x_std)
         y.copy_((raw_y - self.y_mean) / self.y_std)
-        for columns, values in zip(self.channel_columns, channels, strict=True):
-            x[:, columns] = values
+        x[:, self.channels] = channels
 
     def _play_window(self, x: Tensor, y: Tensor, pace: Tensor, rise: Tensor) -> None:
         """Replace trajectory, gait and ground by those at the new times. pace, rise: (B, 1) r and a.
@@ -180,14 +187,6 @@ class OtherPaces(Augmentation):
         ):
             path = x[:, block].unflatten(1, (2, layout.samples))
             x[:, block] = torch.lerp(path, path @ nearest.T, share[:, :, None]).flatten(1)
-
-
-def _projection(powers: Array) -> Array:
-    """(n, n) the matrix that projects n values onto the columns of `powers` (n, k), by least squares.
-
-    The result is the nearest polynomial if the columns are powers of the time.
-    """
-    return powers @ np.linalg.pinv(powers)
 
 
 def _interpolate(
@@ -241,22 +240,18 @@ class OtherPoses(Augmentation):
 
     def __init__(self, database: Database, share: float, places: range, device: torch.device) -> None:
         super().__init__(places, device)
-        layout, middle = database.layout, database.layout.samples // 2
-        self.share = share
-        blocks = (layout.x_joint_position, layout.x_joint_velocity)
-        # Columns of X: those of the pose, the share of each gait in the present frame, and the channels.
-        self.pose_columns = torch.cat([torch.arange(b.start, b.stop) for b in blocks]).to(device)
-        start, samples = layout.x_gait.start, layout.samples
-        present = [start + gait * samples + middle for gait in range(len(GAITS))]
-        self.gait_columns = torch.tensor(present, device=device)
+        layout = database.layout
+        self.share, self.pose = share, x_pose(layout)
+        # Columns of X: the share of each gait in the present frame, and the channels.
+        first = layout.x_gait.start + layout.samples // 2
+        self.gait_columns = first + layout.samples * torch.arange(len(GAITS), device=device)
         std = torch.from_numpy(database.statistics.x_std).to(device, torch.float32)
         self.gait_std = std[self.gait_columns]
-        columns = [torch.arange(layout.x_size)[layout.x_channel(name)] for name, _ in layout.channels]
-        self.channel_columns = torch.cat(columns).to(device)
+        self.channel_columns = channel_columns(layout, device)
         # The remembered rows of each place. A new row replaces the oldest one.
+        sizes = (6 * layout.joints, len(GAITS), len(self.channel_columns))
         self.poses, self.gaits, self.channels = (
-            torch.zeros(len(places), REMEMBERED_ROWS, len(columns), device=device)
-            for columns in (self.pose_columns, self.gait_columns, self.channel_columns)
+            torch.zeros(len(places), REMEMBERED_ROWS, size, device=device) for size in sizes
         )
         self.phases = torch.full((len(places), REMEMBERED_ROWS), torch.nan, device=device)  # nan: no row yet
 
@@ -269,7 +264,7 @@ class OtherPoses(Augmentation):
         """As in `Augmentation`."""
         x, p = batch.x, batch.p
         rows, slot = len(x), self.batches % REMEMBERED_ROWS
-        pose, values = x[:, self.pose_columns], x[:, self.channel_columns]
+        pose, values = x[:, self.pose].clone(), x[:, self.channel_columns]
         gait = x[:, self.gait_columns] * self.gait_std  # not standardised, apart from a constant
         same_gait = (gait[:, None] - self.gaits[:rows]).abs().amax(dim=2) < SAME_GAIT
         other_value = (values[:, None] - self.channels[:rows]).abs().amax(dim=2) > OTHER_VALUE
@@ -279,7 +274,7 @@ class OtherPoses(Augmentation):
         nearest, chosen = apart.min(dim=1)
         factor = torch.where(nearest < NEAR, self._factors(rows).to(x.dtype), 0.0)
         other_pose = self.poses[torch.arange(rows, device=x.device), chosen]
-        x[:, self.pose_columns] = torch.lerp(pose, other_pose, factor[:, None])
+        x[:, self.pose] = torch.lerp(pose, other_pose, factor[:, None])
         remembered = (self.poses, self.gaits, self.channels, self.phases)
         for table, row in zip(remembered, (pose, gait, values, p), strict=True):
             table[:rows, slot] = row
@@ -339,8 +334,7 @@ class VersionPoses(Augmentation):
         # Clips without hurt versions have a negative key.
         self.own_key = np.where(family < 0, -2.0, 2.0 * (family + len(names) * hurt))
         self.other_key = np.where(family < 0, -2.0, 2.0 * (family + len(names) * ~hurt))
-        self.pose_blocks = (layout.x_joint_position, layout.x_joint_velocity)
-        self.direction_block = layout.x_direction
+        self.pose, self.direction = x_pose(layout), layout.x_direction
         key, poses, directions = _pose_table(database, self.own_key)
         self.key = torch.from_numpy(key).to(device)
         self.poses, self.directions = (torch.from_numpy(array).to(device) for array in (poses, directions))
@@ -360,14 +354,12 @@ class VersionPoses(Augmentation):
         candidates = torch.searchsorted(self.key, sought)[:, None] + self.offsets
         candidates = candidates.clamp(0, len(self.key) - 1)
         is_near = ((self.key[candidates] - sought[:, None]).abs() < NEAR_PHASE) & (sought >= 0)[:, None]
-        path_difference = torch.linalg.vector_norm(
-            self.directions[candidates] - x[moved, self.direction_block][:, None], dim=2
-        )
+        other_way = self.directions[candidates] - x[moved, self.direction][:, None]
+        path_difference = torch.linalg.vector_norm(other_way, dim=2)
         smallest, chosen = torch.where(is_near, path_difference, torch.inf).min(dim=1)
         factor = torch.where(smallest < torch.inf, factors[moved], 0.0).to(x.dtype)
         other_pose = self.poses[candidates.gather(1, chosen[:, None])[:, 0]]
-        for block, other_block in zip(self.pose_blocks, other_pose.chunk(2, dim=1), strict=True):
-            x[moved, block] = torch.lerp(x[moved, block], other_block, factor[:, None])
+        x[moved, self.pose] = torch.lerp(x[moved, self.pose], other_pose, factor[:, None])
 
 
 def _pose_table(database: Database, clip_keys: Array) -> tuple[Array, Array, Array]:
@@ -417,45 +409,38 @@ class RollOut(Augmentation):
     def __init__(self, database: Database, frames: int, places: range, device: torch.device) -> None:
         super().__init__(places, device)
         layout, s = database.layout, database.statistics
-        self.frames = frames
-        self.x_position, self.x_velocity = layout.x_joint_position, layout.x_joint_velocity
+        self.frames, self.pose = frames, x_pose(layout)
         self.y_position, self.y_velocity = layout.y_joint_position, layout.y_joint_velocity
+        x_position, x_velocity = layout.x_joint_position, layout.x_joint_velocity
         # Factors that turn errors in standardised Y into errors in standardised X. For example,
         # `position_of_velocity` is for the error that a velocity in Y causes in a position in X.
         self.position_of_position, self.position_of_velocity, self.velocity_of_velocity = (
-            torch.from_numpy(s.y_std[y_block] / s.x_std[x_block]).to(device, torch.float32)
-            for x_block, y_block in (
-                (self.x_position, self.y_position),
-                (self.x_position, self.y_velocity),
-                (self.x_velocity, self.y_velocity),
+            torch.from_numpy(s.y_std[of_y] / s.x_std[of_x]).to(device, torch.float32)
+            for of_x, of_y in (
+                (x_position, self.y_position),
+                (x_position, self.y_velocity),
+                (x_velocity, self.y_velocity),
             )
         )
-        # The present errors in standardised X, for each place in the batch.
-        self.position, self.velocity = (
-            torch.zeros(len(places), 3 * layout.joints, device=device) for _ in range(2)
-        )
+        # The present errors of the pose in standardised X, for each place in the batch.
+        self.errors = torch.zeros(len(places), 6 * layout.joints, device=device)
 
     def begin_section(self) -> None:
         """As in `Augmentation`."""
         super().begin_section()
-        self.position.zero_()
-        self.velocity.zero_()
+        self.errors.zero_()
 
     def change(self, batch: SampleBatch) -> None:
         """As in `Augmentation`."""
-        rows = len(batch.x)
-        batch.x[:, self.x_position] += self.position[:rows]
-        batch.x[:, self.x_velocity] += self.velocity[:rows]
+        batch.x[:, self.pose] += self.errors[: len(batch.x)]
 
     def after(self, error: Tensor) -> None:
         """As in `Augmentation`: advance the errors by a frame."""
         super().after(error)
-        rows = len(error)
+        before, _ = self.errors[: len(error)].chunk(2, dim=1)
         position, velocity = error[:, self.y_position], error[:, self.y_velocity]
         added = position * self.position_of_position + velocity * self.position_of_velocity
-        self.position[:rows] = joint_place(self.position[:rows], added)  # (d + p + v) / 2
-        torch.mul(velocity, self.velocity_of_velocity, out=self.velocity[:rows])
+        now = joint_place(before, added)  # (d + p + v) / 2
+        self.errors[: len(error)] = torch.cat([now, velocity * self.velocity_of_velocity], dim=1)
         # After each batch, the roll-outs of every `frames`-th place end, so that not all end at once.
-        ended = slice((self.batches - self.places.start) % self.frames, None, self.frames)
-        self.position[ended] = 0
-        self.velocity[ended] = 0
+        self.errors[(self.batches - self.places.start) % self.frames :: self.frames] = 0

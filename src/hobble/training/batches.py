@@ -1,7 +1,7 @@
 """Batches of training samples, a check of their losses, and the errors on held-out clips."""
 
-from collections.abc import Iterable, Iterator, Sequence
-from typing import NamedTuple, Protocol
+from collections.abc import Callable, Iterator, Sequence
+from typing import NamedTuple
 
 import numpy as np
 import torch
@@ -16,24 +16,23 @@ TRAIN = "train"
 CHECK_EVERY = 2048  # samples between checks of the losses; each check waits for the GPU
 # A batch with a larger loss means that training diverged. Predicting the mean of Y gives a loss of 1.
 DIVERGED = 1e4
-MOST_NAMED = 8  # at most this many clips or rows are named in a message
+MOST_NAMED = 8  # at most this many clips are named in a message
 
-Piece = tuple[Tensor, Tensor, Tensor, np.ndarray, np.ndarray]  # x, y, p, clip and frame of a `SampleBatch`
+Piece = tuple[Tensor, Tensor, Tensor, np.ndarray]  # x, y, p and clip of a `SampleBatch`
 
 
 class SampleBatch(NamedTuple):
     """The n samples of a batch that one process has, maybe none, on the device of the training.
 
     A sample is a row of the database (a frame of a clip) with one of its terrain fits. x (n, X) and y (n, Y):
-    standardised. p (n,): phase. clip (n,): index of the clip. frame (n,): number of the frame in the clip.
-    total: number of samples of the batch over all processes.
+    standardised. p (n,): phase. clip (n,): index of the clip. total: number of samples of the batch over all
+    processes.
     """
 
     x: Tensor
     y: Tensor
     p: Tensor
     clip: np.ndarray
-    frame: np.ndarray
     total: int
 
 
@@ -89,31 +88,30 @@ class HostRows:
             x, y, p = (torch.from_numpy(array).to(self.device) for array in block[:3])
             for start in range(0, len(p), per_batch):
                 part = slice(start, start + per_batch)
-                yield x[part], y[part], p[part], block.clip[part], block.frame[part]
+                yield x[part], y[part], p[part], block.clip[part]
 
     @property
     def _empty_piece(self) -> Piece:
-        layout, no_indices = self.database.layout, np.empty(0, np.int32)
+        layout = self.database.layout
         x, y = (torch.empty(0, size, device=self.device) for size in (layout.x_size, layout.y_size))
-        return x, y, x[:, 0], no_indices, no_indices
+        return x, y, x[:, 0], np.empty(0, np.int32)
 
 
 def _join(pieces: Sequence[Piece], empty: Piece) -> Piece:
     """The samples of all pieces as one piece. empty: a piece without samples, the result for no pieces."""
-    x, y, p, clip, frame = zip(empty, *pieces, strict=True)
-    return torch.cat(x), torch.cat(y), torch.cat(p), np.concatenate(clip), np.concatenate(frame)
+    x, y, p, clip = zip(empty, *pieces, strict=True)
+    return torch.cat(x), torch.cat(y), torch.cat(p), np.concatenate(clip)
 
 
 class LossWatch:
     """Adds up the losses of a section, and stops the training if it diverges.
 
-    where: names the pass and section in messages. clips: names by index. processes: all of them stop
-    together, with the message of the process that has the broken rows. samples: number of samples that were
+    where: names the pass and section in messages. clips: names by index. samples: number of samples that were
     added.
     """
 
-    def __init__(self, where: str, clips: tuple[str, ...], processes: Processes = ALONE) -> None:
-        self.where, self.clips, self.processes = where, clips, processes
+    def __init__(self, where: str, clips: tuple[str, ...]) -> None:
+        self.where, self.clips = where, clips
         self.samples, self._batches, self._total = 0, 0, 0.0
         self._waiting: list[tuple[Tensor, SampleBatch]] = []  # loss and batch, not yet checked
 
@@ -134,36 +132,18 @@ class LossWatch:
         for loss, (_, batch) in zip(losses, self._waiting, strict=True):
             self._batches += 1
             if not loss <= DIVERGED:
-                raise self._diverged(f"its error is {loss:.3g}", self._batches, batch)
+                raise self._diverged(loss, batch)
             self._total += loss * batch.total
         self._waiting.clear()
 
-    def _diverged(self, problem: str, number: int, batch: SampleBatch) -> HobbleError:
-        text = f"training diverged in {self.where}, batch {number}: {problem}"
-        return HobbleError(self.processes.choose_error_message(*self._explain(text, batch)))
-
-    def _explain(self, text: str, batch: SampleBatch) -> tuple[str, bool]:
-        """The message that begins with `text`, and whether broken rows are the cause.
-
-        A row is broken if a number in it is not finite. The message names the broken rows, or the clips of
-        the batch if no row is broken.
-        """
-        x, y, p = (part.isfinite().cpu().numpy() for part in batch[:3])
-        broken = ~(x.all(1) & y.all(1) & p)
-        if broken.any():
-            places = zip(batch.clip[broken], batch.frame[broken], strict=True)
-            rows = _name_list([f"{self.clips[clip]} frame {frame}" for clip, frame in places])
-            return f"{text}, because rows of the database are not finite: {rows}. Check these frames.", True
-        names = _name_list([self.clips[clip] for clip in np.unique(batch.clip)])
-        return (
-            f"{text}. The batch holds frames of {names}. The last checkpoint is kept. "
-            "Lower training.learning_rate, or look for broken frames in these clips."
-        ), False
-
-
-def _name_list(names: list[str]) -> str:
-    more = len(names) - MOST_NAMED
-    return ", ".join(names[:MOST_NAMED]) + (f" and {more} more" if more > 0 else "")
+    def _diverged(self, loss: float, batch: SampleBatch) -> HobbleError:
+        names = [self.clips[clip] for clip in np.unique(batch.clip)]
+        more = f" and {len(names) - MOST_NAMED} more" if len(names) > MOST_NAMED else ""
+        return HobbleError(
+            f"training diverged in {self.where}, batch {self._batches}: its error is {loss:.3g}. The batch "
+            f"holds frames of {', '.join(names[:MOST_NAMED])}{more}. The last checkpoint is kept. Lower "
+            "training.learning_rate, or look for broken frames in these clips."
+        )
 
 
 # The error on held-out clips, which are not trained on: over all outputs, and for each block of Y.
@@ -171,17 +151,8 @@ def _name_list(names: list[str]) -> str:
 
 HELD_OUT = "held_out"
 ROWS_AT_ONCE = 2048  # rows predicted at once: enough to be fast, in less than 50 MB
-
-
-class PredictsStandardised(Protocol):
-    """A network that predicts standardised outputs, either in training or read from a file."""
-
-    @property
-    def outputs(self) -> int:
-        """Number of columns of Y."""
-
-    def __call__(self, x: Tensor, p: Tensor) -> Tensor:
-        """Standardised outputs (B, Y) of standardised inputs (B, X) at phases (B,)."""
+# A network: standardised outputs (B, Y) of standardised inputs (B, X) at phases (B,).
+Predict = Callable[[Tensor, Tensor], Tensor]
 
 
 class HeldOutErrors:
@@ -189,7 +160,7 @@ class HeldOutErrors:
 
     section_samples: number of training samples in a section. The held-out sample has a tenth as many rows,
     but at least 2,000 and at most 20,000, so measuring it after each section takes a few percent of the
-    training time. The sample is kept in memory. `errors_on_every_row` measures all rows without keeping them.
+    training time. The sample is kept in memory.
     """
 
     def __init__(self, database: Database, device: torch.device, section_samples: int) -> None:
@@ -203,21 +174,14 @@ class HeldOutErrors:
             if rows <= 0:
                 break
 
-    def errors(self, network: PredictsStandardised) -> list[float]:
-        """On the sample, the mean squared error of the whole standardised output, then of each block of Y.
+    def errors(self, network: Predict, every_row: bool = False) -> list[float]:
+        """The mean squared error of the whole standardised output, then of each block of Y.
 
-        The blocks have the order of `RowLayout.blocks("y")`. Without held-out rows, all errors are nan.
+        every_row: whether to measure all held-out rows instead of the sample. The blocks have the order of
+        `RowLayout.blocks("y")`. Without held-out rows, all errors are nan.
         """
-        return self._errors(network, self.sample)
-
-    def errors_on_every_row(self, network: PredictsStandardised) -> list[float]:
-        """The same errors as `errors`, on every held-out row."""
-        return self._errors(network, self._batches())
-
-    def _errors(self, network: PredictsStandardised, batches: Iterable[tuple[Tensor, ...]]) -> list[float]:
-        total = np.zeros(network.outputs)
-        rows = 0
-        for x, y, p in batches:
+        total, rows = np.zeros(self.database.layout.y_size), 0
+        for x, y, p in self._batches() if every_row else self.sample:
             squares = torch.square(network(x, p).sub_(y))
             total += squares.sum(0, dtype=torch.float64).cpu().numpy()
             rows += len(x)

@@ -13,7 +13,7 @@ import torch
 
 from hobble.core.declared import ArrayOf, check_arrays
 from hobble.core.errors import HobbleError, InputError
-from hobble.core.files import DELETE_IT, Arrays, load_npz, printable, write_text
+from hobble.core.files import DELETE_IT, Arrays, load_npz, printable, write_csv
 from hobble.core.processors import count_cores, multiplies_bfloat16
 from hobble.core.skeleton import Skeleton
 from hobble.database.chunks import FILE
@@ -25,52 +25,37 @@ from hobble.training.optimiser import Adam
 from hobble.training.options import Machines, Training
 from hobble.training.processes import ALONE, Processes
 
-# The columns of history.csv before the held-out errors of the blocks of Y; `columns` explains them.
+# The columns of history.csv before the held-out errors of the blocks of Y.
 COLUMNS = ("pass", "section", "samples", "seconds", "train_mse", "held_out_mse")
 
 
-def columns(blocks: Iterable[str]) -> list[str]:
-    """The names of all columns of history.csv. blocks: names of the blocks of Y.
+def write_history(path: Path, blocks: Iterable[str], rows: Sequence[Sequence[float]]) -> None:
+    """Write history.csv. blocks: names of the blocks of Y. rows: the values of the columns for each section.
 
     Samples and seconds are totals from the start; passes and sections begin at 1. train_mse is the mean over
     the section's batches, with dropout. The held-out errors are measured at the end of the section, without
-    dropout. All errors are mean squared errors of the standardised output.
+    dropout. All errors are mean squared errors of the standardised output. A value that is nan (a held-out
+    error without held-out clips) is left empty.
     """
-    return [*COLUMNS, *(f"held_out_{name}" for name in blocks)]
-
-
-def write_history(path: Path, blocks: Iterable[str], rows: Sequence[Sequence[float]]) -> None:
-    """Write history.csv. blocks: names of the blocks of Y. rows: the values of `columns` for each section.
-
-    A value that is nan (a held-out error without held-out clips) is left empty.
-    """
-    lines = [",".join(columns(blocks))]
-    lines += [",".join(_cell(i, value) for i, value in enumerate(row)) for row in rows]
-    write_text(path, "\n".join(lines) + "\n")
-
-
-def _cell(column: int, value: float) -> str:
-    """A value as text: counts in columns 0 to 2, seconds in column 3, then errors."""
-    if value != value:  # nan
-        return ""
-    return str(round(value)) if column < 3 else f"{value:.3f}" if column == 3 else f"{value:.8g}"
+    names, lines = [*COLUMNS, *(f"held_out_{name}" for name in blocks)], []
+    for row in rows:
+        counts, seconds, errors = map(round, row[:3]), round(row[3], 3), (float(f"{v:.8g}") for v in row[4:])
+        lines.append(dict(zip(names, (*counts, seconds, *errors), strict=True)))
+    write_csv(path, lines)
 
 
 # Checkpoints. Each is one file with the complete state of a training.
-
-
-HELD_OUT_COLUMN = COLUMNS.index("held_out_mse")  # the place of the held-out error in a row of the history
 
 
 @dataclass
 class State:
     """The state of a training after `sections_done` whole sections (parts of a pass), counted from its start.
 
-    adam: the optimiser. samples, seconds: training samples and training time so far. best_mse, best: the
-    lowest held-out error so far, and the weights with this error, laid out like `network.flat`. history: one
-    row of numbers per section, with the COLUMNS, then the held-out error of each block of Y. recipe: hash of
-    everything that determines the result (`run_name`). half: whether products round their factors to
-    bfloat16, as chosen for the machine on which the training began.
+    adam: the optimiser. samples, seconds: training samples and training time so far. best: the weights with
+    the lowest held-out error so far, laid out like `network.flat`. history: one row of numbers per section,
+    with the COLUMNS, then the held-out error of each block of Y. recipe: hash of everything that determines
+    the result (`run_name`). half: whether products round their factors to bfloat16, as chosen for the machine
+    on which the training began.
     There is no state of random generators: pass and section seed the order of the rows and dropout.
     """
 
@@ -79,33 +64,33 @@ class State:
     sections_done: int = 0
     samples: int = 0
     seconds: float = 0.0
-    best_mse: float = float("inf")
     best: torch.Tensor | None = None
     history: list[list[float]] = field(default_factory=list)
     recipe: str = ""
     half: bool = False
 
+    @property
+    def tensors(self) -> dict[str, torch.Tensor]:
+        """Name in a checkpoint -> each tensor that determines how the training goes on."""
+        adam = self.adam
+        return {"weights": self.network.flat, "first": adam.first_moment, "second": adam.second_moment}
+
     def keep_best(self, held_out_mse: float) -> None:
         """Remember the present weights if their held-out error is the lowest so far."""
-        if held_out_mse < self.best_mse:
-            self.best_mse, self.best = held_out_mse, self.network.flat.clone()
+        if held_out_mse < min(self.held_out_errors, default=float("inf")):
+            self.best = self.network.flat.clone()
 
     @property
-    def sections_since_best(self) -> int:
-        """Number of sections since the one with the lowest held-out error; 0 before the first section."""
-        errors = [row[HELD_OUT_COLUMN] for row in self.history]
-        return len(errors) - 1 - int(np.argmin(errors)) if errors else 0
+    def held_out_errors(self) -> list[float]:
+        """The held-out error after each section."""
+        return [row[COLUMNS.index("held_out_mse")] for row in self.history]
 
 
 def pack(state: State) -> dict[str, np.ndarray]:
     """Copies of everything in `state`, as the arrays of a checkpoint file."""
-    best = state.network.flat if state.best is None else state.best
+    tensors = {**state.tensors, "best": state.network.flat if state.best is None else state.best}
     return {
-        "weights": _numpy_copy(state.network.flat),
-        "first": _numpy_copy(state.adam.first_moment),
-        "second": _numpy_copy(state.adam.second_moment),
-        "best": _numpy_copy(best),
-        "best_mse": np.array(state.best_mse),
+        **{name: tensor.detach().cpu().numpy().copy() for name, tensor in tensors.items()},
         "steps": np.array(state.adam.steps),
         "sections": np.array(state.sections_done),
         "samples": np.array(state.samples),
@@ -117,15 +102,15 @@ def pack(state: State) -> dict[str, np.ndarray]:
     }
 
 
-# What a checkpoint holds, for a network of N parameters after S sections. Held-out errors are NaN, and the
-# best one is infinite, if no clip is held out.
+# What a checkpoint holds, for a network of N parameters after S sections. If no clip is held out, its history
+# has NaN.
 DECLARED = {
     "network": ArrayOf((), "U"),
     **{name: ArrayOf(("N",)) for name in ("weights", "first", "best")},
     "second": ArrayOf(("N",), low=0),
     **{name: ArrayOf((), "iu", low=0) for name in ("sections", "steps", "samples")},
-    "best_mse": ArrayOf((), low=0, finite=False),
     "seconds": ArrayOf((), low=0),
+    "half": ArrayOf((), "b"),
     "history": ArrayOf(("S", "columns"), finite=False),
 }
 
@@ -148,18 +133,12 @@ def unpack(data: Mapping[str, np.ndarray], state: State, path: Path) -> None:
     found = check_arrays(path, data, DECLARED, lengths, DELETE_IT)
     if found["S"] != int(data["sections"]) or found["columns"] < len(COLUMNS):
         raise InputError(path, "its history does not fit its number of sections", fix=DELETE_IT)
-    state.network.flat.copy_(torch.from_numpy(data["weights"]))
-    state.adam.first_moment.copy_(torch.from_numpy(data["first"]))
-    state.adam.second_moment.copy_(torch.from_numpy(data["second"]))
+    for name, tensor in state.tensors.items():
+        tensor.copy_(torch.from_numpy(data[name]))
     state.adam.steps = int(data["steps"])
-    state.best, state.best_mse = torch.from_numpy(data["best"]), float(data["best_mse"])
+    state.best, state.half = torch.from_numpy(data["best"]), bool(data["half"])
     state.sections_done, state.samples = int(data["sections"]), int(data["samples"])
     state.seconds, state.history = float(data["seconds"]), data["history"].tolist()
-    state.half = bool(data.get("half", state.half))
-
-
-def _numpy_copy(flat: torch.Tensor) -> np.ndarray:
-    return flat.detach().cpu().numpy().copy()
 
 
 # Prepares a training: sets threads and device, names the run, and reads the checkpoint to resume from.
@@ -170,7 +149,7 @@ def _numpy_copy(flat: torch.Tensor) -> np.ndarray:
 log = logging.getLogger("hobble.training")
 
 # Keys of the section `training` that the recipe hash leaves out; see `recipe_hash`.
-NOT_IN_RECIPE_HASH = ("continues", "device", "keep", "patience", *Machines.model_fields)
+NOT_IN_RECIPE_HASH = ("continues", "device", "keep", *Machines.model_fields)
 # Keys of the section `training` that are arguments of `Adam`.
 ADAM_KEYS = ("learning_rate", "beta1", "beta2", "l1")
 # The arrays of a checkpoint that determine how a training goes on. `run_name` includes them in the run's
@@ -250,10 +229,9 @@ def begin_or_resume(
     state, path = new_state(database, network, training, processes), checkpoints
     if processes.is_first:
         path = _restore(state, training, recipe, checkpoints, start)
-    processes.take_from_first(state.network.flat, state.adam.first_moment, state.adam.second_moment)
-    numbers = (state.adam.steps, state.sections_done, state.samples, int(state.half))
-    state.adam.steps, state.sections_done, state.samples, half = processes.numbers_of_first(*numbers)
-    state.half = bool(half)
+    numbers = (state.adam.steps, state.sections_done, state.samples, state.half)
+    numbers = processes.take_from_first(state.tensors.values(), numbers)
+    state.adam.steps, state.sections_done, state.samples, state.half = numbers
     return state, path
 
 
@@ -265,27 +243,15 @@ def _restore(state: State, training: Training, recipe: str, checkpoints: Path, s
     start_arrays = None if start is None else load_npz(start)
     state.recipe = run_name(recipe, start_arrays)
     own_path = checkpoints / state.recipe / "checkpoint.npz"
-    last_section = training.all_sections
+    data = start_arrays
     if own_path.exists():
-        data = load_npz(own_path)
-        check_arrays(own_path, data, {"sections": DECLARED["sections"]}, fix=DELETE_IT)
-        if int(data["sections"]) <= last_section:
-            unpack(data, state, own_path)
-            log.info("resuming from %s, after section %d of %d", own_path, state.sections_done, last_section)
-            return own_path
-        log.warning(
-            "%s has more than %g passes, so it is not used and the training starts again",
-            own_path,
-            training.passes,
-        )
-    if start is not None and start_arrays is not None:
-        unpack(start_arrays, state, start)
-        if state.recipe != recipe:
-            log.warning(
-                "%s was made with other settings, data or code; the training resumes from it all the same",
-                start,
-            )
-        log.info("resuming from %s, after section %d of %d", start, state.sections_done, last_section)
+        own = load_npz(own_path)
+        check_arrays(own_path, own, {"sections": DECLARED["sections"]}, fix=DELETE_IT)
+        data = own if int(own["sections"]) <= training.all_sections else data
+    if data is not None:
+        unpack(data, state, Path(data.path))
+        section = f"section {state.sections_done} of {training.all_sections}"
+        log.info("resuming from %s, after %s", data.path, section)
     return own_path
 
 
@@ -307,14 +273,13 @@ def choose_device(wanted: str, processes: Processes = ALONE) -> torch.device:
     If there are several processes, each one has its own GPU. Raises HobbleError if "cuda" is wanted but not
     available.
     """
-    has_cuda = torch.cuda.is_available()
-    if wanted == "cuda" and not has_cuda:
+    if wanted != "cpu" and torch.cuda.is_available():
+        return torch.device("cuda", processes.local_rank)
+    if wanted == "cuda":
         raise HobbleError(
             "training.device is cuda, but PyTorch finds no CUDA device here. Set it to auto or cpu"
         )
-    if not has_cuda or wanted == "cpu":
-        return torch.device("cpu")
-    return torch.device("cuda") if processes.is_alone else torch.device("cuda", processes.local_rank)
+    return torch.device("cpu")
 
 
 def rounds_to_bfloat16(training: Training, device: torch.device) -> bool:

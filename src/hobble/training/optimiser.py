@@ -1,6 +1,5 @@
 """Updates the weights: Adam, the update of one or several processes, and symmetric networks."""
 
-from collections.abc import Sequence
 from typing import Any
 
 import numba
@@ -109,9 +108,9 @@ class Update:
     the rows of the batch. So each process multiplies its gradient and loss by its share of the rows. Then the
     sums over the processes are the gradient and the loss of the whole batch.
 
-    batch: rows of a whole batch. undropped: blocks of columns of X that dropout never drops, such as
-    channels. A dropped input gets its mean value. So if channels were dropped, a hurt body would seem less
-    hurt, and the network would rely less on its channels.
+    batch: rows of a whole batch. undropped: columns of X that dropout never drops, such as channels. A
+    dropped input gets its mean value. So if channels were dropped, a hurt body would seem less hurt, and the
+    network would rely less on its channels.
     """
 
     def __init__(
@@ -120,7 +119,7 @@ class Update:
         adam: Adam,
         batch: int = 0,
         processes: Processes = ALONE,
-        undropped: Sequence[slice] = (),
+        undropped: Tensor | None = None,
     ) -> None:
         self.step, self.adam, self.processes, self.undropped = step, adam, processes, undropped
         self.own = processes.own_places(batch)
@@ -156,8 +155,8 @@ class Update:
     def _masks(self, rows: int, own: slice) -> list[Tensor]:
         """Draw the dropout masks of a batch of `rows` rows, and return those of the rows `own`."""
         masks = self.step.masks(rows, own)
-        for block in self.undropped:
-            masks[self.step.input_mask][:, block] = 1.0
+        if self.undropped is not None:
+            masks[self.step.input_mask][:, self.undropped] = 1.0
         return masks
 
 
@@ -199,14 +198,6 @@ class Symmetry:
         for layer, _ in self.layers:
             layer[:, :, :-1].mul_(2**0.5)
         self.enforce()  # again, because the symmetric biases depend on the weights
-
-    def after_step(self, steps: int) -> None:
-        """Make the network symmetric after some of the steps. Call this after each step.
-
-        steps: number of steps of the whole training so far.
-        """
-        if steps % STEPS_BETWEEN == 0:
-            self.enforce()
 
     def enforce(self) -> None:
         """Replace each layer by the mean of itself and its mirror image."""

@@ -5,19 +5,9 @@ from __future__ import annotations
 import math
 from typing import Annotated, Literal
 
-from pydantic import AfterValidator, Field, PlainSerializer, model_validator
+from pydantic import Field, model_validator
 
 from hobble.core.section import Positive, PositiveFloat, Section, Share
-
-
-def _int_if_whole(number: float) -> float:
-    """Turn 3.0 into 3, so that both give the same hash of the recipe."""
-    return int(number) if number == int(number) else number
-
-
-# Writes a number as it is, because pydantic would write 3 as 3.0.
-AsItIs = PlainSerializer(lambda number: number, return_type=int | float)
-Passes = Annotated[float, Field(gt=0, le=1_000_000), AfterValidator(_int_if_whole), AsItIs]
 
 
 class Recipe(Section):
@@ -27,7 +17,9 @@ class Recipe(Section):
     a random sample of the data.
     """
 
-    passes: Passes = Field(20, description="passes over the data; with a fraction, the last one ends early")
+    passes: Positive | PositiveFloat = Field(
+        20, description="passes over the data; with a fraction, the last one ends early"
+    )
     sections: Positive = 10
     batch: Positive = Field(32, description="samples of a step, over all processes")
     learning_rate: PositiveFloat = 1e-4
@@ -44,50 +36,39 @@ class Recipe(Section):
         0.01, description="factor of the mean absolute weights in the loss"
     )
     rollout: Positive = Field(
-        1,
-        description="frames of a roll-out, in which the input poses get the errors of earlier predictions, "
-        "as at run time; 1: no roll-outs",
+        1, description="frames for which input poses get the errors of earlier predictions; 1: none"
     )
     other_poses: Annotated[float, Field(ge=0, le=1)] = Field(
         0.0,
-        description="share of the samples whose input pose is moved towards or away from the pose of a clip "
-        "with other channel values; for channels that are constant in each clip, such as a style",
+        description="share of the samples whose input pose is moved towards or away from that of a clip with "
+        "other channel values",
     )
     version_poses: Annotated[float, Field(ge=0, le=1)] = Field(
         0.0,
-        description="share of the samples whose input pose is moved towards or away from the pose of "
-        "another version (healthy or hurt) of the same clip; only for clips with hurt versions",
+        description="share of the samples whose input pose is moved towards or away from that of another "
+        "version (healthy or hurt) of the clip",
     )
     other_paces: Annotated[float, Field(ge=1, le=2)] = Field(
         1.0,
-        description="samples are played slower or faster, at most by this factor, and their paths "
-        "are smoothed; for channels that are constant in each clip, such as a style; 1: neither",
+        description="samples are played slower or faster, at most by this factor, and their paths are "
+        "smoothed; 1: neither",
     )
     keep_channels: bool = Field(False, description="dropout never drops the inputs of channels")
     symmetric: bool = Field(
-        False,
-        description="keep the network symmetric: mirrored inputs give mirrored outputs; for data sets with "
-        "`mirror: true`",
+        False, description="mirrored inputs give mirrored outputs; for data sets with `mirror: true`"
     )
     phase_weight: PositiveFloat = Field(
-        1.0,
-        description="factor of the error in the change of phase, before errors are squared. The change of "
-        "phase is only one of 311 outputs, but decides when each foot lands",
+        1.0, description="factor of the error in the change of phase, before errors are squared"
     )
     scales: dict[str, PositiveFloat] = Field(
         {},
         description="for each channel, a number by which its inputs are divided in training and at run time, "
-        "so that it counts less: the network learns milder and smoother effects; default: 1",
+        "so that it counts less",
     )
     keep: Literal["last", "best"] = Field(
         "last",
         description="weights to write: those at the end, as in Holden et al. (2017), or those with the "
         "lowest held-out error after a section",
-    )
-    patience: Positive | None = Field(
-        None,
-        description="end the training after this many sections without a lower held-out error; null: only "
-        "after all passes",
     )
     seed: int = 1
     memory_mb: Positive = Field(512, description="memory for the rows of the database, for each process")
@@ -116,11 +97,6 @@ class Recipe(Section):
             raise ValueError(
                 f"`passes` ({self.passes:g}) times `sections` ({self.sections}) must be a whole number: "
                 "training can end only after a whole section"
-            )
-        if self.stretches and self.stretches > self.batch:
-            raise ValueError(
-                f"`stretches` ({self.stretches}) must not be more than `batch` ({self.batch}): "
-                "each batch takes at least one sample from each stretch"
             )
         return self
 
@@ -177,19 +153,17 @@ class Training(Machines, Recipe):
 
     @model_validator(mode="after")
     def _check_processes(self) -> Training:
-        if self.gpus and self.processes > 1:
+        if self.gpus and (self.processes > 1 or self.device == "cpu"):
+            raise ValueError("`gpus` has one process for each GPU. Set no `processes`, and no `device: cpu`")
+        stretches = self.stretches or self.count
+        if stretches % self.count:
             raise ValueError(
-                "set `gpus` or `processes`, not both: there is one process for each GPU of a node"
+                f"`stretches` ({stretches}) must be a multiple of the {self.count} processes: each process "
+                "reads whole stretches"
             )
-        if self.gpus and self.device == "cpu":
-            raise ValueError("`gpus` needs `device: cuda` or `device: auto`")
-        if self.stretches and self.stretches % self.count:
+        if stretches > self.batch:
             raise ValueError(
-                f"`stretches` ({self.stretches}) must be a multiple of the {self.count} processes: "
-                "each process reads whole stretches"
-            )
-        if self.count > self.batch:
-            raise ValueError(
-                f"{self.count} processes share a batch of {self.batch}: each needs at least one sample"
+                f"`batch` ({self.batch}) must have at least one sample for each of {stretches} processes or "
+                "stretches"
             )
         return self

@@ -8,10 +8,10 @@ does not communicate and does not start torch.distributed.
 import contextlib
 import os
 import zlib
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from datetime import timedelta
-from typing import Any
+from typing import Any, TypeVar
 
 import torch
 import torch.distributed
@@ -20,6 +20,7 @@ from torch import Tensor
 from hobble.core.errors import HobbleError
 from hobble.database.order import own_part
 
+Numbers = TypeVar("Numbers")
 LONGEST_WAIT = timedelta(minutes=30)  # for the slowest process; a dead process is noticed at once
 
 
@@ -53,30 +54,14 @@ class Processes:
         if not self.is_alone:
             torch.distributed.all_reduce(values)
 
-    def take_from_first(self, *tensors: Tensor) -> None:
-        """Replace the tensors by those of the first process."""
+    def take_from_first(self, tensors: Iterable[Tensor], numbers: Numbers) -> Numbers:
+        """Replace the tensors by those of the first process. Returns the numbers that it passes."""
+        shared: list[Any] = [numbers]
         if not self.is_alone:
             for tensor in tensors:
                 torch.distributed.broadcast(tensor, 0)
-
-    def numbers_of_first(self, *numbers: int) -> list[int]:
-        """The numbers that the first process passes. Every process calls this and gets them."""
-        shared: list[Any] = [numbers]
-        if not self.is_alone:
             torch.distributed.broadcast_object_list(shared, 0)
-        return list(shared[0])
-
-    def choose_error_message(self, text: str, certain: bool) -> str:
-        """Choose one error message for all processes. text: that of this process.
-
-        certain: whether this process knows the cause of the error. The first process that knows it decides;
-        if none does, process 0.
-        """
-        if self.is_alone:
-            return text
-        texts: list[Any] = [None] * self.count
-        torch.distributed.all_gather_object(texts, (not certain, text))
-        return str(min(enumerate(texts), key=lambda item: (item[1][0], item[0]))[1][1])
+        return shared[0]  # type: ignore[no-any-return]
 
     def check_same(self, flat: Tensor) -> None:
         """Raise HobbleError if the processes hold different weights. flat: the weights of this process."""

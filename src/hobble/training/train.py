@@ -29,8 +29,8 @@ from hobble.models.load import load_network
 from hobble.models.model import BuiltOptions, FinishedNetwork, Options
 from hobble.models.network import TERRAIN_SIDE, Network, TrainingFacts
 from hobble.rows.layout import CONTACTS, GAITS
-from hobble.training.augment import augmentations
-from hobble.training.batches import HELD_OUT, TRAIN, HeldOutErrors, HostRows, LossWatch, PredictsStandardised
+from hobble.training.augment import augmentations, channel_columns
+from hobble.training.batches import HELD_OUT, TRAIN, HeldOutErrors, HostRows, LossWatch, Predict
 from hobble.training.checkpoint import (
     State,
     begin_or_resume,
@@ -40,7 +40,7 @@ from hobble.training.checkpoint import (
     use_threads,
     write_history,
 )
-from hobble.training.optimiser import Symmetry, Update
+from hobble.training.optimiser import STEPS_BETWEEN, Symmetry, Update
 from hobble.training.options import Training
 from hobble.training.processes import ALONE, Processes
 
@@ -71,17 +71,15 @@ def train(
 
     The result depends on the arguments and the number of threads, but not on interruptions. Raises
     HobbleError if the training error is not finite (the message names the batch, and the last checkpoint
-    stays), if there are fewer samples than sections, if `keep` or `patience` need a held-out error but no
-    clip is held out, and if `symmetric` is set for a network that cannot be symmetric.
+    stays), if there are fewer samples than sections, and if `keep: best` needs a held-out error but no clip
+    is held out.
     """
     use_threads(threads)
-    if (training.patience or training.keep == "best") and not database.row_count(HELD_OUT):
+    if training.keep == "best" and not database.row_count(HELD_OUT):
         raise HobbleError(
-            "`training.keep: best` and training.patience need the held-out error, but no clip is held out. "
-            "List some clips under held_out in the data set."
+            "`training.keep: best` needs the held-out error, but no clip is held out. List some clips under "
+            "held_out in the data set."
         )
-    if training.symmetric and network.why_not_symmetric:
-        raise HobbleError(f"training.symmetric: {network.why_not_symmetric}. Write `symmetric: false`.")
     samples, sections = database.sample_count(TRAIN), training.sections
     if samples < sections:
         raise HobbleError(
@@ -90,10 +88,8 @@ def train(
         )
     recipe = recipe_hash(network, training, database, code)
     state, path = begin_or_resume(database, network, training, recipe, Path(checkpoints), start, processes)
-    if not processes.is_first:
-        _run(state, database, training, processes, None)
-        return state
-    _run(state, database, training, processes, TrainingRecorder(state, database, training, path))
+    recorder = TrainingRecorder(state, database, training, path) if processes.is_first else None
+    _run(state, database, training, processes, recorder)
     return state
 
 
@@ -108,7 +104,8 @@ def _run(
     sections, seed = training.sections, training.seed
     device, batch_size = state.network.flat.device, training.batch
     step = step_for(state.network, training, state.half)
-    update = Update(step, state.adam, batch_size, processes, _undropped_inputs(database, training))
+    undropped = channel_columns(database.layout, device) if training.keep_channels else None
+    update = Update(step, state.adam, batch_size, processes, undropped)
     symmetry = Symmetry(state.network, database) if training.symmetric else None
     if symmetry and not state.adam.steps:  # no step yet, so the weights are new
         symmetry.make_new_network_symmetric()
@@ -116,15 +113,9 @@ def _run(
     augmented = augmentations(database, training, processes.own_places(batch_size), device)
     samples = database.sample_count(TRAIN)
     for index in range(state.sections_done, training.all_sections):
-        if (
-            training.patience
-            and processes.numbers_of_first(state.sections_since_best)[0] >= training.patience
-        ):
-            log.info("no lower held-out error for %d sections: training ends", training.patience)
-            break
         pass_index, section = divmod(index, sections)
         where = f"pass {pass_index + 1} of {training.passes:g}, section {section + 1} of {sections}"
-        watch = LossWatch(where, database.clips, processes)
+        watch = LossWatch(where, database.clips)
         step.seed(section_seed(seed, index))
         for augmentation in augmented:
             augmentation.begin_section()
@@ -135,8 +126,8 @@ def _run(
             watch.add(update(batch.x, batch.y, batch.p, rate_share, batch.total), batch)
             for augmentation in augmented:
                 augmentation.after(step.error)
-            if symmetry:
-                symmetry.after_step(state.adam.steps)
+            if symmetry and state.adam.steps % STEPS_BETWEEN == 0:
+                symmetry.enforce()
         if symmetry:
             symmetry.enforce()
         train_mse = watch.mean()
@@ -144,12 +135,6 @@ def _run(
         state.sections_done, state.samples = index + 1, state.samples + watch.samples
         if recorder:
             recorder.end_section(where, [pass_index + 1, section + 1], train_mse)
-
-
-def _undropped_inputs(database: Database, training: Training) -> list[slice]:
-    """The blocks of columns of X that dropout never drops: the channels, or none."""
-    layout = database.layout
-    return [layout.x_channel(name) for name, _ in layout.channels] if training.keep_channels else []
 
 
 def section_seed(seed: int, index: int) -> int:
@@ -184,18 +169,11 @@ class TrainingRecorder:
         state.keep_best(errors[0])
         state.history.append([*place, state.samples, state.seconds, train_mse, *errors])
         save_npz(self.path, **pack(state))
-        self._report(where)
-
-    def _report(self, where: str) -> None:
-        """Log the errors, the speed and the time left."""
-        state, seconds = self.state, time.perf_counter() - self.began
-        speed = (state.samples - self.samples_before) / seconds
+        speed = (state.samples - self.samples_before) / (time.perf_counter() - self.began)
         left = format_duration((self.goal - state.samples) / speed)
-        train_mse, held_out_mse = state.history[-1][4:6]
-        errors = f"error {train_mse:.4f}, held out {held_out_mse:.4f}"
+        said = f"{left} left, error {train_mse:.4f}, held out {errors[0]:.4f}, {speed:,.0f} samples/s"
         # The terminal shows the share done and what follows it, see snakemake_logger_plugin_hobble.
-        share = 100 * state.samples // self.goal
-        log.info("%s: %d %% done, %s left, %s, %s samples/s", where, share, left, errors, f"{speed:,.0f}")
+        log.info("%s: %d %% done, %s", where, 100 * state.samples // self.goal, said)
 
 
 # From a database to the files of a network.
@@ -287,11 +265,13 @@ def run(
 
     if isinstance(network, BuiltOptions):
         began = time.perf_counter()
-        built, rows = build(data, network, clips or {})
+        used = [clip for clip in data.manifest.clips if clip["split"] == TRAIN and clip["rows"]]
+        files, rows = [(clips or {})[clip["clip"]] for clip in used], sum(clip["rows"] for clip in used)
+        built = network.build(files, data.layout, Skeleton.from_dict(data.skeleton))
         seconds = time.perf_counter() - began
         log.info("%s, from %d rows in %s", built.description, rows, format_duration(seconds))
         write(built, {"passes": 1, "samples": rows, "steps": 0})
-        errors = errors_on_held_out(data, StandardisedNetwork(load_network(weights)))
+        errors = errors_on_held_out(data, standardised(load_network(weights)))
         lines = [[1, 1, rows, seconds, float("nan"), *errors]]
         arrays = {"network": np.array(built.description), "sections": np.array(0)}
     else:
@@ -299,15 +279,14 @@ def run(
         state = train(data, **options, threads=threads, start=start, code=code)  # type: ignore[arg-type]
         arrays, lines = pack(state), state.history  # of the last weights, before the best ones replace them
         about = {
-            "passes": count_passes(state.sections_done, training.sections),
+            "passes": training.passes,
             "samples": state.samples,
             "steps": state.adam.steps,
             "precision": "bfloat16" if state.half else "float32",
         }
         if training.keep == "best" and state.best is not None:
             state.network.flat.copy_(state.best)
-            about["best_section"] = state.sections_done - state.sections_since_best
-            log.info("best weights: section %d of %d", about["best_section"], state.sections_done)
+            about["best_section"] = 1 + int(np.argmin(state.held_out_errors))
         errors = errors_on_held_out(data, state.network, state.network.flat.device)
         if data.row_count(HELD_OUT):
             about["held_out_mse"] = errors[0]
@@ -316,53 +295,19 @@ def run(
     save_npz(checkpoint, **arrays)
 
 
-def errors_on_held_out(
-    data: Database, network: PredictsStandardised, device: torch.device | str = "cpu"
-) -> list[float]:
+def errors_on_held_out(data: Database, network: Predict, device: torch.device | str = "cpu") -> list[float]:
     """The errors of `HeldOutErrors` on every held-out row, which are also logged."""
-    errors = HeldOutErrors(data, torch.device(device), 0).errors_on_every_row(network)
+    errors = HeldOutErrors(data, torch.device(device), 0).errors(network, every_row=True)
     named = zip(["all outputs", *data.layout.blocks("y")], errors, strict=True)
     log.info("error on every held-out row: %s", ", ".join(f"{name} {error:.4f}" for name, error in named))
     return errors
 
 
-def build(
-    database: Database, network: BuiltOptions, clips: Mapping[str, str | Path]
-) -> tuple[FinishedNetwork, int]:
-    """Build the network from the training clips; return it and the number of their rows in the database.
+def standardised(network: Network) -> Predict:
+    """A network that was read from a file, with standardised inputs and outputs like one in training."""
 
-    clips: as in `run`. Raises InputError if a file does not fit the database, and HobbleError if
-    a clip has no file.
-    """
-    used = [clip for clip in database.manifest.clips if clip["split"] == TRAIN and clip["rows"]]
-    if missing := [clip["clip"] for clip in used if clip["clip"] not in clips]:
-        raise HobbleError(
-            f"the database has rows of {', '.join(missing)}, but the files of these clips are missing"
-        )
-    files = [clips[clip["clip"]] for clip in used]
-    built = network.build(files, database.layout, Skeleton.from_dict(database.skeleton))
-    return built, sum(clip["rows"] for clip in used)
+    def predict(x: Tensor, p: Tensor) -> Tensor:
+        y = network.predict(x.numpy() * network.x_std + network.x_mean, p.numpy())
+        return torch.from_numpy((y - network.y_mean) / np.maximum(network.y_std, 1e-30))
 
-
-class StandardisedNetwork:
-    """A network read from a file, with standardised inputs and outputs like a network in training."""
-
-    def __init__(self, network: Network) -> None:
-        self.network, self.outputs = network, len(network.y_mean)
-
-    def __call__(self, x: Tensor, p: Tensor) -> Tensor:
-        """Standardised outputs (B, Y) of standardised inputs x (B, X) at phases p (B,)."""
-        n = self.network
-        y = n.predict(x.numpy() * n.x_std + n.x_mean, p.numpy())
-        return torch.from_numpy((y - n.y_mean) / np.maximum(n.y_std, 1e-30))
-
-
-def count_passes(sections: int, per_pass: int) -> float:
-    """The number of passes that `sections` sections make up; an int if it is whole.
-
-    per_pass: number of sections in a pass.
-
-    >>> count_passes(40, 4), count_passes(1, 4)
-    (10, 0.25)
-    """
-    return sections // per_pass if sections % per_pass == 0 else round(sections / per_pass, 6)
+    return predict
