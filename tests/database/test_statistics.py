@@ -56,7 +56,7 @@ def test_moments_of_parts_add_up_to_those_of_the_whole(cuts, seed):
 def test_deviations_are_shared_in_the_groups_of_the_original_and_weighted(rows_of, layout):
     rows = rows_of(rows=300, fits=10)
     x, y = clip_moments(rows, rows.layout)
-    s = statistics_of_moments(layout, x, y, 0.1, [1])
+    s = statistics_of_moments(layout, x, y, 0.1, rows.skeleton)
     n = layout.samples
     for start in (0, n, 2 * n, 3 * n):  # tx, tz, dx, dz each on their own
         np.testing.assert_allclose(s.x_std[start : start + n], x.std[start : start + n].mean(), rtol=1e-6)
@@ -77,7 +77,7 @@ def test_nothing_is_ever_divided_by_zero(rows_of, layout):
     still = rows_of(rows=20, fits=1)
     for values in (still.x, still.y, still.heights, still.mean, still.channels["injury"]):
         values[...] = 0.0
-    s = statistics_of_moments(layout, *clip_moments(still, layout), 0.1, [1])
+    s = statistics_of_moments(layout, *clip_moments(still, layout), 0.1, still.skeleton)
     for std in (s.x_std, s.y_std):
         assert (std > 0).all()
         assert np.isfinite(std).all()

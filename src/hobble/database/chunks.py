@@ -189,7 +189,7 @@ class Manifest:
 
     def row_count(self, split: str) -> int:
         """Number of rows of a split."""
-        return sum(chunk.rows for chunk in self.chunks[split])
+        return sum(clip["rows"] for clip in self.clips if clip["split"] == split)
 
     def save(self, path: Path) -> None:
         """Write manifest.json into the database folder `path`, completely or not at all."""
@@ -216,8 +216,9 @@ class Manifest:
         values["skeleton"] = json.loads(values["skeleton"])
         manifest = read_declared(file, "the manifest", cls, values, HINT)
         read_declared(file, "clips", list[ClipEntry], manifest.clips, HINT)
-        read = {split: sum(c["rows"] for c in manifest.clips if c["split"] == split) for split in SPLITS}
-        if read != {split: manifest.row_count(split) for split in manifest.chunks}:
+        if {split: manifest.row_count(split) for split in SPLITS} != {
+            split: sum(chunk.rows for chunk in chunks) for split, chunks in manifest.chunks.items()
+        }:
             raise InputError(file, "its clips have other rows than its chunks", fix=HINT)
         return manifest
 

@@ -56,11 +56,6 @@ def chunk_groups(chunks: int, window: int, seed: int, pass_index: int, layer: in
     return groups
 
 
-def row_order(rows: int, seed: int, pass_index: int, layer: int, group: int) -> np.ndarray:
-    """(rows,) a random order of the rows of a group of chunks. rows: number of rows. group: its number."""
-    return np.random.default_rng([seed, ROWS, pass_index, layer, group]).permutation(rows)
-
-
 def pick_fits(
     count: np.ndarray, visits: int, seed: int, pass_index: int, layer: int, chunk: int
 ) -> np.ndarray:
@@ -93,24 +88,23 @@ def rows_and_fits(
     chunks: Sequence[int],
     rows: Sequence[int],
     count: np.ndarray,
-    first: np.ndarray,
     visits: int,
     where: tuple[int, int, int, int],
     part: slice,
 ) -> tuple[np.ndarray, np.ndarray]:
     """(n,) indices of rows of a group of chunks, in the order of a layer, and (n,) indices of their fits.
 
-    chunks: numbers of the group's chunks. rows: number of rows of each chunk. count, first: (R,) number of
-    fits of each row of the group, and index of its first fit (`first_fits`). where: seed, pass, layer and
-    group. part: the n places in this order to return.
+    chunks: numbers of the group's chunks. rows: number of rows of each chunk. count: (R,) number of fits of
+    each row of the group. where: seed, pass, layer and group. part: the n places in this order to return.
     """
     seed, pass_index, layer, group = where
     picked = [
         pick_fits(count[end - n : end], visits, seed, pass_index, layer, int(chunk))
         for chunk, n, end in zip(chunks, rows, np.cumsum(rows), strict=True)
     ]
-    chosen = row_order(len(count), seed, pass_index, layer, group)[part]
-    return chosen, first[chosen] + np.concatenate(picked)[chosen]
+    order = np.random.default_rng([seed, ROWS, pass_index, layer, group]).permutation(len(count))
+    chosen = order[part]
+    return chosen, first_fits(count)[chosen] + np.concatenate(picked)[chosen]
 
 
 # How training processes share the samples of a section.

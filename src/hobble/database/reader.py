@@ -12,24 +12,24 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
-from itertools import chain, cycle
+from itertools import cycle
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
-from hobble.core.errors import HobbleError, InputError
+from hobble.core.errors import InputError
 from hobble.core.quat import Array
 from hobble.database import order
-from hobble.database.chunks import (
-    STATISTICS,
-    STORED,
-    Manifest,
-    read_chunk,
-    to_stored_type,
-)
+from hobble.database.chunks import STATISTICS, STORED, Manifest, read_chunk, to_stored_type
 from hobble.database.statistics import Statistics, read_statistics
-from hobble.rows.layout import RowLayout, column_count_without_terrain, compose, fit_column_count
+from hobble.rows.layout import (
+    RowLayout,
+    blocks_without_terrain,
+    column_count_without_terrain,
+    compose,
+    fit_column_count,
+)
 
 Buffers = Mapping[str, np.ndarray]
 
@@ -157,15 +157,12 @@ class Database:
         stored = float(statistics.y_std[column][0])
         statistics.y_std[column] /= phase_weight
         factors = [("y", column, stored / float(statistics.y_std[column][0]))]
-        body = np.delete(np.arange(manifest.layout.x_size), manifest.layout.x_terrain)  # columns of a row
         for name, scale in (scales or {}).items():
             if name not in dict(manifest.layout.channels):
                 fix = "Leave it out of `scales`, or add it to the configuration's `channels`."
                 raise InputError(path, f"the channel {name} is not in this database", fix=fix)
-            block = manifest.layout.x_channel(name)
-            statistics.x_std[block] *= scale
-            first = int(np.searchsorted(body, block.start))
-            factors.append(("x", slice(first, first + block.stop - block.start), 1 / scale))
+            statistics.x_std[manifest.layout.x_channel(name)] *= scale
+            factors.append(("x", blocks_without_terrain(manifest.layout)[name], 1 / scale))
         changed = tuple(each for each in factors if each[-1] != 1.0)
         return cls(path, manifest, statistics, memory_mb, phase_weight=phase_weight, _factors=changed)
 
@@ -227,17 +224,21 @@ class Database:
         memory at a time; None: as `chunks_per_window` says. Raises InputError, which names the file, if a
         chunk is damaged.
         """
-        if not 0 <= section < sections:
-            raise HobbleError(f"there is no section {section}: a pass of {sections} has 0 to {sections - 1}")
         if self.row_count(split) == 0:
             return iter(())
         part = range(self.section_sample_count(split, section, sections)) if part is None else part
         spans = order.layer_parts(self.row_count(split), self.manifest.visits, section, sections, part)
         window = window or self.chunks_per_window(split, block_rows)
-        buffers = self._two_buffer_sets(split, window)
-        picked = chain.from_iterable(
-            self._pick_rows(split, (seed, pass_index, layer), start, stop, window, buffers)
+        groups = [
+            group
             for layer, start, stop in spans
+            for group in self._chunk_groups(split, (seed, pass_index, layer), start, stop, window)
+        ]
+        windows = self._windows(split, [chunks for _, chunks, _ in groups], window)
+        visits = self.manifest.visits
+        picked = (
+            (w, *order.rows_and_fits(w.chunks, w.rows, w.count, visits, key, places))
+            for (key, _, places), w in zip(groups, windows, strict=True)
         )
         return read_ahead(self._compose_blocks(picked, len(part), block_rows))
 
@@ -245,13 +246,8 @@ class Database:
         """Each row of a split once, with its fits, in the order of the chunks, BLOCK_ROWS at a time."""
         chunks = len(self.manifest.chunks[split])
         window = self.chunks_per_window(split, BLOCK_ROWS)
-        if window < chunks:
-            numbers, buffers = range(chunks), self._two_buffer_sets(split, window)
-            groups = (numbers[start : start + window] for start in range(0, chunks, window))
-            windows = read_ahead(self.load(split, group, next(buffers)) for group in groups)
-        else:
-            windows = iter([self._load_split(split)] if chunks else [])
-        for loaded in windows:
+        groups = [range(chunks)[start : start + window] for start in range(0, chunks, window or 1)]
+        for loaded in self._windows(split, groups, window):
             for start in range(0, len(loaded.count), BLOCK_ROWS):
                 part = slice(start, start + BLOCK_ROWS)
                 first, count = loaded.first_fit[part], loaded.count[part]
@@ -259,47 +255,35 @@ class Database:
                 x, y = (table[part].astype(np.float32) for table in (loaded.x, loaded.y))
                 yield UncomposedRows(x, y, loaded.phase[part], loaded.clip[part], fits, first - first[0])
 
-    def _pick_rows(
-        self,
-        split: str,
-        layer_key: tuple[int, int, int],
-        start: int,
-        stop: int,
-        window: int,
-        buffers: Iterator[Buffers],
-    ) -> Iterator[PickedRows]:
-        """The rows at places `start` to `stop` - 1 of a layer, each with a fit.
+    def _windows(self, split: str, groups: Sequence[Sequence[int]], window: int) -> Iterator[ChunkWindow]:
+        """The windows of groups of at most `window` chunks. They stay in memory if all chunks do.
 
-        layer_key: seed, number of the pass and number of the layer. window: number of chunks in memory at a
-        time. buffers: two sets of buffers in turn. While a window in one set is in use, the next window is
-        loaded into the other set. So a caller must not use a window after it requested the next rows.
+        Otherwise, while one window is in use, a thread loads the next one. There are only two sets of buffers
+        for them, so a caller must not use a window after it requested the next one.
         """
-        all_chunks = range(len(self.manifest.chunks[split]))
-        if window >= len(all_chunks):
-            groups: list[tuple[int, Sequence[int], int, int]] = [(0, all_chunks, start, stop)]
-            windows = iter([self._load_split(split)])
-        else:
-            groups = list(self._chunk_groups(split, layer_key, start, stop, window))
-            windows = read_ahead(self.load(split, chunks, next(buffers)) for _, chunks, _, _ in groups)
-        for group, _, low, high in groups:
-            w, visits, key = next(windows), self.manifest.visits, (*layer_key, group)
-            part = slice(low, high)
-            yield w, *order.rows_and_fits(w.chunks, w.rows, w.count, w.first_fit, visits, key, part)
+        if window >= len(self.manifest.chunks[split]):
+            return iter([self._load_split(split)] * len(groups))
+        buffers = cycle([empty_buffers(self.manifest, split, window) for _ in range(2)])
+        return read_ahead(self.load(split, chunks, next(buffers)) for chunks in groups)
 
     def _chunk_groups(
         self, split: str, layer_key: tuple[int, int, int], start: int, stop: int, window: int
-    ) -> Iterator[tuple[int, Sequence[int], int, int]]:
+    ) -> Iterator[tuple[tuple[int, int, int, int], Sequence[int], slice]]:
         """The groups of chunks with the rows at places `start` to `stop` - 1 of a layer.
 
-        Yields (number of the group, numbers of its chunks, first place in the group, last place + 1).
+        layer_key: seed, number of the pass and number of the layer. window: number of chunks in memory at a
+        time. Yields (layer_key and number of the group, numbers of its chunks, places in the group).
         """
         rows = [chunk.rows for chunk in self.manifest.chunks[split]]
+        if window >= len(rows):
+            yield (*layer_key, 0), range(len(rows)), slice(start, stop)
+            return
         done = 0
         for group, chunks in enumerate(order.chunk_groups(len(rows), window, *layer_key)):
             group_rows = sum(rows[i] for i in chunks)
             low, high = max(start - done, 0), min(stop - done, group_rows)
             if low < high:
-                yield group, chunks.tolist(), low, high
+                yield (*layer_key, group), chunks.tolist(), slice(low, high)
             done += group_rows
 
     def block_rows(self, batch: int = 1) -> int:
@@ -321,15 +305,6 @@ class Database:
         memory -= BLOCKS * block_rows * 4 * (self.layout.x_size + self.layout.y_size)
         sizes = [chunk.bytes for chunk in self.manifest.chunks[split]]
         return len(sizes) if self.manifest.bytes <= memory else max(1, memory // (2 * max(sizes)))
-
-    def _two_buffer_sets(self, split: str, window: int) -> Iterator[Buffers]:
-        """Two sets of buffers for `window` chunks each, in turn. All windows of a section reuse them.
-
-        Nothing if all chunks fit in memory, because these are loaded once and stay.
-        """
-        if window >= len(self.manifest.chunks[split]):
-            return iter(())
-        return cycle([empty_buffers(self.manifest, split, window) for _ in range(2)])
 
     def _load_split(self, split: str) -> ChunkWindow:
         """All chunks of a split. They are read at the first call and stay in memory."""

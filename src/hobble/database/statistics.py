@@ -5,7 +5,7 @@ The pairs are not stored. Below, a deviation is a standard deviation.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -17,6 +17,7 @@ from hobble.channels.channel import CONSTANT_BELOW, SILENCING_STD
 from hobble.core.declared import ArrayOf, check_arrays
 from hobble.core.files import load_npz
 from hobble.core.quat import Array
+from hobble.database.chunks import HINT
 from hobble.rows.clip_rows import ClipRows
 from hobble.rows.layout import (
     TERRAIN,
@@ -29,7 +30,6 @@ from hobble.rows.layout import (
 
 UNSEEN = 1e-10  # input weight of a joint that the network shall not see, as in Holden et al. (2017)
 LEAST_STD = 1e-30  # of a column in a file of statistics; rows are divided by it
-REMAKE = "Delete the folder of the database. The next run makes it again."
 BATCH = 2048  # rows of a clip are converted to float64 so many at a time, to use little memory
 
 
@@ -54,10 +54,6 @@ class Moments:
         mean = self.mean + delta * (other.weight / weight)
         squares = self.squares + other.squares + delta**2 * (self.weight * other.weight / weight)
         return Moments(weight, mean, squares)
-
-    def __mul__(self, factor: float) -> Moments:
-        """The moments of the same rows, with their weights multiplied by `factor`."""
-        return Moments(self.weight * factor, self.mean, self.squares * factor)
 
     def columns(self, block: slice) -> Moments:
         """The moments of the columns `block`."""
@@ -105,7 +101,7 @@ def read_statistics(path: Path, layout: RowLayout) -> Statistics:
     sizes = {"x": layout.x_size, "y": layout.y_size}
     shapes = {f"{block}_mean": ArrayOf((size,)) for block, size in sizes.items()}
     shapes |= {f"{block}_std": ArrayOf((size,), low=LEAST_STD) for block, size in sizes.items()}
-    check_arrays(path, arrays, shapes, fix=REMAKE)
+    check_arrays(path, arrays, shapes, fix=HINT)
     return Statistics(**{name: arrays[name] for name in shapes})
 
 
@@ -127,14 +123,11 @@ def clip_moments(rows: ClipRows, layout: RowLayout) -> tuple[Moments, Moments]:
         mean = rows.mean[part_fits].astype(np.float64)
         row_mean: Array = np.bincount(fit_row, weight * mean, len(fits)).astype(np.float64)
         spread = float(np.sum(weight * (mean - row_mean[fit_row]) ** 2))
-        heights = Moments.of_rows(rows.heights[part_fits], weight)
         x_frame = _moments_of_lowered(rows.x[part], body.x_joint_position, row_mean, spread)
         parts = {name: x_frame.columns(block) for name, block in blocks_without_terrain(body).items()}
-        parts |= {
-            name: Moments.of_rows(channel_inputs(name, rows.channels[name][part]))
-            for name, _ in layout.channels
-        }
-        parts[TERRAIN] = heights
+        for name, _ in layout.channels:
+            parts[name] = Moments.of_rows(channel_inputs(name, rows.channels[name][part]))
+        parts[TERRAIN] = Moments.of_rows(rows.heights[part_fits], weight)
         x = x + _join_columns(*[parts[name] for name in layout.blocks("x")])
         y = y + _moments_of_lowered(rows.y[part], layout.y_joint_position, row_mean, spread)
     return x, y
@@ -178,11 +171,6 @@ def x_groups(layout: RowLayout) -> list[slice]:
     return [*split, layout.x_gait, *joints, layout.x_terrain, *local]
 
 
-def y_groups(layout: RowLayout) -> list[slice]:
-    """Groups of columns of Y, one for each block. The columns of a group share one deviation."""
-    return list(layout.blocks("y").values())
-
-
 def share_in_groups(std: Array, groups: Iterable[slice], constant: float) -> Array:
     """(C,) deviations that are equal in each group: the mean of the group's deviations.
 
@@ -197,34 +185,25 @@ def share_in_groups(std: Array, groups: Iterable[slice], constant: float) -> Arr
 
 
 def statistics_of_moments(
-    layout: RowLayout, x: Moments, y: Moments, joint_weight: float, unseen: Sequence[int]
+    layout: RowLayout, x: Moments, y: Moments, joint_weight: float, skeleton: Mapping[str, Any]
 ) -> Statistics:
     """The statistics of rows with moments `x` and `y`. Groups of columns share a deviation (`x_groups`).
 
-    unseen: indices of the joints that the network shall not see in its input. The deviation of a joint's
-    columns of X is divided by w * joint_weight, so that the standardised values are multiplied by it. w is
-    UNSEEN for the joints in `unseen`, and 1 for others. Each channel defines the deviations of its columns.
+    skeleton: plain data. Its key `unseen`, if it is there, lists the names of the joints that the network
+    shall not see in its input. The deviation of a joint's columns of X is divided by w * joint_weight, so
+    that the standardised values are multiplied by it. w is UNSEEN for these joints, and 1 for others. Each
+    channel defines the deviations of its columns.
     """
     x_std = share_in_groups(x.std, x_groups(layout), SILENCING_STD)
-    w = np.ones(layout.joints)
-    w[list(unseen)] = UNSEEN
+    w = np.where(np.isin(list(skeleton["joints"]), skeleton.get("unseen", ())), UNSEEN, 1.0)
     for block in (layout.x_joint_position, layout.x_joint_velocity):
         # At most 1e30, so that the value stays finite in float32.
         x_std[block] = np.minimum(x_std[block] / np.repeat(w * joint_weight, 3), 1e30)
     for name, _ in layout.channels:
         block = layout.x_channel(name)
         x_std[block] = channel(name).divisors(x.std[block])
-    y_std = share_in_groups(y.std, y_groups(layout), 1.0)
+    y_std = share_in_groups(y.std, layout.blocks("y").values(), 1.0)
     return Statistics(*(np.asarray(v, np.float32) for v in (x.mean, x_std, y.mean, y_std)))
-
-
-def unseen_joints(skeleton: Mapping[str, Any]) -> list[int]:
-    """Indices of the skeleton's joints that the network shall not see in its input.
-
-    skeleton: plain data. Its key `unseen`, if it is there, lists the names of these joints.
-    """
-    joints = list(skeleton["joints"])
-    return [joints.index(name) for name in skeleton.get("unseen", ())]
 
 
 # Standardises raw rows for a database, so that the reader needs little time to compose a row with a fit.
