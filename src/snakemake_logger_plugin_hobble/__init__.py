@@ -23,17 +23,17 @@ from hobble.core.messages import format_duration
 TICK_SECONDS = 1.0  # between two updates of the line of progress on a terminal
 PROGRESS_SECONDS = 30.0  # between lines of progress if the output goes to a file
 LONG_SECONDS = 15.0  # the log of a job that runs longer than this is named
-TAIL_BYTES = 1 << 16  # an error message is searched for in this many bytes at the end of a job's log
 # A line of a job's log that reports an error: date, time, ERROR and the message.
 ERROR_LINE = re.compile(r"^\S+ \S+ ERROR (.*)$", re.M)
 # A line of a job's log that says how far the job has come, such as "section 1: 34 % done, 8 min left".
 SHARE_LINE = re.compile(r"^\S+ \S+ INFO .*?(\d+ % done.*)$", re.M)
-# Snakemake's messages about a failed job and about the end of a run in which jobs failed. They are not shown,
-# because this module reports the same in fewer words.
-JOB_ENDED = re.compile(r"CalledProcessError|Command 'set -euo pipefail|returned non-zero exit status")
-SUPERFLUOUS = re.compile(
-    r"Exiting because a job execution failed|Look below for error messages|^Shutting down|"
-    r"^At least one job did not complete|^WorkflowError:\s*At least one job did not complete"
+# Snakemake's messages about a failed job and about the end of a run in which jobs failed, and that the rule
+# `clip_file` finds its file already there, because a batch made it. They are not shown: this module reports
+# failures in fewer words.
+NOT_SHOWN = re.compile(
+    r"CalledProcessError|Command 'set -euo pipefail|returned non-zero exit status|^Shutting down|"
+    r"Exiting because a job execution failed|Look below for error messages|"
+    r"^(WorkflowError:\s*)?At least one job did not complete|were not present when the DAG was created"
 )
 # What Snakemake puts around a message of the Snakefile: the place in the code. Users do not need it.
 PLACE = re.compile(
@@ -41,25 +41,19 @@ PLACE = re.compile(
 )
 # Snakemake's messages that are shown although they are no warnings.
 SHOWN_MESSAGES = re.compile(r"^Nothing to be done|^This was a dry-run|^Unlocking|^Touching|^Error")
-# The rule `clip_file` finds its file already there, because a batch made it. Snakemake warns of this.
-FOUND_OUTPUT = "were not present when the DAG was created"
-STOP_MESSAGE = "Terminating processes on user request"  # Snakemake prints this when the user stops the run
-STAGES = (  # in the order in which data passes through them
-    *("synthetic", "motion", "labels", "channels", "terrain", "database", "training", "runtime"),
-    *("evaluation", "report"),
-)
-FOLLOWS = "Input files updated by another job"  # a reason that is left out if there is another
-MANY_REASONS = 3  # at most this many reasons are listed for a rule
+# In the order in which data passes through them.
+STAGES = "synthetic motion labels channels terrain database training runtime evaluation report"
+CLEAR = "\r\x1b[K"  # clears a line of the terminal
 # The Snakefile adds functions: (rule, wildcards) of each planned job -> sentences about the plan.
 ABOUT_PLAN: list[Callable[[Sequence[tuple[str, Mapping[str, str]]]], list[str]]] = []
 
 
-@dataclass(frozen=True)
+@dataclass
 class Job:
     """What is printed about a job.
 
     rule: the rule's name. wildcards: name -> value. log: path of its log, or several with commas. began: when
-    it started, seconds. reason: why it has to run.
+    it started, seconds. reason: why it has to run. is_named: whether its log has been named.
     """
 
     rule: str
@@ -67,6 +61,7 @@ class Job:
     log: str
     began: float
     reason: str = ""
+    is_named: bool = False
 
     @property
     def name(self) -> str:
@@ -93,15 +88,12 @@ class Terminal:
     ) -> None:
         self.stream, self.live, self.dryrun, self.now = stream, live, dryrun, now
         self.began = self.last_line = now()  # `last_line`: when a line of progress was last written to a file
-        self.jobs: dict[int, Job] = {}  # Snakemake's number of a job -> each job that has started
-        self.running: dict[int, Job] = {}  # the same for the jobs that are running
+        self.running: dict[int, Job] = {}  # Snakemake's number of a job -> each one that runs, or is planned
         self.failed: list[Job] = []
         self.done = self.total = 0  # numbers of finished jobs and of all jobs
         self.stopped = False  # whether the user has stopped the run
-        self.stats: Counter[str] = Counter()  # rule -> number of its jobs
-        self.named: set[int] = set()  # the jobs whose logs have been named
+        self.stats: dict[str, int] = {}  # rule -> number of its jobs
         self.lock = threading.RLock()
-        self.progress_shown = False  # whether the line of progress is on the terminal now
         self.closed = False  # whether the summary has been printed
 
     def show_record(self, record: logging.LogRecord) -> None:
@@ -123,62 +115,48 @@ class Terminal:
     def close(self) -> None:
         """Print the summary, or the plan of a dry run, but only once: `logging` calls this again at exit."""
         with self.lock:
-            self._clear_progress()
-            if not self.closed:
-                self.closed = bool(self.jobs or self.failed or self.stats)
+            if self.stats and not self.closed:
+                self.closed = True
                 self._print_plan() if self.dryrun else self._print_summary()
 
     def _print_summary(self) -> None:
-        if not (self.jobs or self.failed):
-            return
-        took = format_duration(self.now() - self.began)
-        count = f"{self.done} of {self.total or len(self.jobs)} jobs done in {took}"
+        count = f"{self.done} of {self.total} jobs done in {format_duration(self.now() - self.began)}"
         if self.failed:
-            self._print_line(f"{count}, {len(self.failed)} failed:")
-            for job in self.failed:
-                self._print_line(f"  {job.name}: {job.log}")
-            self._print_line("When this is fixed, the same command continues from here.")
-        elif self.stopped:
-            self._print_line(f"{count}, then stopped. The same command continues from here.")
+            logs = [f"  {job.name}: {job.log}" for job in self.failed]
+            end = "When this is fixed, the same command continues from here."
+            self._print_line("\n".join([f"{count}, {len(self.failed)} failed:", *logs, end]))
         else:
-            self._print_line(f"{count}.")
+            stopped = ", then stopped. The same command continues from here"
+            self._print_line(f"{count}{stopped if self.stopped else ''}.")
 
     # The methods for Snakemake's events. The method _<event> gets the fields of the event's log record.
 
     def _run_info(self, data: Mapping[str, Any]) -> None:
         """The jobs are planned: print how many each rule has. A dry run prints its plan at the end."""
-        stats = data.get("stats") or {}  # name of a rule, or "total" -> number of jobs
-        self.total = stats.get("total", self.total)
-        first, self.stats = not self.stats, Counter({r: n for r, n in stats.items() if r != "total"})
-        if self.dryrun:
-            if not first:  # now all jobs are known
-                self.close()
-        elif first:
-            largest = ", ".join(f"{count} {rule}" for rule, count in self.stats.most_common(6))
-            self._print_line(f"{self.total} jobs: {largest}{', ...' if len(self.stats) > 6 else ''}")
+        stats, is_first = dict(data.get("stats") or {}), not self.stats  # rule, or "total" -> number of jobs
+        self.total = stats.pop("total", self.total)
+        self.stats = stats
+        if is_first and stats and not self.dryrun:
+            largest = ", ".join(f"{count} {rule}" for rule, count in Counter(stats).most_common(6))
+            self._print_line(f"{self.total} jobs: {largest}{', ...' if len(stats) > 6 else ''}")
 
     def _print_plan(self) -> None:
         """Print the plan of a dry run: a table of the rules by stage, and why they have to run."""
-        if not self.stats:
-            return
-        of_rule: dict[str, list[Job]] = {}
-        for job in self.jobs.values():
-            of_rule.setdefault(job.rule, []).append(job)
-        rows = [("stage", "job", "count", "reason")]
+        rows = []
         for rule, count in self.stats.items():
-            mine = of_rule.get(rule, [])
+            mine = [job for job in self.running.values() if job.rule == rule]
             rows.append((mine[0].stage if mine else "", rule, str(count), _reasons(mine)))
-        rows[1:] = sorted(rows[1:], key=lambda row: [*STAGES, row[0]].index(row[0]))
-        rows.append(("total", "", str(sum(self.stats.values())), ""))
+        rows.sort(key=lambda row: STAGES.find(row[0]))
+        rows = [("stage", "job", "count", "reason"), *rows, ("total", "", str(self.total), "")]
         wide = [max(len(row[column]) for row in rows) for column in range(3)]
         lines = [f"{a:{wide[0]}}  {b:{wide[1]}}  {c:>{wide[2]}}  {d}".rstrip() for a, b, c, d in rows]
         self._print_line("\n".join(["Job stats:", *lines]))
         for about in ABOUT_PLAN:
-            self._print_line("\n".join(about([(job.rule, job.wildcards) for job in self.jobs.values()])))
+            self._print_line("\n".join(about([(job.rule, job.wildcards) for job in self.running.values()])))
 
     def _job_info(self, data: Mapping[str, Any]) -> None:
         """A job starts, or a dry run lists it."""
-        self.jobs[data["jobid"]] = self.running[data["jobid"]] = self._job_of_event(data)
+        self.running[data["jobid"]] = self._job_of_event(data)
         self._progress({})
 
     def _job_finished(self, data: Mapping[str, Any]) -> None:
@@ -190,32 +168,30 @@ class Terminal:
         self.done, self.total = data.get("done", self.done), data.get("total", self.total)
         if self.dryrun or not self.total:
             return
-        for number, job in self.running.items():
-            if job.log and number not in self.named and self.now() - job.began > LONG_SECONDS:
-                self.named.add(number)
+        for job in self.running.values():
+            if job.log and not job.is_named and self.now() - job.began > LONG_SECONDS:
+                job.is_named = True
                 self._print_line(f"{job.name}: its log is {job.log}")
-        doing = list(dict.fromkeys(_doing(job) for job in self.running.values()))
+        said = ((job, _last_match(job.log, SHARE_LINE)) for job in self.running.values())
+        doing = dict.fromkeys(f"{job.name} {share}" if share else job.rule for job, share in said)
         took = format_duration(self.now() - self.began)
         line = f"{self.done}/{self.total} jobs, {took}" + (f": {'; '.join(doing)}" if doing else "")
         if self.live:
-            self.stream.write(f"\r\x1b[K{line[: shutil.get_terminal_size((100, 24)).columns - 1]}")
+            self.stream.write(f"{CLEAR}{line[: shutil.get_terminal_size((100, 24)).columns - 1]}")
             self.stream.flush()
-            self.progress_shown = True
         elif self.now() - self.last_line >= PROGRESS_SECONDS:
             self.last_line = self.now()
             self._print_line(line)
 
     def _job_error(self, data: Mapping[str, Any]) -> None:
         """A job has failed."""
-        job = self.jobs.get(data["jobid"]) or self._job_of_event(data)
-        self.running.pop(data["jobid"], None)
+        job = self.running.pop(data["jobid"], None) or self._job_of_event(data)
         if self.stopped:
             return
         self.failed.append(job)
         if not _last_match(job.log, ERROR_LINE):  # if there is an error in the log, the job has printed it
-            self._print_line(
-                f"{job.name}: ended without a message; it may have been killed. Its log: {job.log}"
-            )
+            why = "ended without a message; it may have been killed"
+            self._print_line(f"{job.name}: {why}. Its log: {job.log}")
 
     def _job_of_event(self, data: Mapping[str, Any]) -> Job:
         """The job that an event of Snakemake is about. data: fields of the event's log record."""
@@ -226,26 +202,17 @@ class Terminal:
     def _show_message(self, record: logging.LogRecord) -> None:
         """Print the text of a record if it is an error, a warning or one of SHOWN_MESSAGES."""
         text = str(record.msg or "").strip()
-        if STOP_MESSAGE in text:
+        is_shown = text and (record.levelno >= logging.WARNING or SHOWN_MESSAGES.search(text))
+        if "Terminating processes on user request" in text:
             self.stopped = True
             self._print_line("Stopping the running jobs.")
-        elif record.levelno >= logging.ERROR:
-            if not (JOB_ENDED.search(text) or SUPERFLUOUS.search(text)) and text:
-                self._print_line(PLACE.sub("", text))
-        elif FOUND_OUTPUT not in text and (record.levelno >= logging.WARNING or SHOWN_MESSAGES.search(text)):
-            self._print_line(text)
+        elif is_shown and not NOT_SHOWN.search(text):
+            self._print_line(PLACE.sub("", text))
 
     def _print_line(self, text: str) -> None:
-        """Print a line of text, in place of the line of progress if this is shown."""
-        self._clear_progress()
-        self.stream.write(f"{text}\n")
+        """Print a line of text, on a terminal in place of the line of progress."""
+        self.stream.write(f"{CLEAR if self.live else ''}{text}\n")
         self.stream.flush()
-
-    def _clear_progress(self) -> None:
-        """Clear the line of progress if it is shown."""
-        if self.progress_shown:
-            self.stream.write("\r\x1b[K")
-            self.progress_shown = False
 
 
 def _reasons(jobs: Sequence[Job]) -> str:
@@ -256,24 +223,14 @@ def _reasons(jobs: Sequence[Job]) -> str:
             what, _, files = reason.partition(": ")
             found.setdefault(what.strip(), files.split(", ")[0].strip())
     if len(found) > 1:
-        found.pop(FOLLOWS, None)
-    listed = [f"{what} ({file})" if file else what for what, file in found.items() if what]
-    return "; ".join(listed[:MANY_REASONS]) + ("; ..." if len(listed) > MANY_REASONS else "")
-
-
-def _doing(job: Job) -> str:
-    """The job's rule, and if its log says how far it has come, the last such words."""
-    said = _last_match(job.log, SHARE_LINE)
-    return f"{job.name} {said}" if said else job.rule
+        found.pop("Input files updated by another job", None)
+    return "; ".join(f"{what} ({file})" if file else what for what, file in found.items())
 
 
 def _last_match(log: str, pattern: re.Pattern[str]) -> str:
     """What the last line of this pattern in a job's log says, or "" if there is none."""
     try:
-        with open(Path(log), "rb") as file:
-            file.seek(0, 2)
-            file.seek(max(0, file.tell() - TAIL_BYTES))
-            found = pattern.findall(file.read().decode(errors="replace"))
+        found = pattern.findall(Path(log).read_text(errors="replace"))
     except OSError:
         return ""
     return found[-1] if found else ""
@@ -286,9 +243,10 @@ class LogHandler(LogHandlerBase):
         settings = self.common_settings
         stream = sys.stdout if settings.stdout else sys.stderr
         shown = (settings.debug_dag, settings.verbose, settings.dryrun, settings.printshellcmds)
-        self.full = settings.printshellcmds or settings.verbose or settings.debug_dag
-        self.snakemake_filter = DefaultFilter(settings.quiet, *shown)
-        self.snakemake_formatter = DefaultFormatter(settings.quiet, settings.show_failed_logs)
+        self.is_full = settings.printshellcmds or settings.verbose or settings.debug_dag
+        self.full = logging.StreamHandler(stream)
+        self.full.addFilter(DefaultFilter(settings.quiet, *shown))
+        self.full.setFormatter(DefaultFormatter(settings.quiet, settings.show_failed_logs))
         self.terminal = Terminal(stream, stream.isatty(), settings.dryrun)
         threading.Thread(target=self._tick, daemon=True).start()
 
@@ -299,24 +257,16 @@ class LogHandler(LogHandlerBase):
 
     def emit(self, record: logging.LogRecord) -> None:
         """Print a record, in short or in full."""
-        try:
-            if not self.snakemake_filter.filter(record):
-                return
-            if self.full:
-                print(self.snakemake_formatter.format(record), file=self.terminal.stream)
-            else:
-                self.terminal.show_record(record)
-        except BrokenPipeError:
-            raise
-        except Exception:
-            self.handleError(record)
+        if self.is_full:
+            self.full.handle(record)
+        elif self.full.filter(record):
+            self.terminal.show_record(record)
 
     def close(self) -> None:
         """Print the summary."""
-        if not self.full:
+        if not self.is_full:
             self.terminal.close()
         super().close()
 
-    writes_to_stream = True  # so that Snakemake itself prints nothing
-    has_filter = has_formatter = True
+    writes_to_stream = has_filter = has_formatter = True  # so that Snakemake itself prints nothing
     writes_to_file = needs_rulegraph = False

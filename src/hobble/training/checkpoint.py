@@ -13,7 +13,7 @@ import torch
 
 from hobble.core.declared import ArrayOf, check_arrays
 from hobble.core.errors import HobbleError, InputError
-from hobble.core.files import DELETE_IT, Arrays, load_npz, printable, write_csv
+from hobble.core.files import DELETE_IT, Arrays, load_npz, printable, write_tables
 from hobble.core.processors import count_cores, multiplies_bfloat16
 from hobble.core.skeleton import Skeleton
 from hobble.database.chunks import FILE
@@ -41,7 +41,7 @@ def write_history(path: Path, blocks: Iterable[str], rows: Sequence[Sequence[flo
     for row in rows:
         counts, seconds, errors = map(round, row[:3]), round(row[3], 3), (float(f"{v:.8g}") for v in row[4:])
         lines.append(dict(zip(names, (*counts, seconds, *errors), strict=True)))
-    write_csv(path, lines)
+    write_tables(path.parent, {path.stem: lines})
 
 
 # Checkpoints. Each is one file with the complete state of a training.
