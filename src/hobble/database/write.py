@@ -358,9 +358,9 @@ def write_database(
         shutil.rmtree(final, ignore_errors=True)  # the same rows of an earlier build, maybe damaged
         os.rename(build, final)
         manifest.save(Path(path))
-        for entry in Path(path).iterdir():  # earlier builds, and what killed ones left
-            if entry.is_dir() and entry.name != manifest.folder:
-                shutil.rmtree(entry, ignore_errors=True)
+        for other in Path(path).iterdir():  # earlier builds, and what killed ones left
+            if other.is_dir() and other.name != manifest.folder:
+                shutil.rmtree(other, ignore_errors=True)
         return manifest
 
 
