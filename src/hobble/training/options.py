@@ -17,8 +17,8 @@ class Recipe(Section):
     a random sample of the data.
     """
 
-    passes: Positive | PositiveFloat = Field(
-        20, description="passes over the data; with a fraction, the last one ends early"
+    passes: Annotated[float, Field(gt=0, le=1_000_000)] = Field(
+        20.0, description="passes over the data; with a fraction, the last one ends early"
     )
     sections: Positive = 10
     batch: Positive = Field(32, description="samples of a step, over all processes")
