@@ -3,6 +3,8 @@
 import numpy as np
 import pytest
 
+from hobble.channels.channel import ClipSource
+from hobble.channels.guarding import CHANNEL
 from hobble.core.errors import HobbleError
 from hobble.hurt.effects import part_of_link
 from hobble.hurt.hurt_clip import hurt_clip
@@ -68,7 +70,9 @@ def test_without_in_between_no_cycle_has_a_severity_in_between(made, mirrored) -
     shares = []
     for in_between in (False, True):
         options = Hurt(severities=(10.0,), seconds=5, at_once=1, in_between=in_between, longest=1)
-        hurt, report = hurt_version(clip, labels, REPORT, options, name="a", version_number=0, ground="flat")
+        hurt, report, _ = hurt_version(
+            clip, labels, REPORT, options, name="a", version_number=0, ground="flat"
+        )
         own = hurt.labels
         if mirrored:
             own, _ = mirror_labels(own, report, mirror_clip(hurt.clip, "image"))
@@ -92,3 +96,18 @@ def test_the_shown_severity_follows_the_requested_one(made, hurting, holden31) -
     calm = np.ptp(near, axis=0).max(axis=1) == 0
     assert calm.mean() > 0.6
     np.testing.assert_allclose(hurt.severity[calm], wanted[when][calm], atol=0.01)
+
+
+def test_guarding_changes_in_a_version_and_the_channel_reads_its_course(made) -> None:
+    """In one half of a stretch the body guards as much as it does not in the other half."""
+    clip, labels, _ = made("straight")
+    hurt, _, course = hurt_version(
+        clip, labels, REPORT, Hurt(seconds=5), name="a", version_number=0, ground="flat"
+    )
+    frames, values = np.array(course)
+    assert (np.diff(frames) > 0).all()
+    assert values[0] == values[1] != values[2]
+    assert values[0] + values[2] == pytest.approx(1, abs=0.001)
+    read, warnings = CHANNEL.read(hurt.clip, ClipSource("a"), {"guarding": course})
+    assert not warnings
+    assert read[[0, int(frames[1]), int(frames[2]), -1], 0] == pytest.approx(values[[0, 1, 2, -1]])

@@ -30,7 +30,7 @@ def make_version(piece, log):
     piece: the hurt version with its params and files, a `Piece`.
     """
     clip = load_clip(piece.input["clip"])
-    hurt, label_report = hurt_version(
+    hurt, label_report, guarding = hurt_version(
         clip,
         load_labels(piece.input["labels"]),
         load_report(piece.input["label_report"], "the report of labels", LabelReport),
@@ -39,7 +39,12 @@ def make_version(piece, log):
         version_number=piece.params["turn"],
         ground=piece.params["ground"],
     )
-    motion_report = {**load_clip_report(piece.input["report"]), "clip": hurt.clip.name, "hurt_of": clip.name}
+    motion_report = {
+        **load_clip_report(piece.input["report"]),
+        "clip": hurt.clip.name,
+        "hurt_of": clip.name,
+        "guarding": guarding,
+    }
     write_files(piece.output, "", hurt.clip, motion_report, hurt.labels, label_report, hurt.severity)
     log.info("%s: %d frames from %d of %s", hurt.clip.name, len(hurt.clip), len(clip), clip.name)
     if "mirror_clip" in piece.output:

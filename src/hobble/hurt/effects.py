@@ -16,6 +16,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from hobble.channels.guarding import CHANNEL as GUARDING
 from hobble.channels.injury import CHANNEL
 from hobble.channels.speed_limits import SUM_NORM
 from hobble.core.files import read_json
@@ -211,7 +212,7 @@ STRENGTH_POWER = CHANNEL.exponent
 # The strength of the change of speed: .46 at 3, .64 at 5, .79 at 7.
 SPEED_POWER = 0.65
 # A person guards an injury with the whole body. GUARD_CHANGES grow with guarding ** GUARD_POWER.
-GUARD_POWER = 2.6
+GUARD_POWER = GUARDING.exponent
 LEG_PARTS = ("hip", "thigh", "shank", "foot")
 GUARDED_PARTS = ("pelvis", *LEG_PARTS, "back")
 JOIN_FROM, JOIN_AT = 5.0, 7.0  # `join` grows from 0 to 1 between these severities of a part of the leg

@@ -39,6 +39,7 @@ SECONDS_FOR_TWO = 4.0
 # A clip is divided into equal stretches of about the option `seconds`. If the frames left after whole
 # stretches of `seconds` last at least this share of `seconds`, there is one stretch more.
 LEAST_REST = 0.4
+GUARDING_CHANGE_SECONDS = 1.0  # time in which a body that guards begins to guard more, or less
 
 
 def schedule_severities(
@@ -79,6 +80,20 @@ def schedule_severities(
     return out
 
 
+def schedule_guarding(frames: int, fps: float, options: Hurt, clip: str) -> tuple[Array, Array]:
+    """How much the body guards in a hurt version: frames, and the values (0 to 1) between which it changes.
+
+    Each stretch has a value in one half and its opposite in the other half. So a network sees every link
+    with much and with little guarding.
+    """
+    edges = np.linspace(0, frames, 1 + 2 * _stretch_count(frames, options.seconds * fps))
+    pause = min(0.5 * GUARDING_CHANGE_SECONDS * fps, 0.25 * edges[1])
+    knots = np.stack([edges[:-1] + pause, edges[1:] - pause], axis=1)
+    values = [guarding_of_clip(clip, i // 2) for i in range(len(knots))]
+    halves = [1.0 - value if i % 2 else value for i, value in enumerate(values)]
+    return knots.ravel(), np.repeat(halves, 2)
+
+
 def _make_deck(skeleton: Skeleton, options: Hurt) -> list[int]:
     """The cards of the data set: indices of links. The cards of a link are spread evenly over the deck."""
     names = list(skeleton.link_names)
@@ -114,13 +129,17 @@ def hurt_version(
     name: str,
     version_number: int,
     ground: str,
-) -> tuple[HurtClip, LabelReport]:
-    """Make a hurt version of a healthy clip. Returns the version and the report of its labels.
+) -> tuple[HurtClip, LabelReport, list[list[float]]]:
+    """Make a hurt version of a healthy clip.
+
+    Returns the version, the report of its labels, and the course of its guarding: frames, and values between
+    which it changes.
 
     labels, report: of the healthy clip. name: of the version. version_number: its number among all versions
     of the data set, from 0. ground: "flat", or another kind of ground.
     """
     severity = schedule_severities(clip.skeleton, len(clip), clip.fps, options, name, version_number)
+    knots, guarding = schedule_guarding(len(clip), clip.fps, options, name)
     flat = ground == "flat"
     hurt = hurt_clip(
         clip,
@@ -130,7 +149,7 @@ def hurt_version(
         flat=flat,
         zero=report.phase_zero,
         margins=report.margins,
-        guarding=guarding_of_clip(name),
+        guarding=np.interp(np.arange(len(clip)), knots, guarding),
     )
     frames = len(hurt.clip)
     unused = np.zeros(frames, bool)
@@ -140,7 +159,8 @@ def hurt_version(
         unused = (away > SEVERITY_TOLERANCE).any(axis=1)
     if len(clip) >= UNCUT_SECONDS * clip.fps:
         unused |= np.arange(frames) >= options.longest * len(clip)
-    return leave_out(hurt, unused, replace(report, clip=name))
+    course = [np.searchsorted(hurt.source_frames, knots).tolist(), guarding.round(3).tolist()]
+    return *leave_out(hurt, unused, replace(report, clip=name)), course
 
 
 def leave_out(hurt: HurtClip, unused: np.ndarray, report: LabelReport) -> tuple[HurtClip, LabelReport]:
