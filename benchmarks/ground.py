@@ -61,8 +61,7 @@ def patches_of(dataset: str, mocap: Path) -> Patches:
     """The patches of a data set, drawn once a process."""
     project = Project(BASE, {"mocap": str(mocap)})
     options = project.catalogue.dataset(dataset).terrain
-    scales = options.model_dump(include={"cell", "height_scale"})
-    maps = heightmaps(options.heightmaps, project.dataset(dataset).heightmap_files, **scales)
+    maps = heightmaps(options.heightmaps, project.dataset(dataset).heightmap_files, cell=options.cell)
     drawn = options.model_dump(include={"cell", "size", "highest", "seed"})
     return draw_patches(maps, count=options.patches, **drawn)
 

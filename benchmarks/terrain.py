@@ -84,7 +84,7 @@ def seconds(work: Callable[[], object], times: int = 2) -> float:
 
 
 def draw(count: int) -> Patches:
-    maps = heightmaps(OPTIONS.heightmaps, [], cell=OPTIONS.cell, height_scale=OPTIONS.height_scale)
+    maps = heightmaps(OPTIONS.heightmaps, [], cell=OPTIONS.cell)
     return draw_patches(maps, count=count, **OPTIONS.model_dump(include={"cell", "size", "highest", "seed"}))
 
 

@@ -177,7 +177,7 @@ def test_clips_that_do_not_fit_together_are_refused(rows_of, tmp_path):
         ),
         ("fits", lambda v: np.where(np.arange(len(v)) == 7, 0, v), "fits holds 0, below"),
         ("mean", lambda v: v * np.inf, "mean holds numbers that are not finite"),
-        ("layout", lambda v: np.array("{}"), "its layout cannot be understood"),
+        ("layout", lambda v: np.array("{}"), "its layout: joints"),
     ],
 )
 def test_a_bad_file_of_rows_is_named(rows_of, tmp_path, field, change, message):

@@ -85,7 +85,7 @@ def walk(ground: Height, frames: int = 420, speed: float = 2.2, period: int = 64
 
 def some_patches(count: int = 300, kinds: tuple[str, ...] = KINDS, seed: int = 1) -> Patches:
     entries = [HeightmapOptions(kind=kind, seed=i) for i, kind in enumerate(kinds)]
-    maps = heightmaps(entries, [], cell=CELL, height_scale=3.0)
+    maps = heightmaps(entries, [], cell=CELL)
     return draw_patches(maps, count=count, cell=CELL, size=128, highest=50.0, seed=seed)
 
 

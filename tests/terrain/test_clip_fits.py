@@ -9,6 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hobble.core.skeleton import Skeleton
+from hobble.labels.label import label_clip
+from hobble.labels.options import LabelOptions
+from hobble.motion.make import make_clip
 from hobble.motion.options import ClipMotion
 from hobble.motion.root import RootFrames
 from hobble.terrain.clip_fits import clip_fits, heights_under, sample_points
@@ -19,7 +22,7 @@ from hobble.terrain.cycle_ground import (
     fit_surfaces,
     heel_above_toe,
 )
-from hobble.terrain.options import FitOptions
+from hobble.terrain.options import FitOptions, Terrain
 from hobble.terrain.patches import Patches
 
 GROUNDS = {
@@ -97,33 +100,18 @@ def test_heights_of_joints_above_their_soles(made: SimpleNamespace, holden31: Sk
 @pytest.mark.shared
 def test_real_clips_stand_on_the_fitted_ground(shared: Path, root: Path, made: SimpleNamespace) -> None:
     """Uneven ground, a limp, and the original's own flat clip, whose ground stays at zero."""
-    from hobble.labels.label import label_clip
-    from hobble.labels.options import LabelOptions
-    from hobble.motion.make import make_clip
-    from hobble.terrain.options import Terrain
-
     patches = made.patches(2_000)
-    terrain = Terrain()
-    skeletons = root / "config/skeletons"
+    skeletons, original = root / "config/skeletons", "pfnn/LocomotionFlat09_000"
     for file, kind in (
         ("cmu/03_04", "rocky"),
         ("cmu/105_16", "flat"),
-        ("pfnn/LocomotionFlat09_000", "flat"),
-        ("pfnn/LocomotionFlat09_000", "rocky"),
+        (original, "flat"),
+        (original, "rocky"),
     ):
-        bvh = shared / f"mocap/{file}.bvh"
-        clip, report = make_clip(
-            bvh,
-            skeletons / "holden31.yaml",
-            str(skeletons),
-            clip=bvh.stem,
-            skeleton_name="holden31",
-            options=ClipMotion(),
-        )
-        files = [p for s in (".phase", "_footsteps.txt") if (p := bvh.with_name(bvh.stem + s)).is_file()]
-        labels, _ = label_clip(clip, files, report, "walk", kind, LabelOptions())
-        arrays = {"contacts": labels.contacts, "cycles": labels.cycles}
-        fits = clip_fits(clip, arrays, patches, kind, terrain, made.database())
+        bvh, figure = shared / f"mocap/{file}.bvh", skeletons / "holden31.yaml"
+        clip, report = make_clip(bvh, figure, skeletons, bvh.stem, "holden31", ClipMotion())
+        labels, _ = label_clip(clip, [], report, "walk", kind, LabelOptions())
+        fits = clip_fits(clip, vars(labels), patches, kind, Terrain(), made.database())
         assert len(fits.frame) > 60, file
         assert fits.foot_error[..., 0].max() < 1, file
         assert fits.foot_below.max() <= 1, file
@@ -144,23 +132,17 @@ def test_flat_ground_is_zero_and_one_fit(made: SimpleNamespace, patches: Patches
     assert fits.foot_error.max() < 0.01
 
 
-@pytest.mark.parametrize("bent", [True, False])
-def test_an_uneven_floor_is_adapted_only_if_configured(
-    made: SimpleNamespace, patches: Patches, bent: bool
+def test_an_uneven_floor_is_adapted_and_a_foot_below_a_flat_one_makes_only_a_local_pit(
+    made: SimpleNamespace, patches: Patches
 ) -> None:
     walk = made.walk(GROUNDS["waves"])
-    options = made.options(bend_flat=bent)
-    fits = clip_fits(walk.clip, walk.labels, patches, "flat", options, made.database())
+    fits = clip_fits(walk.clip, walk.labels, patches, "flat", made.options(), made.database())
     assert np.all(fits.fits == 1)
-    assert np.any(fits.heights != 0) is np.bool_(bent)
-    assert (fits.foot_error[..., 0].max() < 1) is np.bool_(bent)
-    assert (fits.foot_below.max() <= 1) is np.bool_(bent)
-
-
-def test_a_foot_below_a_flat_floor_makes_only_a_local_pit(made: SimpleNamespace, patches: Patches) -> None:
+    assert np.any(fits.heights != 0)
+    assert fits.foot_error[..., 0].max() < 1
+    assert fits.foot_below.max() <= 1
     walk = made.walk(GROUNDS["level"])
-    contacts = walk.labels["contacts"]
-    frame = np.flatnonzero(~contacts[:, 1] & (np.arange(420) > 100))[5]
+    frame = np.flatnonzero(~walk.labels["contacts"][:, 1] & (np.arange(420) > 100))[5]
     feet = walk.clip.positions[:, -4:].copy()
     feet[frame, 1, 1] = 2.5 - 4
     clip = made.figure(feet, walk.clip.root)
@@ -168,7 +150,7 @@ def test_a_foot_below_a_flat_floor_makes_only_a_local_pit(made: SimpleNamespace,
     assert np.all(fits.heights == 0)
     assert fits.foot_error.max() < 0.01
     assert 0 < fits.foot_below.max() <= 1
-    options = made.options(bend_flat=False)
+    options = made.options(deepest=None)
     as_it_is = clip_fits(clip, walk.labels, patches, "flat", options, made.database())
     assert as_it_is.foot_below.max() == pytest.approx(4)
 
@@ -191,7 +173,7 @@ def test_the_surface_solves_the_regularised_system_of_the_original() -> None:
     weights = np.linalg.solve(distances(places, places) / spread - 0.1 * np.eye(12), residual[0])
     elsewhere = rng.uniform(-300, 300, (40, 2))
     expected = distances(elsewhere, places) / spread @ weights
-    assert np.allclose(fit_surfaces(points, residual, 0.1)[0].heights_at(elsewhere), expected)
+    assert np.allclose(fit_surfaces(points, residual)[0].heights_at(elsewhere), expected)
 
 
 @settings(max_examples=20, deadline=None)
@@ -203,7 +185,7 @@ def test_only_large_residuals_are_fitted_more_closely_than_in_the_original(seed:
     count = rng.integers(1, 9, 40).astype(float)
     at = np.column_stack([place, np.zeros(40), count])
     residual = np.stack([rng.normal(0, 0.1, 40), rng.choice([0.0, 50.0], 40)])
-    once, met = fit_surfaces(at, residual, 0.1), fit_surfaces(at, residual, 0.1, 0.5)
+    once, met = fit_surfaces(at, residual), fit_surfaces(at, residual, 0.5)
     left = [np.abs(r - s.heights_at(place)) @ count / count.sum() for r, s in zip(residual, met, strict=True)]
     assert max(left) <= 0.5 + 1e-9
     assert np.abs(residual[1] - once[1].heights_at(place)) @ count / count.sum() > 0.5

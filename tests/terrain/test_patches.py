@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hobble.core.errors import HobbleError, InputError
+from hobble.core.errors import InputError
 from hobble.terrain.heightmaps import TerrainMap
 from hobble.terrain.patches import (
     FootPoints,
@@ -75,8 +75,6 @@ def test_maps_without_patches_are_refused_by_name() -> None:
         draw(plane(0, 0), plane(3, 3))
     with pytest.raises(InputError, match="plane: 90 x 300 cells are too few for patches of 128 x 128"):
         draw(plane(0, 0, rows=90))
-    with pytest.raises(HobbleError, match="heightmaps is empty"):
-        draw()
 
 
 def plain_errors(patches: Patches, footing: FootPoints) -> np.ndarray:

@@ -17,7 +17,7 @@ import torch
 from hobble.core.errors import HobbleError, InputError
 from hobble.core.files import _HOST, load_npz, read_json, save_npz, write_json
 from hobble.database.reader import Database
-from hobble.rows.layout import CONTACTS, GAITS, RowLayout
+from hobble.rows.layout import CONTACTS, GAITS, layout_from_data
 from hobble.training import checkpoint
 from hobble.training import train as module
 from hobble.training.checkpoint import State, pack, recipe_hash
@@ -180,7 +180,7 @@ def test_the_weights_file_is_enough_for_the_runtime(
     assert first.read_bytes() == again.read_bytes()
     weights = load_npz(first)
     meta = json.loads(str(weights["meta"]))
-    assert RowLayout.from_dict(meta["layout"]) == data.layout
+    assert layout_from_data("meta", meta["layout"]) == data.layout
     assert list(meta["skeleton"]["joints"]) == list(data.skeleton["joints"])
     assert (meta["gaits"], meta["contacts"]) == (list(GAITS), list(CONTACTS))
     assert (meta["channels"], meta["configuration"]) == ({"injury": ["Hips-LeftLeg"]}, "example")

@@ -7,12 +7,7 @@ from hobble.workflow.job import job
 
 with job(snakemake) as log:
     options = PatchOptions.model_validate(snakemake.params.options)
-    maps = heightmaps(
-        options.heightmaps,
-        snakemake.input.get("files", []),
-        cell=options.cell,
-        height_scale=options.height_scale,
-    )
+    maps = heightmaps(options.heightmaps, snakemake.input.get("files", []), cell=options.cell)
     patches = draw_patches(
         maps,
         count=options.patches,

@@ -180,7 +180,7 @@ def scatter(
     for number, entry in enumerate(manifest.clips):
         source = clips[entry["clip"]]
         whole = source if isinstance(source, ClipRows) else load_clip_rows(source)
-        used = whole.every(entry["every"], entry["first_row"]) if "every" in entry else whole
+        used = whole.part(slice(entry["first_row"], None, entry["every"])) if "every" in entry else whole
         place, places[entry["split"]] = np.split(places[entry["split"]], [len(used)])
         for first in range(0, len(used), PART_ROWS):
             part = slice(first, min(first + PART_ROWS, len(used)))

@@ -64,17 +64,7 @@ def build_clip_rows(
     )
     frame, cycle = cycle_frames(labels["cycles"])
     _check(name, clip, labels, channels, terrain, frame)
-    root = root_frames(clip, facing_sigma)
-    longer_root, frame_in_longer = extend_root(root, window), frame + window
-    x, y = _body_columns(
-        labels,
-        layout,
-        frame,
-        (longer_root, frame_in_longer),
-        root,
-        local_pose(clip, root),
-        skeleton.role("hips"),
-    )
+    x, y = _body_columns(clip, labels, layout, frame, root_frames(clip, facing_sigma))
     if with_local_phases:
         vectors, change = local_phases(clip, labels["contacts"])
         x.append(vectors[frame])
@@ -100,35 +90,27 @@ def build_clip_rows(
 
 
 def _body_columns(
-    labels: Arrays,
-    layout: RowLayout,
-    frame: np.ndarray,
-    path: tuple[RootFrames, np.ndarray],
-    root: RootFrames,
-    pose: tuple[Array, Array, Array],
-    hips: int,
+    clip: Clip, labels: Arrays, layout: RowLayout, frame: np.ndarray, root: RootFrames
 ) -> tuple[list[Array], list[Array]]:
     """The blocks of X without terrain and channels, and the blocks of Y, both in column order.
 
-    A block has one entry for each of the R rows. frame: (R,) the frame of the clip for each row. path: the
-    root continued past the ends of the clip, and the index (R,) of each row's frame in it. root: the root in
-    the clip only. pose: result of `local_pose`. hips: index of this joint.
+    A block has one entry for each of the R rows. frame: (R,) the frame of the clip for each row.
     """
-    longer_root, frame_in_longer = path
-    next_frame = frame_in_longer + 1
-    position, velocity, rotation = pose
+    # The root continued past the ends of the clip, and the index of each row's frame in it.
+    longer_root, frame_in_longer = extend_root(root, layout.window), frame + layout.window
+    position, velocity, rotation = local_pose(clip, root)
     x = [
-        *trajectory(longer_root, frame_in_longer, frame_in_longer, layout.offsets),
+        *trajectory(longer_root, frame_in_longer, layout.offsets),
         gait_columns(labels["gait"], frame, layout.offsets),
         position[frame - 1],
         velocity[frame - 1],
     ]
     y = [
-        velocity[frame, hips][:, [0, 2]],
+        velocity[frame, clip.skeleton.role("hips")][:, [0, 2]],
         root.turn[frame],
         phase_change(labels["phase"])[frame],
         labels["contacts"][frame],
-        *trajectory(longer_root, next_frame, next_frame, layout.offsets[layout.future :]),
+        *trajectory(longer_root, frame_in_longer + 1, layout.offsets[layout.future :]),
         position[frame],
         velocity[frame],
         rotation[frame],
@@ -157,18 +139,17 @@ def phase_change(phase: Array) -> Array:
     return np.where(change < 0, change + 1, change)
 
 
-def trajectory(root: RootFrames, frame: np.ndarray, seen_from: np.ndarray, offsets: range) -> list[Array]:
-    """Positions and facing directions of the root around each of R frames.
+def trajectory(root: RootFrames, frame: np.ndarray, offsets: range) -> list[Array]:
+    """Positions and facing directions of the root around each of R frames, in its root coordinates.
 
-    frame: (R,) these frames. offsets: frames from each of them to the samples. seen_from: (R,) the frames in
-    whose root coordinates the samples are given, one for each frame. Returns four arrays (R, samples): x and
-    z of the position (cm), then x and z of the facing direction.
+    frame: (R,) these frames. offsets: frames from each of them to the samples. Returns four arrays
+    (R, samples): x and z of the position (cm), then x and z of the facing direction.
     """
     sampled = frame[:, None] + np.array(offsets)
     on_ground = np.zeros((*sampled.shape, 3))
     on_ground[..., [0, 2]] = root.position[sampled]
-    position = points_to_root(root, on_ground, seen_from)
-    direction = vectors_to_root(root, root.direction[sampled], seen_from)
+    position = points_to_root(root, on_ground, frame)
+    direction = vectors_to_root(root, root.direction[sampled], frame)
     return [position[..., 0], position[..., 2], direction[..., 0], direction[..., 2]]
 
 
@@ -193,35 +174,24 @@ def _table(blocks: list[Array], rows: int) -> Array:
 
 
 def _check(
-    name: str,
-    clip: Clip,
-    labels: Arrays,
-    channels: Arrays,
-    terrain: Arrays,
-    frame: np.ndarray,
+    name: str, clip: Clip, labels: Arrays, channels: Arrays, terrain: Arrays, frame: np.ndarray
 ) -> None:
     """Raise InputError if the arguments of `build_clip_rows` do not match. frame: (R,) frames of the rows."""
-    widths = {each: len(channel(each).columns(clip.skeleton)) for each in channels}
+    frames = "frames of the clip"
     declared = {
-        "phase": ArrayOf(("frames of the clip",), low=0, high=1),
-        "gait": ArrayOf(("frames of the clip", len(GAITS)), low=-1e-3, high=1.001),
-        "contacts": ArrayOf(("frames of the clip", len(CONTACTS)), "biuf", 0, 1),
-        **{
-            each: ArrayOf(("frames of the clip", width), high=channel(each).highest)
-            for each, width in widths.items()
-        },
+        "phase": ArrayOf((frames,), low=0, high=1),
+        "gait": ArrayOf((frames, len(GAITS)), low=-1e-3, high=1.001),
+        "contacts": ArrayOf((frames, len(CONTACTS)), "biuf", 0, 1),
     }
-    check_arrays(name, {**labels, **channels}, declared, {"frames of the clip": len(clip)}, MAKE_AGAIN)
+    for each in channels:
+        columns = channel(each).columns(clip.skeleton)
+        declared[each] = ArrayOf((frames, len(columns)), high=channel(each).highest)
+    check_arrays(name, {**labels, **channels}, declared, {frames: len(clip)}, MAKE_AGAIN)
     if not np.array_equal(terrain["frame"], frame):
-        raise InputError(
-            name, "its terrain was fitted to other cycles than its labels have now", fix=MAKE_AGAIN
-        )
+        problem = "its terrain was fitted to other cycles than its labels have now"
+        raise InputError(name, problem, fix=MAKE_AGAIN)
     # A row needs the pose of the frame before it, and the velocity to the frame after it.
     if len(frame) and (frame.min() < 1 or frame.max() + 2 > len(clip)):
         outside = int(frame.min() if frame.min() < 1 else frame.max())
-        raise InputError(
-            name,
-            "the clip has no frame before or after a cycle",
-            frame=outside,
-            fix="Leave out this cycle, or use a clip that is longer at this end.",
-        )
+        fix = "Leave out this cycle, or use a clip that is longer at this end."
+        raise InputError(name, "the clip has no frame before or after a cycle", frame=outside, fix=fix)

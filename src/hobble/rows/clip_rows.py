@@ -26,8 +26,8 @@ from hobble.core.skeleton import skeleton_from_data
 from hobble.rows.layout import (
     GAITS,
     RowLayout,
-    body_column_count,
     body_layout,
+    column_count_without_terrain,
     compose,
     frame_inputs,
     layout_from_data,
@@ -79,10 +79,6 @@ class ClipRows:
         """(R,) index of each row's first fit in `heights` and `mean`."""
         return np.cumsum(self.fits) - self.fits
 
-    def every(self, step: int, first: int = 0) -> ClipRows:
-        """Every `step`-th row from row `first` on, with the fits of these rows."""
-        return self.part(slice(first, None, step))
-
     def part(self, rows: slice) -> ClipRows:
         """The rows in a slice, with their fits."""
         kept = np.zeros(len(self), bool)
@@ -101,12 +97,14 @@ class ClipRows:
         layout = self.layout
         if set(self.channels) != set(dict(layout.channels)):
             raise InputError(where, "its channels are not those that its layout names", fix=DELETE_IT)
-        widths = {"x": body_column_count(layout), "y": layout.y_size, **dict(layout.channels)}
+        widths = {
+            "x": column_count_without_terrain(body_layout(layout)),
+            "y": layout.y_size,
+            **dict(layout.channels),
+        }
         by_row = {name: ArrayOf(("rows", width), finite=False) for name, width in widths.items()}
         by_row["p"] = ArrayOf(("rows",), low=0, high=1, finite=False)
-        counts = {
-            name: ArrayOf(("rows",), "iu", low) for name, low in (("frame", 0), ("cycle", 0), ("fits", 1))
-        }
+        counts = {name: ArrayOf(("rows",), "iu", name == "fits") for name in ("frame", "cycle", "fits")}
         tables = {**vars(self), **self.channels}
         check_arrays(where, tables, by_row | counts, fix=DELETE_IT)
         for name in by_row:
@@ -327,9 +325,8 @@ def load_excerpt(path: str | Path, excerpt: Excerpt, before: int = 0, after: int
     first, stop = max(0, excerpt.first - before), min(excerpt.clip_rows, excerpt.stop + after)
     rows = load_clip_rows(path, None if stop - first == excerpt.clip_rows else (first, stop))
     if len(rows) != stop - first:
-        raise InputError(
-            path, f"does not have as many rows as its summary says ({excerpt.clip_rows})", fix=DELETE_IT
-        )
+        problem = f"does not have as many rows as its summary says ({excerpt.clip_rows})"
+        raise InputError(path, problem, fix=DELETE_IT)
     return rows
 
 
@@ -357,9 +354,8 @@ class RowsSummary:
 def summary_of_rows(rows: ClipRows) -> RowsSummary:
     """Make the summary of a clip's rows."""
     parts = cut_into_excerpts(rows.clip, len(rows))
-    return RowsSummary(
-        rows.clip, len(rows), tuple(excerpt_kind(rows, part.first, part.stop) for part in parts)
-    )
+    kinds = tuple(excerpt_kind(rows, part.first, part.stop) for part in parts)
+    return RowsSummary(rows.clip, len(rows), kinds)
 
 
 def save_summary(path: str | Path, summary: RowsSummary) -> None:

@@ -11,12 +11,14 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
+from pydantic import ConfigDict, Field
 
 from hobble.channels import channel
 from hobble.channels.channel import read_through_curve
+from hobble.core.declared import read_declared
 from hobble.core.errors import HobbleError, InputError
 from hobble.core.files import printable
 from hobble.core.quat import Array
@@ -27,8 +29,8 @@ GAITS = ("stand", "walk", "jog", "crouch", "jump", "bump")
 CONTACTS = ("left_heel", "left_toe", "right_heel", "right_toe")
 MOST_COLUMNS = 1 << 16  # of X or Y
 SIDES = ("left", "centre", "right")  # where X has ground heights: left of the path, on it, right of it
-# Keys of `RowLayout.to_dict` that are one number each -> the least number.
-NUMBERS = {"joints": 1, "window": 1, "step": 1, "local_phases": 0}
+Count = Annotated[int, Field(strict=True, ge=0, le=MOST_COLUMNS)]
+AtLeastOne = Annotated[Count, Field(ge=1)]
 LOCAL = "local_phase"  # name of the block of local phases in X and Y
 # The blocks of X that every network has, in the order of Holden et al. (2017).
 BODY = ("position", "direction", "gait", "joint_position", "joint_velocity", "terrain")
@@ -65,35 +67,19 @@ class RowLayout:
     every sample, then z of every sample.
     """
 
-    joints: int
-    window: int = 60
-    step: int = 10
-    channels: tuple[tuple[str, int], ...] = ()
-    local_phases: int = 0
+    __pydantic_config__ = ConfigDict(extra="forbid")
+    joints: AtLeastOne
+    window: AtLeastOne = 60
+    step: AtLeastOne = 10
+    channels: tuple[tuple[str, Count], ...] = ()
+    local_phases: Count = 0
 
-    @classmethod
-    def from_dict(cls, data: Mapping[str, Any]) -> RowLayout:
-        """The layout from the data of `to_dict`.
-
-        Raises KeyError, TypeError or ValueError if the data describe no layout.
-        """
-        if unknown := set(data) - {*NUMBERS, "channels"}:
-            raise ValueError(f"there is no such key: {min(unknown)}")
-        numbers = {key: data[key] for key in NUMBERS if key in data}
-        channels = dict(data.get("channels", {}))
-        for least_of, values in ((NUMBERS, numbers), (dict.fromkeys(channels, 0), channels)):
-            for key, value in values.items():
-                least = least_of[key]
-                if type(value) is not int or not least <= value <= MOST_COLUMNS:
-                    raise ValueError(
-                        f"{key} is {value!r:.40}, not a whole number from {least} to {MOST_COLUMNS}"
-                    )
-        if numbers.get("window", 0) % numbers.get("step", 1):
-            raise ValueError(f"window {numbers['window']} is not a multiple of step {numbers['step']}")
-        return cls(**numbers, channels=tuple(channels.items()))
+    def __post_init__(self) -> None:
+        if self.window % self.step:
+            raise ValueError(f"window {self.window} is not a multiple of step {self.step}")
 
     def to_dict(self) -> dict[str, Any]:
-        """The layout as data that JSON can hold, for `from_dict`."""
+        """The layout as data that JSON can hold, for `layout_from_data`."""
         sizes = {"joints": self.joints, "window": self.window, "step": self.step}
         sizes |= {"local_phases": self.local_phases} if self.local_phases else {}
         return {**sizes, "channels": [list(pair) for pair in self.channels]}
@@ -124,14 +110,9 @@ class RowLayout:
     @cached_property
     def _x_blocks(self) -> dict[str, slice]:
         """Name -> columns of each block of X, in column order."""
-        trajectory, joints = 2 * self.samples, 3 * self.joints
-        sizes = dict(
-            zip(
-                BODY,
-                (trajectory, trajectory, len(GAITS) * self.samples, joints, joints, 3 * self.samples),
-                strict=True,
-            )
-        )
+        each, joints = self.samples, 3 * self.joints
+        columns = (2 * each, 2 * each, len(GAITS) * each, joints, joints, 3 * each)
+        sizes = dict(zip(BODY, columns, strict=True))
         return _side_by_side(sizes | {LOCAL: 2 * self.local_phases} | dict(self.channels))
 
     # Trajectory positions, x then z, in the root coordinates of the row's frame, cm.
@@ -210,10 +191,10 @@ def layout_from_data(path: str | Path, data: Any, fix: str | None = None) -> Row
     Raises InputError, with the advice `fix`, if it is not valid.
     """
     try:
-        return RowLayout.from_dict(json.loads(data) if isinstance(data, str) else data)
-    except (AttributeError, KeyError, TypeError, ValueError, RecursionError) as error:
-        problem = printable(f"its layout cannot be understood: {error}", 400)
-        raise InputError(path, problem, fix=fix) from None
+        data = json.loads(data) if isinstance(data, str) else data
+    except (ValueError, RecursionError) as error:
+        raise InputError(path, printable(f"its layout is not valid JSON: {error}", 400), fix=fix) from None
+    return read_declared(path, "its layout", RowLayout, data, fix)
 
 
 # Composes rows of X from the body's columns, the channels, and the ground heights of one terrain fit.
@@ -224,11 +205,6 @@ def layout_from_data(path: str | Path, data: Any, fix: str | None = None) -> Row
 
 
 TERRAIN = "terrain"  # name of the block of ground heights in X
-
-
-def body_column_count(layout: RowLayout) -> int:
-    """Number of columns of X without terrain and channels."""
-    return column_count_without_terrain(layout) - sum(columns for _, columns in layout.channels)
 
 
 def body_layout(layout: RowLayout) -> RowLayout:
@@ -244,11 +220,6 @@ def column_count_without_terrain(layout: RowLayout) -> int:
 def fit_column_count(layout: RowLayout) -> int:
     """Number of values that a database stores for a terrain fit: ground heights and their mean."""
     return 3 * layout.samples + 1
-
-
-def joint_heights(joints: slice) -> slice:
-    """The columns of y, the height, in a block `joints` of joint positions x, y, z."""
-    return slice(joints.start + 1, joints.stop, 3)
 
 
 def frame_inputs(layout: RowLayout, body: Array, channels: Mapping[str, Array]) -> Array:
@@ -310,7 +281,7 @@ def lower_joints(values: Any, joints: slice, by: Any, std: Any = None) -> None:
     joints: the block of joint positions. std: (columns,) by which standardised values were divided; None for
     raw values.
     """
-    heights = joint_heights(joints)
+    heights = slice(joints.start + 1, joints.stop, 3)  # the columns of y
     values[:, heights] -= by if std is None else by / std[heights]
 
 
@@ -363,10 +334,8 @@ def mirror_of_x(layout: RowLayout, skeleton: Skeleton) -> ColumnMirror:
     """
     # The gait shares are not mentioned, because they stay the same.
     collected = _Columns(layout.x_size, skeleton)
-    collected.trajectory(layout.x_position)
-    collected.trajectory(layout.x_direction)
-    collected.joints(layout.x_joint_position, POINT)
-    collected.joints(layout.x_joint_velocity, POINT)
+    collected.trajectory(layout.x_position, layout.x_direction)
+    collected.joints(POINT, layout.x_joint_position, layout.x_joint_velocity)
     collected.swap(layout.x_terrain, np.arange(len(SIDES))[::-1])
     collected.parts(layout.x_local_phase)
     for name, columns in layout.channels:
@@ -380,23 +349,14 @@ def mirror_of_y(layout: RowLayout, skeleton: Skeleton) -> ColumnMirror:
     """The mirror of rows of Y that are not standardised. Raises HobbleError as `mirror_of_x` does."""
     # The change of phase is not mentioned, because it stays the same.
     collected = _Columns(layout.y_size, skeleton)
-    collected.trajectory(layout.y_root_velocity)
-    collected.trajectory(layout.y_position)
-    collected.trajectory(layout.y_direction)
+    collected.trajectory(layout.y_root_velocity, layout.y_position, layout.y_direction)
     collected.sign[layout.y_turn] = -1
-    collected.swap(layout.y_contacts, np.array([CONTACTS.index(_on_other_foot(name)) for name in CONTACTS]))
-    collected.joints(layout.y_joint_position, POINT)
-    collected.joints(layout.y_joint_velocity, POINT)
-    collected.joints(layout.y_joint_rotation, ROTATION)
+    collected.swap(layout.y_contacts, np.array([2, 3, 0, 1]))  # left and right of CONTACTS
+    collected.joints(POINT, layout.y_joint_position, layout.y_joint_velocity)
+    collected.joints(ROTATION, layout.y_joint_rotation)
     collected.parts(layout.y_local_phase)
     collected.parts(layout.y_local_change)
     return collected.mirror()
-
-
-def _on_other_foot(contact: str) -> str:
-    """The name of the same contact of the other foot: right_toe for left_toe."""
-    side, part = contact.split("_")
-    return f"{'right' if side == 'left' else 'left'}_{part}"
 
 
 class _Columns:
@@ -406,17 +366,19 @@ class _Columns:
         self.source, self.sign = np.arange(count), np.ones(count)
         self.mirror_joints = skeleton.mirror_joints
 
-    def trajectory(self, block: slice) -> None:
-        """Mirror a block that has x of every sample, then z of every sample: x changes its sign."""
-        self.sign[block.start : (block.start + block.stop) // 2] = -1
+    def trajectory(self, *blocks: slice) -> None:
+        """Mirror blocks that have x of every sample, then z of every sample: x changes its sign."""
+        for block in blocks:
+            self.sign[block.start : (block.start + block.stop) // 2] = -1
 
-    def joints(self, block: slice, signs: tuple[int, int, int]) -> None:
-        """Mirror a block that has x, y, z of every joint.
+    def joints(self, signs: tuple[int, int, int], *blocks: slice) -> None:
+        """Mirror blocks that have x, y, z of every joint.
 
         Left and right joints swap, and x, y, z are multiplied by `signs`.
         """
-        self.swap(block, self.mirror_joints)
-        self.sign[block] = np.tile(signs, len(self.mirror_joints))
+        for block in blocks:
+            self.swap(block, self.mirror_joints)
+            self.sign[block] = np.tile(signs, len(self.mirror_joints))
 
     def parts(self, block: slice) -> None:
         """Mirror a block of local phases, which may be empty: the parts of the body swap."""

@@ -4,8 +4,6 @@ A fit is a patch of ground that suits the footsteps of a cycle, corrected so tha
 gets several fits, or one if its ground is flat.
 """
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
@@ -34,6 +32,28 @@ from hobble.terrain.options import FitOptions, HeightSampling
 from hobble.terrain.patches import Patches
 
 log = logging.getLogger("hobble.terrain")
+GRID_POINTS = 24  # points of the ground's grid along x and along z
+MARGIN_CM = 60.0  # the grid reaches this far beyond the feet
+
+
+@dataclass(frozen=True)
+class FitPicture:
+    """The best fit of one cycle, in centimetres in the clip's world.
+
+    cycle: number of the cycle in the clip. x, z: (G,) coordinates of the grid. ground: (G, G) height at each
+    x[i], z[j]. soles, contacts: (T, 4, 3) and (T, 4), in the T frames that the ground is fitted to. pose,
+    turns: (3, J, 3) and (3, J, 4) positions and world rotations of the joints after a quarter, half and three
+    quarters of these frames.
+    """
+
+    cycle: int
+    x: Array = field(repr=False)
+    z: Array = field(repr=False)
+    ground: Array = field(repr=False)
+    soles: Array = field(repr=False)
+    contacts: Mask = field(repr=False)
+    pose: Array = field(repr=False)
+    turns: Array = field(repr=False)
 
 
 @dataclass(frozen=True)
@@ -82,17 +102,23 @@ def clip_fits(
     window = sampling.window
     root = extend_root(root_frames(clip, sampling.facing_sigma), window)
     samples = sample_points(root, sampling.terrain_side)
-    feet = _standing_feet(clip, contacts, cycles, window, ground == "flat", options)
+    # The frames that the ground is fitted to: those of a cycle, and `window` frames before and after it.
+    spans = [slice(max(start - window, 0), min(end + window + 1, len(clip))) for start, end in cycles]
+    feet = _standing_feet(clip, contacts, spans, ground == "flat", options)
     offsets = np.arange(-window, window, sampling.step)
     heights: list[Array] = [np.zeros((0, 3 * len(offsets)))]
     fitted, pictures = [], []
-    shown = cycles_to_picture(len(cycles))
-    for c, (start, end) in enumerate(cycles):
-        around = _fitted_frames(start, end, window, len(clip))
-        samples_of_clip = samples[:, window:-window]  # without the frames before and after it
-        fit = _fit_ground(feet, around, samples_of_clip, patches, ground, options)
+    # One cycle in each half of the clip gets a picture.
+    shown = {len(cycles) // 4, (3 * len(cycles)) // 4}
+    for c, ((start, end), around) in enumerate(zip(cycles, spans, strict=True)):
+        soles, standing = feet.soles[around], feet.contacts[around]
+        if ground == "flat":
+            fit = flat_ground(soles, standing, options)
+        else:
+            beside = samples[:, window:-window][:, around]  # `samples` go on before and after the clip
+            fit = fit_cycle(patches, soles, standing, beside, ground, options)
         heights.append(heights_under(fit, samples, start + window, end + window, offsets))
-        fitted.append((fit, feet.soles[around], feet.contacts[around]))
+        fitted.append((fit, soles, standing))
         if c in shown and np.any(heights[-1]):
             pictures.append(make_picture(clip, c, fit, feet, around))
     frame, cycle = cycle_frames(cycles)
@@ -109,54 +135,28 @@ def clip_fits(
 
 
 def _standing_feet(
-    clip: Clip, contacts: Mask, cycles: np.ndarray, window: int, flat: bool, options: FitOptions
+    clip: Clip, contacts: Mask, spans: Sequence[slice], flat: bool, options: FitOptions
 ) -> Feet:
     """The soles of a clip, and which of them stand on the ground.
 
     On flat ground, a joint in contact does not count as standing if the other joint of its foot is in
-    contact, too, and more than `options.held_up` cm lower. If no joint is in contact in a cycle and its
-    window, the lowest 5 % of the sole positions count as standing. window: frames before and after a cycle.
+    contact, too, and more than `options.held_up` cm lower. spans: the frames of each cycle with those around
+    it. If no joint is in contact in them, the lowest 5 % of the sole positions count as standing.
     """
     counted = np.zeros(len(clip), bool)
-    for start, end in cycles:
-        counted[_fitted_frames(start, end, window, len(clip))] = True
+    for around in spans:
+        counted[around] = True
     feet = find_soles(clip, contacts, np.flatnonzero(counted), flat, options)
     contacts = feet.contacts.copy()
     if flat and options.held_up is not None:
         contacts &= ~is_above_other_joint(feet, options.held_up)
-    for start, end in cycles:
-        around = _fitted_frames(start, end, window, len(clip))
+    for around in spans:
         if not contacts[around].any():
             text = "%s: no contact in frames %d to %d; the lowest positions of the feet count as contacts"
-            log.warning(text, clip.name, start, end)
+            log.warning(text, clip.name, around.start, around.stop)
             height = feet.soles[around][..., 1]
             contacts[around] = height <= np.quantile(height, 0.05)
     return replace(feet, contacts=contacts)
-
-
-def _fitted_frames(start: int, end: int, window: int, frames: int) -> slice:
-    """The frames that the ground is fitted to: `start` to `end`, and `window` frames before and after these.
-
-    frames: number of frames of the clip.
-    """
-    return slice(max(start - window, 0), min(end + window + 1, frames))
-
-
-def _fit_ground(
-    feet: Feet, around: slice, samples: Array, patches: Patches, kind: str, options: FitOptions
-) -> CycleGround:
-    """The ground of one cycle, with all its fits.
-
-    around: the frames to fit to. samples: (3, F, 2) as from `sample_points`, for the F frames of the clip.
-    kind: "flat", "rocky", "jumpy" or "beam".
-    """
-    soles, contacts = feet.soles[around], feet.contacts[around]
-    if kind == "flat":
-        return flat_ground(soles, contacts, options)
-    path = samples[1, around]
-    sides = samples[0, around] - path
-    sides = sides / np.linalg.norm(sides, axis=-1, keepdims=True)
-    return fit_cycle(patches, soles, contacts, path, sides, kind, options)
 
 
 def _fit_statistics(fitted: Sequence[tuple[CycleGround, Array, Mask]], fits: int) -> dict[str, Any]:
@@ -244,38 +244,6 @@ def load_fits(path: str | Path) -> Arrays:
     return data
 
 
-# Data for a picture of a fit of the ground: heights on a grid, the feet over time, and three poses.
-
-
-GRID_POINTS = 24  # points of the ground's grid along x and along z
-MARGIN_CM = 60.0  # the grid reaches this far beyond the feet
-
-
-@dataclass(frozen=True)
-class FitPicture:
-    """The best fit of one cycle, in centimetres in the clip's world.
-
-    cycle: number of the cycle in the clip. x, z: (G,) coordinates of the grid. ground: (G, G) height at each
-    x[i], z[j]. soles, contacts: (T, 4, 3) and (T, 4), in the T frames that the ground is fitted to. pose,
-    turns: (3, J, 3) and (3, J, 4) positions and world rotations of the joints after a quarter, half and three
-    quarters of these frames.
-    """
-
-    cycle: int
-    x: Array = field(repr=False)
-    z: Array = field(repr=False)
-    ground: Array = field(repr=False)
-    soles: Array = field(repr=False)
-    contacts: Mask = field(repr=False)
-    pose: Array = field(repr=False)
-    turns: Array = field(repr=False)
-
-
-def cycles_to_picture(count: int) -> set[int]:
-    """Numbers of the cycles that get a picture: one in each half of the `count` cycles of a clip."""
-    return {count // 4, (3 * count) // 4} if count > 1 else set(range(count))
-
-
 def make_picture(clip: Clip, cycle: int, ground: CycleGround, feet: Feet, around: slice) -> FitPicture:
     """The picture of the best fit of a cycle. around: the frames that the ground was fitted to."""
     soles = feet.soles[around]
@@ -284,13 +252,6 @@ def make_picture(clip: Clip, cycle: int, ground: CycleGround, feet: Feet, around
     points = np.stack(np.meshgrid(x, z, indexing="ij"), axis=-1).reshape(-1, 2)
     heights = ground.heights_at(points)[0].reshape(GRID_POINTS, GRID_POINTS)
     frames = np.linspace(around.start, around.stop - 1, 5).astype(int)[1:4]
-    return FitPicture(
-        cycle,
-        x.astype(np.float32),
-        z.astype(np.float32),
-        heights.astype(np.float32),
-        soles.astype(np.float32),
-        feet.contacts[around],
-        clip.positions[frames].astype(np.float32),
-        clip.global_rotations[frames].astype(np.float32),
-    )
+    x, z, heights, soles = (values.astype(np.float32) for values in (x, z, heights, soles))
+    pose, turns = (values[frames].astype(np.float32) for values in (clip.positions, clip.global_rotations))
+    return FitPicture(cycle, x, z, heights, soles, feet.contacts[around], pose, turns)

@@ -21,6 +21,7 @@ from hobble.terrain.patches import FootPoints, Patches, best_patches
 Mask = NDArray[np.bool_]
 
 FOOT_ROLES = ("left_heel", "left_toe", "right_heel", "right_toe")  # roles of joints of a `Skeleton`
+SOLE_CM = 4.0  # height of a toe joint above its sole where nothing tells it
 IS_HEEL = np.array([True, False, True, False])  # whether each of FOOT_ROLES is a heel
 OTHER_OF_FOOT = [1, 0, 3, 2]  # for each of FOOT_ROLES, the index of the other joint of the same foot
 
@@ -48,7 +49,7 @@ def find_soles(clip: Clip, contacts: Mask, frames: np.ndarray, flat: bool, optio
     On flat ground "auto" is the median height of the joints in contact. If this puts a sole more than
     `deepest` cm below the ground, the height is reduced by just enough to prevent that; but if more than
     `deepest` cm would be needed, it stays the median. On other ground, or without contacts, the toe joint is
-    `sole` cm above its sole, and the heel joint is higher than the toe joint by as much as in the rest pose.
+    SOLE_CM above its sole, and the heel joint is higher than the toe joint by as much as in the rest pose.
     """
     joints = clip.positions[:, [clip.skeleton.role(role) for role in FOOT_ROLES]].copy()
     above_sole: list[float] = []
@@ -59,7 +60,7 @@ def find_soles(clip: Clip, contacts: Mask, frames: np.ndarray, flat: bool, optio
         elif flat and down.any():
             above_sole.append(_flat_height(heights, down, options.deepest))
         else:
-            above_sole.append(options.sole + (heel_above_toe(clip.skeleton) if columns is IS_HEEL else 0.0))
+            above_sole.append(SOLE_CM + (heel_above_toe(clip.skeleton) if columns is IS_HEEL else 0.0))
     joints[..., 1] -= np.where(IS_HEEL, *above_sole)
     return Feet(joints, contacts, *above_sole)
 
@@ -86,6 +87,7 @@ def heel_above_toe(skeleton: Skeleton) -> float:
     return float(heights[IS_HEEL].mean() - heights[~IS_HEEL].mean())
 
 
+SMOOTHING = 0.1  # regularisation of the radial basis functions, as in Holden et al. (2017)
 WALL_STEEPNESS = 2.0  # least steepness of the walls of a pit, cm per cm
 # A surface that leaves too large a residual is fitted again with a quarter of the smoothing, at most this
 # many times.
@@ -125,11 +127,11 @@ class Surface:
 
 
 def fit_surfaces(
-    points: Array, residual: Array, smoothing: float, most: float | None = None, standing: int | None = None
+    points: Array, residual: Array, most: float | None = None, standing: int | None = None
 ) -> list[Surface]:
     """One surface for each row of `residual` (K, N), the heights that it should have at N points, cm.
 
-    points: (N, 4) from `gather_stances`. smoothing: regularisation. A point with count m has smoothing / m on
+    points: (N, 4) from `gather_stances`. A point with count m has SMOOTHING / m on
     the diagonal of the system of equations, and the weight m in the mean distance between points. So the
     surface is exactly that of m points at one place.
 
@@ -142,7 +144,7 @@ def fit_surfaces(
     spread = float(count @ apart @ count / count.sum() ** 2)
     if spread < 1e-6:  # all points are at one place, so no surface can be fitted
         return [Surface(places[:1], np.zeros(1), 1.0)] * len(residual)
-    diagonal, weights = smoothing / count, np.zeros_like(residual)
+    diagonal, weights = SMOOTHING / count, np.zeros_like(residual)
     share = count[:standing] / count[:standing].sum()
     refit = np.arange(len(residual))  # indices of the surfaces that are still to be fitted
     for _ in range(1 + MAX_REFITS):
@@ -172,18 +174,6 @@ class Pits:
         """(M,) at points (M, 2): the lowest of the heights `ground` (M,) and the cones."""
         cones = self.heights + self.steepness * distances(points, self.places)
         return np.minimum(ground, cones.min(axis=1, initial=np.inf))
-
-
-def dig_pits(soles: Array, standing: Array, depth: float) -> Pits:
-    """Pits that lower the ground until soles (N, 3) are only `depth` cm below it.
-
-    standing: (M, 4) points of standing feet, from `gather_stances`. The walls of a pit are so steep that the
-    ground under standing feet nearby is not lowered, for example on the next step of stairs.
-    """
-    places, heights = soles[:, [0, 2]], soles[:, 1] + depth
-    apart = np.maximum(distances(places, standing[:, :2]), 1e-3)
-    needed_steepness = ((standing[:, 2] - heights[:, None]) / apart).max(axis=1)
-    return Pits(places, heights, np.maximum(needed_steepness, WALL_STEEPNESS))
 
 
 def distances(a: Array, b: Array) -> Array:
@@ -242,23 +232,21 @@ def fit_cycle(
     patches: Patches,
     soles: Array,
     contacts: Mask,
-    path: Array,
-    sides: Array,
+    samples: Array,
     kind: str,
     options: FitOptions,
 ) -> CycleGround:
     """Fit the ground under one cycle and the frames around it, T frames together.
 
     soles: (T, 4, 3) positions of the soles at heels and toes, cm. contacts: (T, 4) bool, at least one true.
-    path: (T, 2) x and z of the root. sides: (T, 2) unit vectors to the left of the path. kind: "rocky",
+    samples: (3, T, 2) x and z of points to the left of the path, on it and to its right. kind: "rocky",
     "jumpy" or "beam"; "jumpy" and "beam" add terms to the error.
     """
-
     where, height = soles[..., [0, 2]], soles[..., 1]
     centre, level = where[contacts].mean(axis=0), height[contacts].mean()
     cells = patches.cells(where.reshape(-1, 2), centre).reshape(where.shape)
     foot_points = np.concatenate([cells, (height - level)[..., None]], axis=-1)
-    beam_sides = beam_side_points(patches, path, sides, centre) if kind == "beam" else np.zeros((0, 4))
+    beam_sides = beam_side_points(patches, samples, centre) if kind == "beam" else np.zeros((0, 4))
     footing = FootPoints(foot_points[contacts], foot_points[~contacts], kind == "jumpy", beam_sides)
     chosen, error = best_patches(patches, footing, options.fits)
     # Mean height of each patch under the feet in contact, subtracted to make the patch level with the feet.
@@ -274,9 +262,9 @@ def flat_ground(soles: Array, contacts: Mask, options: FitOptions) -> CycleGroun
     contact, as in Holden et al. (2017). They compute contacts from velocities, and the last frame has no
     velocity. So for this mean, as in their work, the last frame gets the contacts of the frame before it.
 
-    With `bend_flat`, if the feet in contact are on average more than `deepest` cm from it (because the floor
-    or the capture is uneven), a surface is added and pits are dug where a foot is still too low. Otherwise
-    only pits are dug, under feet that are more than `deepest` below the ground.
+    If the feet in contact are on average more than `deepest` cm from it (because the floor or the capture is
+    uneven), a surface is added and pits are dug where a foot is still too low. Otherwise only pits are dug,
+    under feet that are more than `deepest` below the ground.
     """
     deepest = options.deepest
     heights = soles[..., 1]
@@ -284,7 +272,7 @@ def flat_ground(soles: Array, contacts: Mask, options: FitOptions) -> CycleGroun
     counted = by_velocity if by_velocity.any() else contacts
     height = heights[counted].mean() if options.flat_level == "feet" else 0.0
     uncorrected = CycleGround(None, np.array([-1]), np.zeros(1), np.zeros(2), np.array([height]))
-    if deepest is None or not options.bend_flat:
+    if deepest is None:
         return uncorrected
     if np.abs(heights[contacts] - height).mean() > deepest:
         return meet_feet(uncorrected, soles, contacts, options)
@@ -301,35 +289,45 @@ def meet_feet(uncorrected: CycleGround, soles: Array, contacts: Mask, options: F
     """
     standing = gather_stances(soles, contacts, STANCE_FRAMES)
     residual = standing[:, 2] - uncorrected.heights_at(standing[:, :2])
-    smoothing, deepest = options.smoothing, options.deepest
-    most = None if deepest is None else deepest / 2
-    ground = replace(uncorrected, surfaces=fit_surfaces(standing, residual, smoothing, most))
+    deepest = options.deepest
     if deepest is None:
-        return ground
+        return replace(uncorrected, surfaces=fit_surfaces(standing, residual))
+    most = deepest / 2
+    ground = replace(uncorrected, surfaces=fit_surfaces(standing, residual, most))
     surfaces = list(ground.surfaces)
-    for k, covered in enumerate(ground.height_above_soles(soles) > deepest / 2):
+    for k, covered in enumerate(ground.height_above_soles(soles) > most):
         if covered.any():
             points = np.concatenate([standing, gather_stances(soles, covered & ~contacts, COVERED_FRAMES)])
             residual = (points[:, 2] - uncorrected.heights_at(points[:, :2])[k])[None]
-            (surfaces[k],) = fit_surfaces(points, residual, smoothing, most, len(standing))
+            (surfaces[k],) = fit_surfaces(points, residual, most, len(standing))
     return _with_pits(replace(uncorrected, surfaces=surfaces), soles, standing, deepest)
 
 
 def _with_pits(ground: CycleGround, soles: Array, standing: Array, deepest: float) -> CycleGround:
     """The ground of each fit with pits for the feet that are more than `deepest` below it.
 
-    In a pit the ground is lowered until the foot is only deepest / 2 below it.
+    In a pit the ground is lowered until the foot is only deepest / 2 below it. standing: (M, 4) points of
+    standing feet, from `gather_stances`. The walls of a pit are so steep that the ground under standing feet
+    nearby is not lowered, for example on the next step of stairs.
     """
-    below = ground.height_above_soles(soles) > deepest
-    return replace(ground, pits=[dig_pits(soles[covered], standing, deepest / 2) for covered in below])
+    pits = []
+    for below in ground.height_above_soles(soles) > deepest:
+        places, heights = soles[below][:, [0, 2]], soles[below][:, 1] + deepest / 2
+        apart = np.maximum(distances(places, standing[:, :2]), 1e-3)
+        needed_steepness = ((standing[:, 2] - heights[:, None]) / apart).max(axis=1)
+        pits.append(Pits(places, heights, np.maximum(needed_steepness, WALL_STEEPNESS)))
+    return replace(ground, pits=pits)
 
 
-def beam_side_points(patches: Patches, path: Array, sides: Array, centre: Array) -> Array:
+def beam_side_points(patches: Patches, samples: Array, centre: Array) -> Array:
     """(N, 4) points beside a path on a beam, at which the ground must be far below the beam.
 
     Columns: u and v of the point, then u and v of the path beside it, in cells from the middle of the patch.
-    path, sides: see `fit_cycle`. centre: (2,) x and z of the middle of the patch, cm.
+    samples: see `fit_cycle`. centre: (2,) x and z of the middle of the patch, cm.
     """
+    path = samples[1]
+    sides = samples[0] - path
+    sides = sides / np.linalg.norm(sides, axis=-1, keepdims=True)
     beside = np.concatenate([path + sign * d * sides for d in BEAM_SIDE_CM for sign in (1, -1)])
     on_path = np.tile(path, (2 * len(BEAM_SIDE_CM), 1))
     free = distances(beside, path).min(axis=1) > PATH_CLEARANCE_CM

@@ -1,6 +1,7 @@
-"""Reads heightmaps from files, takes one from matplotlib's model of a real landscape, or generates them."""
+"""Reads heightmaps from files, or generates them."""
 
 import io
+import itertools
 import zlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
@@ -15,7 +16,6 @@ from hobble.terrain import options
 
 MAX_CELLS = 1 << 26  # largest number of cells of a map: 8192 x 8192, 512 MB, 322 x 322 m with cells of 3.9 cm
 MAX_TEXT_BYTES = 1 << 28  # size of the largest text file that is read
-MAX_LINE_LETTERS = 1 << 20  # letters in the longest line of a text file
 MAX_HEIGHT = 1e7  # largest height, cm (100 km); the runtime has the same limit
 
 # The words with which lines of the header of an ESRI grid begin.
@@ -36,67 +36,35 @@ class TerrainMap:
 
 
 def heightmaps(
-    entries: Sequence[options.HeightmapOptions],
-    files: Sequence[str | Path],
-    *,
-    cell: float,
-    height_scale: float,
+    entries: Sequence[options.HeightmapOptions], files: Sequence[str | Path], *, cell: float
 ) -> list[TerrainMap]:
     """The heightmaps that a data set lists.
 
-    files: a path for each entry of kind `file`, in the order of the entries. cell: width of a cell, cm.
-    height_scale: factor that converts the heights in files to cm. The `cell` and `height_scale` of an entry,
-    if it has them, take precedence. Raises InputError for a file that cannot be used.
+    files: a path for each entry of kind `file`, in the order of the entries. cell: width of a cell, cm; the
+    `cell` of an entry, if it has one, takes precedence. Raises InputError for a file that cannot be used.
     """
-    paths = iter(files)
-    out = []
+    paths, out = iter(files), []
     for entry in entries:
         width = entry.cell or cell
-        scale = entry.height_scale
-        if entry.kind == "file":
-            path = next(paths)
-            heights = read_heights(path) * (scale or height_scale)
-            if (highest := float(np.nanmax(np.abs(heights)))) > MAX_HEIGHT:
-                raise InputError(
-                    path,
-                    f"a height of {highest:.4g} cm, but at most {MAX_HEIGHT:g} cm are allowed",
-                    fix='Set height_scale of this map, or give the file its "no data" value.',
-                )
-            out.append(TerrainMap(str(path), heights, width))
-        elif entry.kind == "elevation":
-            out.append(TerrainMap("elevation", landscape_heights(width) * (scale or 1.0), width))
-        else:
-            name = f"{entry.kind} (seed {entry.seed})"
-            heights = generate_heights(entry.kind, entry.seed, width) * (scale or 1.0)
-            out.append(TerrainMap(name, heights, width))
+        if entry.kind != "file":
+            heights = generate_heights(entry.kind, entry.seed, width)
+            out.append(TerrainMap(f"{entry.kind} (seed {entry.seed})", heights, width))
+            continue
+        path = next(paths)
+        heights = read_heights(path) * entry.height_scale
+        if (highest := float(np.nanmax(np.abs(heights)))) > MAX_HEIGHT:
+            problem = f"a height of {highest:.4g} cm, but at most {MAX_HEIGHT:g} cm are allowed"
+            fix = 'Set height_scale of this map, or give the file its "no data" value.'
+            raise InputError(path, problem, fix=fix)
+        out.append(TerrainMap(str(path), heights, width))
     return out
-
-
-def landscape_heights(cell: float) -> Array:
-    """Heights (rows, columns), cm, of a real landscape in matplotlib's sample data, reduced in size.
-
-    A cell of the data is 3 arc seconds wide. That is 92.6 m from north to south, but only 74.3 m from east to
-    west at 36.6 degrees north. So the columns are resampled to make cells square. Then lengths and heights
-    are scaled by the same factor, so that a cell is `cell` cm wide. Slopes reach 36 degrees.
-    """
-    import matplotlib
-
-    data = load_npz(Path(matplotlib.get_data_path(), "sample_data", "jacksboro_fault_dem.npz"))
-    metres = data["elevation"].astype(float)
-    latitude = (float(data["ymin"]) + float(data["ymax"])) / 2
-    narrowing = np.cos(np.radians(latitude))  # width of a cell from east to west / from north to south
-    columns = np.arange(metres.shape[1])
-    new_columns = np.arange(0, metres.shape[1] - 1, 1 / narrowing)
-    square = np.stack([np.interp(new_columns, columns, row) for row in metres])
-    cell_metres = 1852.0 / 60 * 3  # an arc minute is a nautical mile, 1852 m
-    return (square - square.mean()) * cell / cell_metres
 
 
 def read_heights(path: str | Path) -> Array:
     """Heights (rows, columns) from a file, in the file's unit; nan in holes.
 
     .txt .csv .dat .asc: rows of numbers separated by spaces, commas or semicolons, with or without the header
-    of an ESRI grid. .npy: one 2D array. .npz: its only 2D array, or the one called `heights` or `elevation`.
+    of an ESRI grid. .npy: one 2D array. .npz: its only 2D array, or the one called `heights`.
     .png .tif .tiff: grey values of up to 32 bits. The "no data" value of a GeoTIFF or ESRI grid marks a hole.
     Raises InputError if the file cannot be used.
     """
@@ -106,10 +74,8 @@ def read_heights(path: str | Path) -> Array:
     readers = {".npz": _read_npz, ".npy": load_npy, **dict.fromkeys(IMAGE_FORMATS, _read_image)}
     heights = np.asarray(readers.get(path.suffix.lower(), _read_text_grid)(path))
     if heights.ndim != 2 or min(heights.shape) < 2:
-        raise InputError(
-            path,
-            f"a heightmap needs rows and columns, at least two of each, but this has shape {heights.shape}",
-        )
+        needed = "a heightmap needs rows and columns, at least two of each"
+        raise InputError(path, f"{needed}, but this has shape {heights.shape}")
     if heights.dtype.kind not in "fiub":
         raise InputError(path, f"heights must be numbers, not {heights.dtype}")
     if heights.size > MAX_CELLS:
@@ -122,51 +88,31 @@ def read_heights(path: str | Path) -> Array:
 
 def _read_text_grid(path: Path) -> Array:
     """Heights (rows, columns) of a text file, with or without the header of an ESRI grid; nan in holes."""
-    rows: list[Array] = []
-    header: dict[str, float] = {}
-    cells = 0
-    for number, line in enumerate(io.StringIO(read_text(path, MAX_TEXT_BYTES), newline=None), 1):
-        if len(line) > MAX_LINE_LETTERS:
-            raise InputError(
-                path,
-                f"a line of more than {MAX_LINE_LETTERS} letters, the largest number allowed",
-                line=number,
-            )
-        words = line.split("#")[0].replace(",", " ").replace(";", " ").split()
-        if not words:
-            continue
-        try:
-            if not rows and words[0].lower() in ESRI_HEADER:
-                header[words[0].lower()] = float(" ".join(words[1:]))
-                continue
-            rows.append(np.array([float(word) for word in words]))
-        except ValueError as error:
-            raise InputError(
-                path, f"not a number: {str(error).split(':')[-1].strip()}", line=number
-            ) from error
-        if len(rows[-1]) != len(rows[0]):
-            problem = f"{len(rows[-1])} heights, but the rows above have {len(rows[0])}"
-            raise InputError(path, problem, line=number)
-        cells += len(rows[-1])
-        if cells > MAX_CELLS:
-            raise InputError(path, f"more than {MAX_CELLS} heights, the largest number allowed", line=number)
-    if not rows:
+    text = read_text(path, MAX_TEXT_BYTES).replace(",", " ").replace(";", " ")
+    lines, header = io.StringIO(text, newline=None), {}
+    for line in lines:
+        word, *rest = line.split("#")[0].lower().split() or [""]
+        if word not in {*ESRI_HEADER, ""}:
+            break
+        header[word] = " ".join(rest)
+    else:
         raise InputError(path, "the file holds no heights")
-    heights, no_data = np.array(rows), header.get("nodata_value")
-    return heights if no_data is None else np.where(heights == no_data, np.nan, heights)
+    try:
+        heights = np.loadtxt(itertools.chain([line], lines), ndmin=2)
+        return np.where(heights == float(header.get("nodata_value", "nan")), np.nan, heights)
+    except ValueError as error:
+        raise InputError(path, f"not rows of numbers: {printable(error)}") from error
 
 
 def _read_npz(path: Path) -> Array:
-    """The only 2D array of an npz file, or the one called `heights` or `elevation`."""
+    """The only 2D array of an npz file, or the one called `heights`."""
     arrays = {name: array for name, array in load_npz(path).items() if array.ndim == 2}
-    for name in ("heights", "elevation", *arrays):
-        if name in arrays and (len(arrays) == 1 or name in ("heights", "elevation")):
-            return arrays[name]
-    raise InputError(
-        path,
-        f"which array holds the heights? The 2D arrays are: {printable(', '.join(arrays)) or 'none'}",
-        fix="Store the heights in a 2D array called `heights`.",
-    )
+    if len(arrays) != 1 and "heights" not in arrays:
+        problem = (
+            f"which array holds the heights? The 2D arrays are: {printable(', '.join(arrays)) or 'none'}"
+        )
+        raise InputError(path, problem, fix="Store the heights in a 2D array called `heights`.")
+    return arrays.get("heights", next(iter(arrays.values())))
 
 
 def _read_image(path: Path) -> Array:
@@ -177,10 +123,10 @@ def _read_image(path: Path) -> Array:
         # Only these formats, because for others Pillow may start programs, such as Ghostscript.
         with Image.open(path, formats=IMAGE_FORMATS[path.suffix.lower()]) as image:
             if image.width * image.height > MAX_CELLS:
-                raise InputError(
-                    path,
-                    f"{image.width} x {image.height} cells are too many; at most {MAX_CELLS} are allowed",
+                problem = (
+                    f"{image.width} x {image.height} cells are too many; at most {MAX_CELLS} are allowed"
                 )
+                raise InputError(path, problem)
             grey = image if image.mode in ("L", "I", "F", "I;16", "I;16B", "1") else image.convert("L")
             heights = np.asarray(grey, float)
             no_data = getattr(image, "tag_v2", {}).get(GDAL_NODATA)

@@ -10,9 +10,9 @@ from hobble.core.section import Finite, Positive, PositiveFloat, RelativePath, S
 
 
 class HeightmapOptions(Section):
-    """One heightmap: generated, read from a file, or matplotlib's elevation model of a real landscape."""
+    """One heightmap: generated, or read from a file."""
 
-    kind: Literal["fractal", "hills", "stairs", "slope", "boxes", "beams", "elevation", "file"]
+    kind: Literal["fractal", "hills", "stairs", "slope", "boxes", "beams", "file"]
     path: RelativePath | None = Field(
         None, description="file of the map, only for `kind: file`; relative to the mocap folder"
     )
@@ -20,10 +20,7 @@ class HeightmapOptions(Section):
     cell: PositiveFloat | None = Field(
         None, description="width of this map's cells, cm; default: terrain.cell"
     )
-    height_scale: PositiveFloat | None = Field(
-        None,
-        description="factor that multiplies the heights; for `kind: file` it replaces terrain.height_scale",
-    )
+    height_scale: PositiveFloat = Field(3.0, description="factor that converts the heights in the file to cm")
 
     @model_validator(mode="after")
     def _check_path(self) -> HeightmapOptions:
@@ -35,7 +32,7 @@ class HeightmapOptions(Section):
 class PatchOptions(Section):
     """How patches are drawn from heightmaps, for the rule `terrain_patches`."""
 
-    heightmaps: tuple[HeightmapOptions, ...] = Field(
+    heightmaps: Annotated[tuple[HeightmapOptions, ...], Field(min_length=1)] = Field(
         default_factory=lambda: tuple(
             HeightmapOptions(kind=kind, seed=i)
             for i, kind in enumerate(("fractal", "fractal", "hills", "stairs", "slope", "boxes", "beams"))
@@ -47,18 +44,11 @@ class PatchOptions(Section):
         description="width of the cells of patches, and of heightmaps without their own `cell`, cm",
     )
     size: Annotated[int, Field(gt=0, le=2048)] = Field(128, description="width of a patch, cells")
-    height_scale: PositiveFloat = Field(3.0, description="factor that converts the heights in files to cm")
     highest: PositiveFloat = Field(
         50.0,
         description="a patch is dropped if one of its heights is further than this from its mean height, cm",
     )
     seed: int = 1
-
-    @model_validator(mode="after")
-    def _check_heightmaps(self) -> PatchOptions:
-        if not self.heightmaps:
-            raise ValueError("`heightmaps` is empty: list at least one, as ground to draw patches from")
-        return self
 
 
 class FitOptions(Section):
@@ -71,9 +61,6 @@ class FitOptions(Section):
         10,
         description="fits of each cycle; on flat ground a cycle has only one, which counts this many times",
     )
-    smoothing: Annotated[float, Field(ge=0)] = Field(
-        0.1, description="regularisation of the radial basis functions"
-    )
     heel_height: Literal["auto"] | Finite = Field(
         "auto",
         description="height of the heel joint above its sole, cm; `auto`: computed from the clip; Holden et "
@@ -84,19 +71,10 @@ class FitOptions(Section):
         description="height of the toe joint above its sole, cm; `auto`: computed from the clip; Holden et "
         "al. (2017) use 4",
     )
-    sole: Finite = Field(
-        4.0,
-        description="height of the toe joint above its sole if `toe_height` is `auto` and the ground is not "
-        "flat, cm",
-    )
     deepest: PositiveFloat | None = Field(
         1.0,
-        description="how far a foot may be below the ground, cm; null: no limit, as in Holden et al. (2017)",
-    )
-    bend_flat: bool = Field(
-        True,
-        description="correct flat ground if the feet in contact are on average more than `deepest` from it, "
-        "or if a foot is more than `deepest` below it; false: keep it level",
+        description="how far a foot may be below the ground, cm. Flat ground is corrected if the feet in "
+        "contact are on average further than this from it. null: no limit, as in Holden et al. (2017)",
     )
     flat_level: Literal["zero", "feet"] = Field(
         "zero",

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from hobble.core.declared import ArrayOf, load_declared
-from hobble.core.errors import HobbleError, InputError
+from hobble.core.errors import InputError
 from hobble.core.files import DELETE_IT, save_npz
 from hobble.core.quat import Array
 from hobble.terrain.heightmaps import MAX_CELLS, MAX_HEIGHT, TerrainMap
@@ -27,7 +27,7 @@ class Patches:
     """P views of M heightmaps.
 
     heights: all maps one after another, row by row, cm, float32. starts: (M,) index of each map's first cell.
-    shapes: (M, 2) rows and columns. names: (M,) names of the maps. which: (P,) index of each view's map.
+    shapes: (M, 2) rows and columns. which: (P,) index of each view's map.
     affine: (P, 2, 3) such that row, column of the map = affine (u, v, 1), where (u, v) is a cell counted from
     the middle of the patch, u along the world's x and v along z. mean: (P,) mean height of each view, cm; it
     is subtracted. cell: width of a patch's cell, cm. size: width of a patch, cells.
@@ -36,7 +36,6 @@ class Patches:
     heights: Array = field(repr=False)
     starts: np.ndarray = field(repr=False)
     shapes: np.ndarray
-    names: np.ndarray
     which: np.ndarray = field(repr=False)
     affine: Array = field(repr=False)
     mean: Array = field(repr=False)
@@ -47,9 +46,9 @@ class Patches:
         return len(self.which)
 
     @property
-    def arrays(self) -> tuple[np.ndarray, ...]:
-        """The arrays in the order in which the compiled loops take them."""
-        return self.heights, self.starts, self.shapes, self.which, self.affine, self.mean
+    def maps(self) -> tuple[np.ndarray, ...]:
+        """The arrays of all heightmaps, in the order in which the compiled loops take them."""
+        return self.heights, self.starts, self.shapes
 
     def cells(self, points: Array, centre: Array) -> Array:
         """World points (N, 2), x and z in cm, as cells from the middle of a patch at `centre` (2,).
@@ -68,8 +67,7 @@ class Patches:
         from hobble.terrain.kernels import view_heights
 
         k = np.asarray(chosen, int)
-        maps = self.heights, self.starts, self.shapes
-        return view_heights(*maps, self.which[k], self.affine[k], self.mean[k], cells)
+        return view_heights(*self.maps, self.which[k], self.affine[k], self.mean[k], cells)
 
 
 def draw_patches(
@@ -81,8 +79,6 @@ def draw_patches(
     view with a height more than `highest` cm from its mean is dropped, and another view is drawn. Raises
     InputError for a map that is too small, or if fewer than one in a thousand of its views can be used.
     """
-    if not maps:
-        raise HobbleError("terrain.heightmaps is empty: list at least one, as ground to draw patches from.")
     counts = [count // len(maps) + (i < count % len(maps)) for i in range(len(maps))]
     drawn = [
         _draw_views(heightmap, views, cell, size, highest, np.random.default_rng([seed, i]))
@@ -93,7 +89,6 @@ def draw_patches(
         heights=np.concatenate([np.nan_to_num(m.heights).astype(np.float32).ravel() for m in maps]),
         starts=_first_cells(shapes),
         shapes=shapes,
-        names=np.array([Path(m.name).name for m in maps]),
         which=np.repeat(np.arange(len(maps), dtype=np.int32), counts),
         affine=np.concatenate([affine for affine, _ in drawn]),
         mean=np.concatenate([mean for _, mean in drawn]),
@@ -124,12 +119,11 @@ def _draw_views(
         found += len(kept)
         tried += VIEWS_PER_DRAW
         if found < count and found < FEWEST_PASSING * tried:
-            raise InputError(
-                heightmap.name,
-                f"{found or 'none'} of {tried} random views, {size} cells wide, stay within {highest:g} cm "
-                "of their mean height",
-                fix="Lower its height_scale, or leave this heightmap out.",
+            problem = (
+                f"{found or 'none'} of {tried} random views, {size} cells wide, stay within {highest:g} cm"
             )
+            fix = "Lower its height_scale, or leave this heightmap out."
+            raise InputError(heightmap.name, f"{problem} of their mean height", fix=fix)
     return np.concatenate(affines), np.concatenate(means)
 
 
@@ -137,7 +131,6 @@ def _draw_views(
 DECLARED = {
     "heights": ArrayOf(("H",), low=-MAX_HEIGHT, high=MAX_HEIGHT),
     "shapes": ArrayOf(("M", 2), "iu", 2, MAX_CELLS),
-    "names": ArrayOf(("M",), "U"),
     "which": ArrayOf(("P",), "iu", 0),
     "affine": ArrayOf(("P", 2, 3)),
     "mean": ArrayOf(("P",), low=-MAX_HEIGHT, high=MAX_HEIGHT),
@@ -148,8 +141,7 @@ DECLARED = {
 
 def save_patches(path: str | Path, patches: Patches) -> None:
     """Write the heightmaps and their views as one npz."""
-    arrays = {n: getattr(patches, n) for n in ("heights", "shapes", "names", "which", "affine", "mean")}
-    save_npz(path, **arrays, cell=np.array(patches.cell), size=np.array(patches.size))
+    save_npz(path, **{name: np.asarray(getattr(patches, name)) for name in DECLARED})
 
 
 def load_patches(path: str | Path) -> Patches:
@@ -207,11 +199,9 @@ def _random_views(rng: np.random.Generator, heightmap: TerrainMap, cell: float, 
     if not has_room.any():
         needed = int(np.ceil((size - 1) * scale)) + 1
         rows, columns = heightmap.heights.shape
-        raise InputError(
-            heightmap.name,
-            f"{rows} x {columns} cells are too few for patches of {needed} x {needed} of its cells",
-            fix="Use a larger map, a larger `cell` for this map, or a smaller terrain.size.",
-        )
+        problem = f"{rows} x {columns} cells are too few for patches of {needed} x {needed} of its cells"
+        fix = "Use a larger map, a larger `cell` for this map, or a smaller terrain.size."
+        raise InputError(heightmap.name, problem, fix=fix)
     centre = low + place_in_map * (high - low)
     return np.concatenate([turn, centre[..., None]], axis=-1)[has_room].astype(np.float32)
 
@@ -247,9 +237,9 @@ def best_patches(patches: Patches, footing: FootPoints, count: int) -> tuple[np.
     """Indices (count,) of the patches with the lowest errors, best first, and these errors (count,), cm²."""
     from hobble.terrain.kernels import search_views
 
-    # The last array, the means, is left out: the error does not depend on a constant added to the heights.
+    # The means are left out: the error does not depend on a constant added to the heights.
     found: tuple[np.ndarray, Array] = search_views(  # type: ignore[call-arg]
-        *patches.arrays[:-1], _foot_tables(footing), footing.jumps, count
+        *patches.maps, patches.which, patches.affine, _foot_tables(footing), footing.jumps, count
     )
     return found
 

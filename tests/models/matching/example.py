@@ -11,7 +11,7 @@ from hobble.models import network_options
 from hobble.models.load import network_from_arrays
 from hobble.models.model import BuiltOptions, FinishedNetwork
 from hobble.rows.clip_rows import ClipRows, save_clip_rows
-from hobble.rows.layout import RowLayout, body_column_count
+from hobble.rows.layout import RowLayout, body_layout, column_count_without_terrain
 
 FRAMES = (70, 90)  # of each clip
 CUT = 40  # the first clip's second cycle begins in the frame with which its first ends
@@ -44,7 +44,7 @@ def clip(skeleton: Skeleton, number: int, seed: int = 1) -> ClipRows:
         clip=f"clip-{number}",
         layout=layout,
         skeleton=skeleton.to_dict(),
-        x=smooth(rng, count, body_column_count(layout), 10.0)[row],
+        x=smooth(rng, count, column_count_without_terrain(body_layout(layout)), 10.0)[row],
         y=y[row],
         p=(0.02 * row) % 1.0,
         channels={"injury": injury[row]},
