@@ -21,9 +21,7 @@ CASES: list[tuple[Any, tuple, int]] = [
     (TrainablePfnn, ((6, 5, 4), 4), 1),
     (TrainablePfnn, ((6, 5, 5, 3), 4), 33),
     (TrainablePfnn, ((7, 4, 4, 4, 3), 6), 8),
-    (TrainablePlain, ((6, 5, 4), 1), 9),
     (TrainablePlain, ((7, 4, 4, 4, 3), 1), 9),
-    (TrainableMann, ((6, 5, 4), 2, (3, 4, 2), (5, 0, 2)), 1),
     (TrainableMann, ((6, 5, 5, 3), 8, (2, 4, 4, 8), (1, 3)), 33),
     (TrainableMann, ((7, 4, 4, 4, 3), 3, (2, 3), (0, 6)), 8),
 ]
@@ -106,23 +104,20 @@ def test_the_gradient_is_exact_to_the_precision_of_the_factors(step_class, kind,
 
 
 @pytest.mark.parametrize("step_class", STEPS)
-@pytest.mark.parametrize("dropout", [0.0, 0.3])
-def test_dropout_keeps_its_share_and_scales_it_up(step_class, dropout: float) -> None:
-    step = step_class(fresh((300, 200, 10)), dropout)
+def test_dropout_keeps_its_share_and_scales_it_up(step_class) -> None:
+    step = step_class(fresh((300, 200, 10)), 0.3)
     step.seed(9)
-    first = step.masks(500)
+    first, second = step.masks(500), step.masks(500)
     assert [tuple(mask.shape) for mask in first] == [(500, 300), (500, 200)]
     for mask in first:
-        assert set(mask.unique().tolist()) <= {0.0, torch.tensor(1 / (1 - dropout)).item()}
-        assert float((mask > 0).float().mean()) == pytest.approx(1 - dropout, abs=0.005)
-        assert float((mask > 0).float().mean(0).std()) < 0.05  # no column is dropped more often than others
-        assert float((mask > 0).float().mean(1).std()) < 0.05
-    second = step.masks(500)
+        assert set(mask.unique().tolist()) == {0.0, torch.tensor(1 / 0.7).item()}
+        kept = (mask > 0).float()
+        assert float(kept.mean()) == pytest.approx(0.7, abs=0.005)
+        assert max(float(kept.mean(axis).std()) for axis in (0, 1)) < 0.05  # no column or row is special
     step.seed(9)
     assert all(torch.equal(a, b) for a, b in zip(first, step.masks(500), strict=True))
-    if dropout:
-        both = (first[0] > 0) & (second[0] > 0)
-        assert float(both.float().mean()) == pytest.approx((1 - dropout) ** 2, abs=0.01)
+    both = (first[0] > 0) & (second[0] > 0)
+    assert float(both.float().mean()) == pytest.approx(0.7**2, abs=0.01)
 
 
 def test_initial_weights_fill_their_bounds_and_biases_are_zero() -> None:

@@ -10,6 +10,7 @@ from hobble.channels import channel as channel_named
 from hobble.core.skeleton import Skeleton, forward_kinematics
 from hobble.models.pfnn import Pfnn
 from hobble.rows.layout import RowLayout
+from tests.engine.networks import layers
 
 MakeNetwork = Callable[..., Pfnn]
 
@@ -46,19 +47,12 @@ def make_network(holden31: Skeleton) -> MakeNetwork:
         skeleton: Skeleton = holden31,
     ) -> Pfnn:
         layout = RowLayout(len(skeleton.joints), channels=((channel, links),) if links else ())
-        rng = np.random.default_rng(5)
-        sizes = (layout.x_size, 23, 17, layout.y_size)
-        shapes = list(zip(sizes[1:], sizes, strict=False))
-        gain = [scale if i == len(shapes) - 1 else 1.0 for i in range(len(shapes))]
+        weights, biases = layers(
+            np.random.default_rng(5), control_points, (layout.x_size, 23, 17, layout.y_size)
+        )
         return Pfnn(
-            weights=tuple(
-                (g * rng.normal(0, n**-0.5, (control_points, m, n))).astype(np.float32)
-                for g, (m, n) in zip(gain, shapes, strict=True)
-            ),
-            biases=tuple(
-                (g * rng.normal(0, 0.1, (control_points, m))).astype(np.float32)
-                for g, (m, n) in zip(gain, shapes, strict=True)
-            ),
+            weights=(*weights[:-1], np.float32(scale) * weights[-1]),
+            biases=(*biases[:-1], np.float32(scale) * biases[-1]),
             x_mean=np.zeros(layout.x_size, np.float32),
             x_std=np.full(layout.x_size, 20, np.float32),
             y_mean=mean_output(skeleton, layout, speed, turn),

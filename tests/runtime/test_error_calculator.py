@@ -15,16 +15,15 @@ def rows(network) -> ClipRows:
     """120 frames of a figure that glides in a circle over rising ground, with noise."""
     layout, count, rng = network.layout, 120, np.random.default_rng(4)
     y = np.tile(network.y_mean, (count, 1)) + rng.normal(0, 0.5, (count, layout.y_size)).astype(np.float32)
-    y[:, layout.y_turn] = -2 * np.pi / count
-    y[:, layout.y_root_velocity] = 0, 2.0
-    mean = np.linspace(0, 20, count).astype(np.float32)
+    y[:, layout.y_turn], y[:, layout.y_root_velocity] = -2 * np.pi / count, (0, 2.0)
+    mean, ones = np.linspace(0, 20, count).astype(np.float32), np.ones(count, np.int32)
     y[:, layout.y_joint_position.start + 1 : layout.y_joint_position.stop : 3] += mean[:, None]
-    x = rng.normal(0, 20, (count, layout.x_terrain.start)).astype(np.float32)
-    ones = np.ones(count, np.int32)
-    heights = rng.normal(0, 3, (count, 3 * layout.samples)).astype(np.float32)
-    frame = np.arange(60, 60 + count, dtype=np.int32)
-    phase = rng.random(count).astype(np.float32)
-    return ClipRows("a", layout, {}, x, y, phase, {}, frame, 0 * ones, ones, heights, mean)
+    x, heights, phase = (
+        rng.normal(0, size, (count, columns)).astype(np.float32)
+        for size, columns in ((20, layout.x_terrain.start), (3, 3 * layout.samples), (1, 1))
+    )
+    frame, p = np.arange(60, 60 + count, dtype=np.int32), phase[:, 0] % 1
+    return ClipRows("a", layout, {}, x, y, p, {}, frame, 0 * ones, ones, heights, mean)
 
 
 def test_truth_prediction_and_error_of_every_frame(network, rows: ClipRows) -> None:
@@ -56,8 +55,8 @@ def test_it_is_in_the_callers_axes_and_refuses_other_rows(network, rows: ClipRow
     own, other = (
         ProceduralAnimation(network, axes=a).compare(rows) for a in (Axes(), Axes("left", "Z", "m"))
     )
-    x, y, z = np.moveaxis(own.all.predicted.positions, -1, 0)
-    np.testing.assert_allclose(other.all.predicted.positions, np.stack([z, -x, y], axis=-1) / 100, atol=1e-9)
+    x, y, z = np.moveaxis(own.predicted.positions, -1, 0)
+    np.testing.assert_allclose(other.predicted.positions, np.stack([z, -x, y], axis=-1) / 100, atol=1e-9)
     fewer = type(network.layout)(30)
     with pytest.raises(ValueError, match="not those that the network has learnt"):
         ProceduralAnimation(network).compare(type(rows)(**{**vars(rows), "layout": fewer}))

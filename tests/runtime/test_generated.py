@@ -94,7 +94,7 @@ def test_scenarios_and_loops_are_written(tmp_path: Path, hurtable, monkeypatch: 
     assert data["left_knee/swept"].tolist() == ["injury", "LeftUpLeg-LeftLeg"]
     assert not data["walk/swept_values"].any()
     assert data["walk/swept"].tolist() == ["", ""]
-    generated.export_glb(tmp_path / "a.glb", hurtable, tmp_path / "scenarios.npz", Runtime())
+    generated.export_glb(tmp_path / "a.glb", hurtable, Runtime())
     file = Glb(tmp_path / "a.glb")
     for gait in generated.SPEEDS:
         for hurt in ("", "_left_knee", "_lower_back"):
@@ -105,4 +105,3 @@ def test_scenarios_and_loops_are_written(tmp_path: Path, hurtable, monkeypatch: 
                 for node, path in (("Hips", "translation"), ("LeftLeg", "rotation"), ("Spine1", "rotation")):
                     found = file.keys(animation, node, path)
                     assert found[-1] == pytest.approx(found[0], abs=1e-4)
-    assert set(file.animations) > set(names)

@@ -43,8 +43,8 @@ def speed_and_gait(
     [({}, 2.5), ({KNEE: 10}, 1.0), ({KNEE: 5}, 1.5), ({ARM: 10}, 1.8), ({KNEE: 5, ARM: 10}, 1.48955)],
 )
 def test_the_target_speed_is_limited_by_all_injuries(limited: Network, hurt, speed: float) -> None:
-    assert speed_and_gait(limited, (0, 2.5), hurt)[0] == pytest.approx(speed, abs=1e-5)
-    assert speed_and_gait(limited, (2.5, 0), hurt)[0] == pytest.approx(speed, abs=1e-5)
+    for velocity in ((0, 2.5), (2.5, 0)):
+        assert speed_and_gait(limited, velocity, hurt)[0] == pytest.approx(speed, abs=1e-5)
     assert speed_and_gait(limited, (0, 2.5), hurt, limits=False)[0] == pytest.approx(2.5, abs=1e-6)
 
 

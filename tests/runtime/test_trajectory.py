@@ -38,16 +38,9 @@ def prediction(
 
 
 def move(
-    y: np.ndarray,
-    position,
-    direction,
-    gait,
-    phase=None,
-    target=(0.0, 1.0),
-    loss: float = 0.0,
-    recorded_poses=False,
-    pull: float = 0.0,
-) -> np.ndarray:
+    y: np.ndarray, position, direction, gait, phase=None, target=(0.0, 1.0), loss: float = 0.0,
+    recorded_poses=False, pull: float = 0.0,
+) -> np.ndarray:  # fmt: skip
     phase = np.zeros(1) if phase is None else phase
     columns = controller.advance_columns(LAYOUT)
     targets = np.array([target], float)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from hobble.runtime import ProceduralAnimation
+from hobble.runtime import ProceduralAnimation, waypoints
 from hobble.runtime.waypoints import Follower, Waypoint
 
 SQUARE = (
@@ -14,8 +14,9 @@ SQUARE = (
 )
 
 
-def test_a_point_that_follows_its_target_reaches_all_waypoints() -> None:
-    follower = Follower(SQUARE, arrived=20.0)
+def test_a_point_that_follows_its_target_reaches_all_waypoints(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(waypoints, "ARRIVED", 20.0)
+    follower = Follower(SQUARE)
     place = follower.start[0][None]
     assert follower.start[1] == 0.0
     frames = [0]

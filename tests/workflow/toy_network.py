@@ -11,11 +11,9 @@ from hobble.models.blend import BlendedNetwork, BlendedOptions, TrainableBlend
 class ToyOptions(BlendedOptions):
     """The keys of every kind with layers."""
 
-    kind: Literal["toy"] = "toy"
+    network: ClassVar[str] = "hobble.models.toy:Toy"
 
-    @classmethod
-    def network_class(cls):
-        return Toy
+    kind: Literal["toy"] = "toy"
 
     def trainable(self, flat, sizes, columns):
         return TrainableToy(flat, sizes, 1, kind=self.kind)
@@ -29,10 +27,7 @@ class Toy(BlendedNetwork):
     """The network at run time: one set of weights, whatever the phase."""
 
     kind: ClassVar[str] = "toy"
-
-    @property
-    def description(self):
-        return f"toy of {self.layers_in_words()}"
+    description: ClassVar[str] = "toy"
 
     def shares(self, z, phase):
         return np.ones((len(z), 1), np.float32)

@@ -61,10 +61,9 @@ rule export_release:
 
 
 rule export_glb:
-    """The character for a game engine as a glTF 2.0 file: body, skeleton, loops of each gait, the scripted scenarios."""
+    """The character for a game engine as a glTF 2.0 file: body, skeleton, loops of each gait."""
     input:
         weights=network_file("weights.npz"),
-        scenarios=rules.generate.output.scenarios,
     output:
         glb="results/{configuration}/export/character.glb",
     log:

@@ -8,5 +8,5 @@ from hobble.workflow.job import job
 with job(snakemake) as log:
     network = load_network(snakemake.input.weights)
     runtime = Runtime.model_validate(snakemake.params.runtime)
-    export_glb(snakemake.output.glb, network, snakemake.input.scenarios, runtime)
+    export_glb(snakemake.output.glb, network, runtime)
     log.info("wrote %s", snakemake.output.glb)

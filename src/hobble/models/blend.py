@@ -174,11 +174,6 @@ class BlendedNetwork(OnnxNetwork):
         sizes = {"form": FIXED, "layers": len(weights), "sets": len(first), "extra": self.extra_inputs}
         return sizes, stack.sections()
 
-    def layers_in_words(self) -> str:
-        """Such as "2 hidden layers"."""
-        hidden = len(self.sizes) - 2
-        return f"{hidden} hidden layer{'s' * (hidden != 1)}"
-
 
 class LayerMirror(NamedTuple):
     """How to mirror a layer (out, K, in + 1) of a network in training.

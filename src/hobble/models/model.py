@@ -7,6 +7,7 @@ game that runs a network needs no PyTorch.
 
 from __future__ import annotations
 
+import pkgutil
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -36,10 +37,12 @@ class Options(Section):
 
     kind: str = ""
 
+    network: ClassVar[str] = ""  # the class of its networks that are ready to run, as `pkgutil` names it
+
     @classmethod
     def network_class(cls) -> type[Network]:
-        """The class of the kind's networks that are ready to run."""
-        raise NotImplementedError
+        """The class of the kind's networks that are ready to run. It is imported only now."""
+        return pkgutil.resolve_name(cls.network)  # type: ignore[no-any-return]
 
     @property
     def hidden(self) -> tuple[int, ...]:

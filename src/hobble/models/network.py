@@ -146,6 +146,7 @@ class Network(ABC):
     """
 
     kind: ClassVar[str] = ""  # name of its kind, and of the kind's folder in hobble.models
+    description: ClassVar[str] = ""  # what the network is, in words that can follow "A" in a sentence
     uses_phase: ClassVar[bool] = True  # whether a prediction depends on the phase
     # Whether the predicted poses are recorded frames, as in motion matching. With other networks, the
     # runtime shortens the predicted movement of the root where the character should stand or go another way.
@@ -236,11 +237,6 @@ class Network(ABC):
     def stored_numbers(self, mode: str) -> int:
         """How many numbers the network keeps in memory to run in `mode`, one of `modes`."""
         return self.parameter_count
-
-    @property
-    @abstractmethod
-    def description(self) -> str:
-        """What the network is, in words that can follow "A" in a sentence."""
 
     @abstractmethod
     def predict(self, x: Array, phase: Array) -> Array:

@@ -8,6 +8,7 @@ too, so that all files are called in the same way. Only this module needs the on
 
 from __future__ import annotations
 
+import importlib
 import json
 from abc import abstractmethod
 from pathlib import Path
@@ -135,16 +136,12 @@ def write_graph(path: str | Path, network: OnnxNetwork, mode: str) -> None:
 
     Raises HobbleError if onnx is not installed, ValueError for an unknown mode.
     """
-    try:
-        import onnx
-        from onnx import TensorProto, helper
-    except ImportError as error:
-        raise HobbleError('onnx is not installed: pip install "hobble[onnx]"') from error
-    g = Graph()
+    onnx = _package("onnx")
+    helper, g = onnx.helper, Graph()
     z = (g.named("x") - network.x_mean) * inverse_or_0(network.x_std)
     g("Add", network.onnx_outputs(g, z, mode) * network.y_std, network.y_mean, output="y")
     x, phase, y = (
-        helper.make_tensor_value_info(name, TensorProto.FLOAT, ["batch", *sizes])
+        helper.make_tensor_value_info(name, onnx.TensorProto.FLOAT, ["batch", *sizes])
         for name, sizes in (("x", [len(network.x_mean)]), ("phase", []), ("y", [len(network.y_mean)]))
     )
     opset = helper.make_opsetid("", OPSET)
@@ -165,10 +162,7 @@ def check(path: str | Path, network: OnnxNetwork, mode: str) -> float:
     Both get CHECKED_ROWS random rows. The difference is relative for values of Y above 1. Raises InputError
     if it is above TOLERANCE, HobbleError if onnxruntime is not installed.
     """
-    try:
-        import onnxruntime
-    except ImportError as error:
-        raise HobbleError('onnxruntime is not installed: pip install "hobble[onnx]"') from error
+    onnxruntime = _package("onnxruntime")
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads = 1
     session = onnxruntime.InferenceSession(str(path), options, providers=["CPUExecutionProvider"])
@@ -184,6 +178,14 @@ def check(path: str | Path, network: OnnxNetwork, mode: str) -> float:
         problem = f"onnxruntime and Hobble's runtime differ by {difference:.2g}, more than {TOLERANCE:g}"
         raise InputError(path, problem)
     return difference
+
+
+def _package(name: str) -> Any:
+    """A package that only exports need. Raises HobbleError if it is not installed."""
+    try:
+        return importlib.import_module(name)
+    except ImportError as error:
+        raise HobbleError(f'{name} is not installed: pip install "hobble[onnx]"') from error
 
 
 def _metadata(network: OnnxNetwork, mode: str) -> dict[str, Any]:

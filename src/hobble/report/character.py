@@ -317,7 +317,7 @@ def _compared_clip(network: Network, rows: ClipRows, split: str, drawn_joints: l
     number; `captured` and `predicted`, from `packed_motion`; `error`, for each frame the mean distance from
     predicted to captured joints, cm.
     """
-    found = ProceduralAnimation(network).compare(rows).all
+    found = ProceduralAnimation(network).compare(rows)
     frame_step = round(60 / FPS)  # rows have 60 frames a second, the page has FPS
     error = found.distance.mean(axis=1)[::frame_step]
     assert network.skeleton is not None

@@ -129,7 +129,7 @@ def _network_figure(network: Mapping[str, Any]) -> parts.KeyFigure:
     # networks it counts all parameters. Motion matching has no layers, so its `sizes` are empty.
     note = "numbers in its tables"
     if network["sizes"]:
-        which = " at each control point" if "control points" in network["described"] else ""
+        which = " at each control point" if "phase-functioned" in network["described"] else ""
         note = f"parameters{which}; layers of {'–'.join(map(str, network['sizes']))}"
     note += f"; {parts.format_bytes(network['bytes'])} on disk"
     return parts.KeyFigure(

@@ -29,7 +29,7 @@ from hobble.runtime.waypoints import Follower, Waypoint
 
 if TYPE_CHECKING:
     from hobble.rows.clip_rows import ClipRows
-    from hobble.runtime.error_calculator import ErrorCalculator
+    from hobble.runtime.error_calculator import Compared
     from hobble.runtime.layers import Layers
     from hobble.runtime.retarget import RigDriver
 
@@ -158,21 +158,15 @@ class ProceduralAnimation:
         count = self.characters
         self.follower = Follower(self._waypoints, count) if self._waypoints is not None else None
         place, yaw = self.follower.start if self.follower else (np.zeros(2), 0.0)
-        places = (
-            np.broadcast_to(place, (count, 2))
-            if position is None
-            else self._targets.convert_ground_vector("position", position, self.axes.points_from_caller)
-        )
+        places, yaws = np.tile(place, (count, 1)), np.full(count, yaw)
+        if position is not None:
+            places = self._targets.ground_vector("position", position)
         if np.abs(places).max() > FARTHEST:
             raise ValueError(f"position is further than {FARTHEST / 1e5:g} km from the origin: {position}")
-        if facing is None:
-            yaws = np.full(count, yaw)
-        else:
-            ahead = self._targets.convert_facing(facing)
+        if facing is not None:
+            ahead = self._targets.ground_vector("facing", facing)
             yaws = np.arctan2(ahead[:, 0], ahead[:, 1])
-        self._continue_from(
-            start_characters(self.network, count, np.array(places, float), yaws, self._channel_values.scales)
-        )
+        self._continue_from(start_characters(self.network, count, places, yaws, self._channel_values.scales))
 
     def __copy__(self) -> ProceduralAnimation:
         return copy.deepcopy(self)
@@ -198,13 +192,9 @@ class ProceduralAnimation:
 
     def _continue_from(self, state: Character) -> None:
         """Make a new controller, which continues from `state`."""
-        count = self.characters
         self.state = state
         self._controller = Controller(self.predictor, state, **self._controller_options)
-        # Written in each frame by `target_facing`.
-        self._target_strafe, self._target_look = np.zeros(count), np.zeros((count, 2))
-        self._no_facing = np.zeros((count, 2))  # zero means: face the direction of movement
-        self._limiter = SpeedLimiter(self.network, self._channel_values.columns, count)
+        self._limiter = SpeedLimiter(self.network, self._channel_values.columns, self.characters)
 
     @cached_property
     def layers(self) -> Layers:
@@ -213,15 +203,15 @@ class ProceduralAnimation:
 
         return Layers(self.skeleton, self._pose_axes)
 
-    def compare(self, rows: ClipRows) -> ErrorCalculator:
+    def compare(self, rows: ClipRows) -> Compared:
         """Step through recorded rows: for each frame the captured pose, the predicted one and the error.
 
         rows: `hobble.rows.clip_rows.load_clip_rows("database/clips/<clip>.npz")`. The state of the characters
         stays as it is. Raises ValueError for rows of other joints or without the network's channels.
         """
-        from hobble.runtime.error_calculator import ErrorCalculator
+        from hobble.runtime.error_calculator import compare
 
-        return ErrorCalculator(self, rows)
+        return compare(self, rows)
 
     @property
     def seconds(self) -> Array:
@@ -272,7 +262,7 @@ class ProceduralAnimation:
         the characters are as they were before the call.
         """
         velocity, ahead, gait = self._choose_target(target_velocity, facing, gait)
-        strafe, direction = self._target_strafe, self._target_look
+        strafe, direction = np.empty(self.characters), np.empty((self.characters, 2))
         target_facing(velocity, ahead, self.state.smoothed_direction, strafe, direction)
         heading = self.state.direction[:, self.network.layout.window]
         shares = self._targets.gait_shares(velocity, direction, heading, gait)
@@ -318,11 +308,12 @@ class ProceduralAnimation:
         A facing of zero means the direction of movement. The gait is in a form that `gait_shares` of
         `CallerTargets` takes.
         """
-        ahead = self._no_facing if facing is None else self._targets.convert_facing(facing)
+        still = np.zeros((self.characters, 2))
+        ahead = still if facing is None else self._targets.ground_vector("facing", facing)
         if velocity is not None:
-            return self._targets.convert_velocity(velocity), ahead, gait
+            return self._targets.velocity(velocity), ahead, gait
         if self.follower is None:
-            return np.zeros((self.characters, 2)), ahead, gait
+            return still.copy(), ahead, gait
         target, ahead, gaits = self.follower.lead(self.state.position[:, self.network.layout.window])
         return target, ahead, gaits if gait is None else gait
 

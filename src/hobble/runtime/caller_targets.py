@@ -152,12 +152,12 @@ class CallerTargets:
         self._gaits = {name: i for i, name in enumerate(gaits)}  # name -> column among the shares
         self._shares = np.zeros((characters, len(gaits)))
 
-    def convert_velocity(self, velocity: Any) -> Array:
+    def velocity(self, velocity: Any) -> Array:
         """The caller's target velocity as Hobble's x, z (C, 2), cm a frame.
 
-        Raises ValueError for a speed above FASTEST, and as `convert_ground_vector` does.
+        Raises ValueError for a speed above FASTEST, and as `ground_vector` does.
         """
-        target = self.convert_ground_vector("target_velocity", velocity, self.axes.points_from_caller)
+        target = self.ground_vector("target_velocity", velocity)
         if (fastest := np.hypot(target[:, 0], target[:, 1]).max()) > FASTEST:
             raise ValueError(
                 f"target_velocity is {fastest:.4g} cm a frame, faster than a body can move. It may "
@@ -165,19 +165,11 @@ class CallerTargets:
             )
         return target
 
-    def convert_facing(self, facing: Any) -> Array:
-        """The caller's facing as Hobble's x, z (C, 2), of any length.
-
-        Raises ValueError as `convert_ground_vector` does.
-        """
-        return self.convert_ground_vector("facing", facing, self.axes.directions_from_caller)
-
-    def convert_ground_vector(self, what: str, vector: Any, convert: Any) -> Array:
+    def ground_vector(self, what: str, vector: Any) -> Array:
         """The caller's vector, or one for each character, as Hobble's x, z (C, 2).
 
-        A vector has three components, or two without the height. what: name of the vector for messages.
-        convert: function that converts vectors (..., 3) to Hobble's axes. Raises ValueError for a wrong shape
-        or a number that is not finite.
+        A vector has three components, or two without the height. what: its name; that of a "facing" has any
+        length. Raises ValueError for a wrong shape or a number that is not finite.
         """
         v = np.asarray(vector, float)
         if (
@@ -196,7 +188,7 @@ class CallerTargets:
             full[..., [k for k in range(3) if k != "XYZ".index(self.axes.up)]] = v
             v = full
         if not self.axes.is_native:
-            v = convert(v)
+            v = (self.axes.directions_from_caller if what == "facing" else self.axes.points_from_caller)(v)
         return np.array(np.broadcast_to(v[..., ::2], (self.characters, 2)), order="C")
 
     def gait_shares(self, velocity: Array, direction: Array, heading: Array, gait: Any) -> Array:
@@ -233,8 +225,10 @@ class CallerTargets:
                 name = "jog" if speed[c] >= JOG_FROM else "walk"
             self.check_gait(name)
             if speed[c] < STILL:
-                shares[c, self._gaits["stand"]] = 1.0 - _steps_around(heading[c], direction[c])
-                shares[c, self._gaits["walk"]] = 1.0 - shares[c, self._gaits["stand"]]
+                # The angle between both facings, from their cross product and their dot product.
+                (x, z), (to_x, to_z) = heading[c], direction[c]
+                steps = abs(np.arctan2(to_x * z - to_z * x, to_x * x + to_z * z)) > TURN_IN_PLACE
+                shares[c, self._gaits["walk" if steps else "stand"]] = 1.0
                 if name != "crouch":
                     continue
             shares[c, self._gaits[name]] = 1.0
@@ -244,14 +238,3 @@ class CallerTargets:
         """Raise UnknownName if the network does not have this gait."""
         if name not in self._gaits:
             raise UnknownName("no gait", name, self._gaits)
-
-
-def _steps_around(heading: Array, direction: Array) -> float:
-    """1 if a standing character has to step on the spot to face `direction` (2,), else 0.
-
-    heading: (2,) where it faces now.
-    """
-    x, z = heading
-    # The angle between both, from their cross product and their dot product.
-    angle = np.arctan2(direction[0] * z - direction[1] * x, direction[0] * x + direction[1] * z)
-    return float(abs(angle) > TURN_IN_PLACE)

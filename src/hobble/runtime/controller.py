@@ -286,9 +286,8 @@ class Controller:
             c.ground[:] = _heights(ground, points[:, 0], points[:, 1]).reshape(c.ground.shape)
         trajectory.write_mean_height(c.ground, c.root_height)
         if not c.placed.all():  # once, at the start: lift the joints to the ground, which may have any height
-            new = ~c.placed
-            c.joint_position[new, :, 1] += c.root_height[new, None]
-            self.root[new, 1] = c.root_height[new]
+            c.joint_position[..., 1] += c.root_height[:, None]
+            self.root[:, 1] = c.root_height
             c.placed[:] = True
 
     def _input(self) -> None:

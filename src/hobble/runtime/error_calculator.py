@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -33,7 +33,7 @@ def relative_and_distance(truth: Array, predicted: Array) -> Array:
 
 @dataclass(frozen=True)
 class Compared:
-    """A frame, or F frames: then each array has a leading axis F.
+    """A frame, or F frames: then each array has a leading axis F, and iterating gives the frames.
 
     frame: its number in the clip. truth, predicted: the captured pose, and the one that the network predicts
     from the captured input of the frame before. Both are placed at the captured root, in the caller's axes
@@ -47,58 +47,49 @@ class Compared:
     relative: Array = field(repr=False)
     distance: Array = field(repr=False)
 
-
-class ErrorCalculator:
-    """Compares what a character's network predicts with recorded frames; see `ProceduralAnimation.compare`.
-
-    `all` has all F frames. Iterating gives one `Compared` after another. A frame on the border of two gait
-    cycles has two rows, of which the first is used, with the first of its terrain fits.
-    """
-
-    def __init__(self, character: Any, rows: ClipRows) -> None:
-        network, layout = character.network, character.network.layout
-        if rows.layout.joints != layout.joints or not set(layout.channels) <= set(rows.layout.channels):
-            raise ValueError(f"the rows ({rows.layout}) are not those that the network has learnt ({layout})")
-        stretches = unbroken_stretches(rows.frame)
-        chosen = np.concatenate([np.zeros(0, np.int64), *stretches])
-        pairs = compose_pairs(rows, layout, chosen, rows.first_fit[chosen])
-        # A network with a memory would continue from the prediction before. Here each frame is on its own.
-        predict = network.predict if network.memory_size else character.predictor.predict
-        predicted = predict(pairs.x, pairs.p.astype(float))
-        ground = rows.mean[rows.first_fit[chosen]]
-        roots: list[Array] = [np.zeros((0, 3))]
-        yaws: list[Array] = [np.zeros(0)]
-        for stretch in stretches:
-            y = rows.y[stretch].astype(float)
-            turn = y[:, layout.y_turn][:, 0]
-            roots.append(root_path(y[:, layout.y_root_velocity], turn))
-            yaws.append(headings(turn))
-        root, yaw = np.concatenate(roots), np.concatenate(yaws)
-        root[:, 1] = ground
-        values = {name: rows.channels[name][chosen] for name in network.channels}
-
-        def pose(y: Array) -> Pose:
-            world = local_positions(y)
-            world[..., ::2] = rotate_by_yaw(world[..., ::2], yaw[:, None])
-            turns = y[:, layout.y_joint_rotation].reshape(len(y), -1, 3)
-            contacts = np.clip(y[:, layout.y_contacts], 0, 1)
-            placed = world + root[:, None], world_rotations(turns, yaw)
-            return character.pose_in_callers_axes(*placed, contacts, pairs.p, root, yaw, values)
-
-        def local_positions(y: Array) -> Array:
-            return y[:, layout.y_joint_position].reshape(len(y), -1, 3).astype(float)
-
-        errors = relative_and_distance(local_positions(pairs.y), local_positions(predicted))
-        self.all = Compared(
-            rows.frame[chosen], pose(pairs.y), pose(predicted), errors[..., 0], errors[..., 1]
-        )
-
     def __len__(self) -> int:
-        return len(self.all.frame)
+        return len(self.frame)
 
-    def __getitem__(self, k: int) -> Compared:
-        a = self.all
-        return Compared(int(a.frame[k]), a.truth[k], a.predicted[k], a.relative[k], a.distance[k])
+    def __getitem__(self, k: int) -> Self:
+        pose = self.truth[k], self.predicted[k]
+        return type(self)(int(self.frame[k]), *pose, self.relative[k], self.distance[k])
 
-    def __iter__(self) -> Iterator[Compared]:
+    def __iter__(self) -> Iterator[Self]:
         return (self[k] for k in range(len(self)))
+
+
+def compare(character: Any, rows: ClipRows) -> Compared:
+    """All frames of `rows`, compared; see `ProceduralAnimation.compare`.
+
+    A frame on the border of two gait cycles has two rows, of which the first is used, with the first of its
+    terrain fits.
+    """
+    network, layout = character.network, character.network.layout
+    if rows.layout.joints != layout.joints or not set(layout.channels) <= set(rows.layout.channels):
+        raise ValueError(f"the rows ({rows.layout}) are not those that the network has learnt ({layout})")
+    stretches = unbroken_stretches(rows.frame)
+    chosen = np.concatenate([np.zeros(0, np.int64), *stretches])
+    pairs = compose_pairs(rows, layout, chosen, rows.first_fit[chosen])
+    # A network with a memory would continue from the prediction before. Here each frame is on its own.
+    predict = network.predict if network.memory_size else character.predictor.predict
+    predicted = predict(pairs.x, pairs.p.astype(float))
+    moves = [rows.y[stretch].astype(float) for stretch in stretches]
+    turns = [y[:, layout.y_turn][:, 0] for y in moves]
+    paths = (root_path(y[:, layout.y_root_velocity], turn) for y, turn in zip(moves, turns, strict=True))
+    root, yaw = np.concatenate([np.zeros((0, 3)), *paths]), np.concatenate([[], *map(headings, turns)])
+    root[:, 1] = rows.mean[rows.first_fit[chosen]]
+    values = {name: rows.channels[name][chosen] for name in network.channels}
+
+    def pose(y: Array) -> Pose:
+        world = local_positions(y)
+        world[..., ::2] = rotate_by_yaw(world[..., ::2], yaw[:, None])
+        turned = world_rotations(y[:, layout.y_joint_rotation].reshape(len(y), -1, 3), yaw)
+        contacts = np.clip(y[:, layout.y_contacts], 0, 1)
+        placed = world + root[:, None], turned
+        return character.pose_in_callers_axes(*placed, contacts, pairs.p, root, yaw, values)
+
+    def local_positions(y: Array) -> Array:
+        return y[:, layout.y_joint_position].reshape(len(y), -1, 3).astype(float)
+
+    errors = relative_and_distance(local_positions(pairs.y), local_positions(predicted))
+    return Compared(rows.frame[chosen], pose(pairs.y), pose(predicted), errors[..., 0], errors[..., 1])

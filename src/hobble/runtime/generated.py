@@ -19,7 +19,7 @@ from hobble.core import quat
 from hobble.core.bvh import write_bvh
 from hobble.core.clip import Clip
 from hobble.core.errors import HobbleError
-from hobble.core.files import load_npz, save_npz
+from hobble.core.files import save_npz
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton, forward_kinematics, local_rotations, two_bone_knee
 from hobble.figure.gltf import BodyMotion, write_glb
@@ -33,7 +33,6 @@ SETTLED = 6 * 60  # frames until the gait has settled; no loop begins earlier
 SHORTEST, LONGEST = 150, 300  # frames: least and greatest length of a loop, unless the caller says otherwise
 BLEND = 12  # frames over which the end of a loop is blended into its start
 SPEEDS = {"stand": 0.0, "walk": 2.5, "jog": 7.0, "crouch": 2.0}  # cm a frame, of the gaits that can repeat
-GLB_FPS = 30.0  # poses a second of the scenarios in a glTF file; viewers interpolate between them
 LOOP_FRAMES = (40, 150)  # frames at 60 Hz: least and greatest length of a loop in a glTF file
 HURT = 0.7  # share of a channel's highest value, with which the hurt loops walk
 
@@ -297,18 +296,14 @@ def skeleton_in_motion(network: Network, positions: Array, rotations: Array) -> 
     return replace(skeleton, offsets=offsets)
 
 
-def export_glb(path: str | Path, network: Network, scenarios: str | Path, runtime: Runtime) -> None:
-    """Write the body of a network's skeleton, with loops of each gait and an animation for each scenario.
+def export_glb(path: str | Path, network: Network, runtime: Runtime) -> None:
+    """Write the body of a network's skeleton as the file `path`, with loops of each gait.
 
-    path: the .glb file. scenarios: the file runtime/scenarios.npz in the results of a configuration. Raises
-    HobbleError for a network without a skeleton.
+    Raises HobbleError for a network without a skeleton.
     """
     if network.skeleton is None:
         raise HobbleError(f"cannot write {path}: the network's file has no skeleton, so there is no body")
-    data = load_npz(scenarios)
-    first = str(data["names"][0])
-    skeleton = skeleton_in_motion(network, data[f"{first}/positions"], data[f"{first}/rotations"])
-    write_glb(path, skeleton, [*_loops(network, skeleton, runtime), *_thinned_scenarios(data, skeleton)])
+    write_glb(path, network.skeleton, list(_loops(network, network.skeleton, runtime)))
 
 
 def _loops(network: Network, skeleton: Skeleton, runtime: Runtime) -> Iterator[BodyMotion]:
@@ -328,15 +323,3 @@ def _loops(network: Network, skeleton: Skeleton, runtime: Runtime) -> Iterator[B
             local = local_rotations(skeleton, world)
             yield BodyMotion(f"{gait}{name}_loop", places[:, 0] - moving, local, FPS)
             yield BodyMotion(f"{gait}{name}_loop_root_motion", places[:, 0], local, FPS, moving)
-
-
-def _thinned_scenarios(data: Mapping[str, Array], skeleton: Skeleton) -> Iterator[BodyMotion]:
-    """The motion of each scenario, thinned to GLB_FPS, with constant bone lengths."""
-    step = max(1, round(float(data["fps"]) / GLB_FPS))
-    for name in map(str, data["names"]):
-        positions, rotations, ground = (
-            np.asarray(data[f"{name}/{key}"], float)[::step] for key in ("positions", "rotations", "root")
-        )
-        world, places = restore_bone_lengths(skeleton, positions, rotations)
-        local = local_rotations(skeleton, world)
-        yield BodyMotion(name, places[:, 0], local, float(data["fps"]) / step, ground * [1.0, 0.0, 1.0])

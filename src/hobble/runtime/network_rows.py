@@ -11,6 +11,7 @@ from hobble.channels.shown import channel_display
 from hobble.core.compiled import njit
 from hobble.core.quat import Array
 from hobble.models.network import Network
+from hobble.runtime.feet import turn_toward
 from hobble.runtime.trajectory import Trajectory, joint_place
 
 
@@ -144,13 +145,7 @@ Drawn = tuple[Any, Any, Any, Any]
 
 @njit
 def write_inputs(
-    path: Trajectory,
-    ground: Any,
-    height: Any,
-    pose: Joints,
-    first: Any,
-    step: int,
-    x: Any,
+    path: Trajectory, ground: Any, height: Any, pose: Joints, first: Any, step: int, x: Any
 ) -> None:
     """Write the state, without channels, into the network's input rows x (C, X), not standardised.
 
@@ -183,11 +178,8 @@ def write_inputs(
         for j in range(joints.shape[1]):
             dx, dz = joints[c, j, 0] - px, joints[c, j, 2] - pz
             k = first[3] + 3 * j
-            x[c, k], x[c, k + 1], x[c, k + 2] = (
-                dx * cos - dz * sin,
-                joints[c, j, 1] - height[c],
-                dx * sin + dz * cos,
-            )
+            x[c, k], x[c, k + 2] = dx * cos - dz * sin, dx * sin + dz * cos
+            x[c, k + 1] = joints[c, j, 1] - height[c]
             dx, dz = velocities[c, j, 0], velocities[c, j, 2]
             k = first[4] + 3 * j
             x[c, k], x[c, k + 1], x[c, k + 2] = dx * cos - dz * sin, velocities[c, j, 1], dx * sin + dz * cos
@@ -195,13 +187,7 @@ def write_inputs(
 
 @njit
 def write_poses(
-    y: Any,
-    first: int,
-    path: Trajectory,
-    heights: tuple[Any, Any],
-    pose: Joints,
-    fastest: float,
-    drawn: Drawn,
+    y: Any, first: int, path: Trajectory, heights: tuple[Any, Any], pose: Joints, fastest: float, drawn: Drawn
 ) -> None:
     """Turn the prediction y (C, Y) into the world poses `pose` and `drawn`, which are changed in place.
 
@@ -281,12 +267,4 @@ def _turn_joint(rotation: Any, x: float, y: float, z: float, half_cos: float, ha
         half_cos * y + half_sin * w,
         half_cos * z - half_sin * x,
     )
-    dot = rotation[0] * w + rotation[1] * x + rotation[2] * y + rotation[3] * z
-    keep, take = 0.0, 1.0
-    if abs(dot) < np.cos(FASTEST_TURN / 2):
-        # Turn by FASTEST_TURN along the shorter way (slerp).
-        half = np.arccos(abs(dot))
-        keep = np.sin(half - FASTEST_TURN / 2) / np.sin(half)
-        take = np.sin(FASTEST_TURN / 2) / np.sin(half) * (1.0 if dot >= 0 else -1.0)
-    rotation[0], rotation[1] = keep * rotation[0] + take * w, keep * rotation[1] + take * x
-    rotation[2], rotation[3] = keep * rotation[2] + take * y, keep * rotation[3] + take * z
+    turn_toward(rotation, w, x, y, z, FASTEST_TURN)

@@ -21,8 +21,7 @@ from hobble.motion.rest_pose import why_not_standing
 from hobble.motion.retarget import BENT, LIMB_BONES, MOST_DROP, NEARLY_STRAIGHT, SPARED, Retarget, plan
 from hobble.motion.rig import body_in_file, leg_length, likely_unit, match_rig
 from hobble.motion.skeleton_file import KnownSkeleton, find_skeleton, load_skeleton, skeleton_folder
-from hobble.runtime.feet import leg_joints
-from hobble.runtime.leg_reach import move_heel, rotation_between, turn_rotation, turn_vector
+from hobble.runtime.feet import leg_joints, move_heel, rotation_between, turn_rotation, turn_vector
 
 # Roles that a rig must have.
 NEEDED = ("hips", "head", *(f"{s}_{p}" for s in SIDES for p in ("shoulder", "hip", "knee", "heel", "toe")))
@@ -124,14 +123,7 @@ def _limb_bones(how: Retarget) -> tuple[np.ndarray, Array]:
 
 @njit
 def drive_rig(
-    source: Any,
-    turned: Any,
-    followed: Any,
-    joints: Any,
-    limbs: Any,
-    body: Any,
-    position: Any,
-    rotation: Any,
+    source: Any, turned: Any, followed: Any, joints: Any, limbs: Any, body: Any, position: Any, rotation: Any
 ) -> None:
     """Write the poses of a rig into position (C, K, 3) and rotation (C, K, 4).
 
@@ -167,11 +159,8 @@ def drive_rig(
             hip, heel, toe = legs[f, 0], legs[f, 2], legs[f, 3]
             x, y, z = turn_vector(q[heel], offsets[toe, 0], offsets[toe, 1], offsets[toe, 2])
             ball = s[leading[f, 3]]
-            shift[f, 0], shift[f, 1], shift[f, 2] = (
-                scale * ball[0] - x,
-                scale * ball[1] + lift - lifts[f] - y,
-                scale * ball[2] - z,
-            )
+            shift[f, 0], shift[f, 2] = scale * ball[0] - x, scale * ball[2] - z
+            shift[f, 1] = scale * ball[1] + lift - lifts[f] - y
             bones = _length(offsets[legs[f, 1]]), _length(offsets[heel])
             drop = max(drop, _drop(p[hip], shift[f], bones, s, leading[f]))
             shift[f] -= p[heel]

@@ -39,18 +39,16 @@ ARRIVED = 100.0  # cm: a waypoint counts as reached within this distance
 class Follower:
     """Makes C characters follow a closed track of W waypoints, each character at its own pace.
 
-    Every character starts at the track's last waypoint and goes toward waypoint 0. characters: C. arrived:
-    distance, in cm, within which a waypoint counts as reached. `places` (W, 2) are the positions of the
-    waypoints. `reached` (C,) counts the waypoints that each character has reached. `off_path` (C,) is the
-    distance, in cm, of each character from the line between the last reached waypoint and the next one.
+    Every character starts at the track's last waypoint and goes toward waypoint 0. characters: C. `places`
+    (W, 2) are the positions of the waypoints. `reached` (C,) counts the waypoints that each character has
+    reached. `off_path` (C,) is the distance, in cm, of each character from the line between the last reached
+    waypoint and the next one.
     """
 
-    def __init__(
-        self, track: Sequence[Waypoint] = TRACK, characters: int = 1, arrived: float = ARRIVED
-    ) -> None:
+    def __init__(self, track: Sequence[Waypoint] = TRACK, characters: int = 1) -> None:
         if len(track) < 2:
             raise ValueError(f"a track needs at least two waypoints, not {len(track)}")
-        self.track, self.arrived = tuple(track), arrived
+        self.track = tuple(track)
         self.places = np.array([w.position for w in self.track], float)
         self._speeds = np.array([w.speed for w in self.track], float)
         self._facings = np.array([w.facing or (0.0, 0.0) for w in self.track], float)
@@ -71,7 +69,7 @@ class Follower:
         """
         count = len(self.track)
         ahead = self.places[self.reached % count] - position
-        self.reached += np.sqrt(np.sum(ahead * ahead, axis=1)) < self.arrived
+        self.reached += np.sqrt(np.sum(ahead * ahead, axis=1)) < ARRIVED
         n = self.reached % count  # the next waypoint of each character
         ahead, way = self.places[n] - position, self.places[n] - self.places[n - 1]
         # The nearest point of the line from the last waypoint is at the share t of the way to the next.

@@ -78,12 +78,7 @@ def built(
     for name, size in (("X", layout.x_size), ("Y", layout.y_size)):
         arrays[f"{name}mean"] = rng.normal(0, 10, size).astype(np.float32)
         arrays[f"{name}std"] = rng.uniform(0.5, 2, size).astype(np.float32)
-    meta = {
-        "kind": kind,
-        "layout": layout.to_dict(),
-        "skeleton": skeleton.to_dict(),
-        "channels": {"injury": skeleton.link_names},
-        **tables.meta,
-    }
+    own = {"layout": layout.to_dict(), "skeleton": skeleton.to_dict(), **tables.meta}
+    meta = {"kind": kind, "channels": {"injury": skeleton.link_names}, **own}
     arrays["meta"] = np.array(json.dumps(meta))
     return tables, arrays, network_from_arrays("weights.npz", arrays)

@@ -10,38 +10,40 @@ from hobble.core.errors import InputError
 from hobble.core.skeleton import Skeleton
 from hobble.models.matching import MatchingOptions
 from hobble.models.matching.build import feature_groups, find_runs, on_mean_ground
-from hobble.rows.clip_rows import compose_pairs, save_clip_rows
+from hobble.rows.clip_rows import ClipRows, compose_pairs, save_clip_rows
 from hobble.rows.layout import RowLayout
 
 from .example import CUT, FRAMES, built, clip, layout_of
 
 
-def test_a_frame_that_two_cycles_share_is_kept_once(holden31: Skeleton) -> None:
-    rows = clip(holden31, 0)
+@pytest.fixture
+def rows(holden31: Skeleton) -> ClipRows:
+    return clip(holden31, 0)
+
+
+def test_a_frame_that_two_cycles_share_is_kept_once(rows: ClipRows) -> None:
     kept, remaining = find_runs(rows)
     np.testing.assert_array_equal(rows.frame[kept], 100 + np.arange(FRAMES[0]))
     assert rows.cycle[kept[CUT]] == 1, "the row with which a cycle begins"
     np.testing.assert_array_equal(remaining, np.arange(FRAMES[0])[::-1])
 
 
-def test_a_gap_between_cycles_ends_a_run(holden31: Skeleton) -> None:
-    rows = clip(holden31, 0)
+def test_a_gap_between_cycles_ends_a_run(rows: ClipRows) -> None:
     rows = replace(rows, frame=np.where(rows.cycle > 0, rows.frame + 30, rows.frame))
     kept, remaining = find_runs(rows)
     assert len(kept) == len(rows)
     np.testing.assert_array_equal(remaining, [*range(CUT, -1, -1), *range(len(rows) - CUT - 2, -1, -1)])
 
 
-def test_a_clip_without_rows_gives_no_frames(holden31: Skeleton) -> None:
-    rows = clip(holden31, 0)
+def test_a_clip_without_rows_gives_no_frames(rows: ClipRows) -> None:
     cut = {n: getattr(rows, n)[:0] for n in ("x", "y", "p", "frame", "cycle", "fits", "heights", "mean")}
     rows = replace(rows, **cut, channels={"injury": rows.channels["injury"][:0]})
     assert [len(part) for part in find_runs(rows)] == [0, 0]
     assert [len(part) for part in on_mean_ground(rows, rows.layout)] == [0, 0]
 
 
-def test_rows_lie_on_the_mean_of_their_fits(holden31: Skeleton) -> None:
-    rows, layout = clip(holden31, 0), layout_of(holden31)
+def test_rows_lie_on_the_mean_of_their_fits(rows: ClipRows) -> None:
+    layout = rows.layout
     x, y = on_mean_ground(rows, layout)
     first = rows.first_fit
     each = [compose_pairs(rows, layout, np.arange(len(rows)), first + k) for k in range(2)]

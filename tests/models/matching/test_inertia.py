@@ -53,12 +53,6 @@ def played(frames: np.ndarray, rows: list[int], phase: float = 0.0) -> tuple[np.
     return np.array(shown), np.array(lag)
 
 
-def test_without_a_transition_the_frames_are_played_unchanged() -> None:
-    frames = two_runs(np.random.default_rng(1))
-    expected = np.concatenate([frames[5:50, block] for block in BLOCKS], axis=1)
-    np.testing.assert_allclose(played(frames, list(range(5, 50)))[0], expected, atol=1e-6)
-
-
 def spring(x0: np.ndarray, v0: np.ndarray, frames: int = 30) -> np.ndarray:
     """x = (x0 + (v0 + d x0) t) e^(-d t), with d = 2 ln 2 / halflife, after 1, 2, ... frames."""
     d, t = 2 * np.log(2) / HALFLIFE, np.arange(1, frames + 1)[:, None]

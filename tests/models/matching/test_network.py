@@ -2,7 +2,6 @@
 
 import json
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,16 +11,21 @@ from hobble.core.errors import InputError
 from hobble.core.skeleton import Skeleton
 from hobble.models.load import network_from_arrays
 from hobble.models.matching.network import ROW, SINCE, Matching
-from hobble.models.network import standardise_inputs
+from hobble.models.network import STORAGES, standardise_inputs
 
 from .example import FRAMES, built
 
 Made = tuple[Any, dict[str, Any], Matching]
 
 
-@pytest.fixture
-def made(holden31: Skeleton, tmp_path: Path) -> Made:
-    return built(holden31, tmp_path, every=5)
+@pytest.fixture(scope="module")
+def made(holden31: Skeleton, tmp_path_factory: Any) -> Made:
+    return built(holden31, tmp_path_factory.mktemp("matching"), every=5)
+
+
+@pytest.fixture(scope="module")
+def network(made: Made) -> Matching:
+    return made[2]
 
 
 def x_of(network: Matching, row: int) -> np.ndarray:
@@ -32,8 +36,7 @@ def x_of(network: Matching, row: int) -> np.ndarray:
     return x[None].astype(np.float32)
 
 
-def test_the_nearest_frame_equals_a_search_over_all(made: Made) -> None:
-    _, _, network = made
+def test_the_nearest_frame_equals_a_search_over_all(network: Matching) -> None:
     x = network.x_mean + 10 * np.random.default_rng(1).normal(size=(20, len(network.x_mean)))
     queries = network.input_features(standardise_inputs(network, x))
     np.testing.assert_allclose(queries, x[:, network.columns] * network.feature_weights, rtol=1e-4, atol=1e-3)
@@ -41,18 +44,16 @@ def test_the_nearest_frame_equals_a_search_over_all(made: Made) -> None:
     np.testing.assert_array_equal(network.nearest_rows(queries), network.start_rows[apart.argmin(axis=1)])
 
 
-def test_channel_values_have_to_match(made: Made) -> None:
+def test_channel_values_have_to_match(network: Matching) -> None:
     """A query equals a frame of the healthy clip except for the channel. It finds a frame of the hurt
     clip.
     """
-    _, _, network = made
     x = x_of(network, 10)
     x[0, network.layout.x_channel("injury").start + 4] = 7.0
     assert network.nearest_rows(network.input_features(standardise_inputs(network, x)))[0] >= FRAMES[0]
 
 
-def test_a_character_plays_on_between_searches(made: Made) -> None:
-    _, _, network = made
+def test_a_character_plays_on_between_searches(network: Matching) -> None:
     predictor, memory = network.predictor(), np.zeros((1, network.memory_size))
     away = x_of(network, FRAMES[0] + 30)  # what it asks for from the second frame on
     shown = []
@@ -66,8 +67,7 @@ def test_a_character_plays_on_between_searches(made: Made) -> None:
     assert memory[0, SINCE] == 2
 
 
-def test_the_end_of_a_run_starts_a_search(made: Made) -> None:
-    _, _, network = made
+def test_the_end_of_a_run_starts_a_search(network: Matching) -> None:
     predictor, memory = network.predictor(), np.zeros((1, network.memory_size))
     memory[0, ROW], last = FRAMES[0], FRAMES[0] - 1  # the last row of the first clip
     assert network.remaining[last] == 0
@@ -75,8 +75,7 @@ def test_the_end_of_a_run_starts_a_search(made: Made) -> None:
     assert memory[0, ROW] - 1 == 40
 
 
-def test_no_transition_to_nearby_frames(made: Made) -> None:
-    _, _, network = made
+def test_no_transition_to_nearby_frames(network: Matching) -> None:
     predictor, memory = network.predictor(), np.zeros((1, network.memory_size))
     memory[0, ROW], memory[0, SINCE] = 11, 4
     predictor.predict(x_of(network, 25), np.zeros(1), None, memory)
@@ -84,48 +83,30 @@ def test_no_transition_to_nearby_frames(made: Made) -> None:
 
 
 @pytest.mark.parametrize("wrong", [-3.0, 1e7, np.nan, np.inf])
-def test_an_invalid_memory_is_reset(made: Made, wrong: float) -> None:
-    _, _, network = made
+def test_an_invalid_memory_is_reset(network: Matching, wrong: float) -> None:
     memory = np.full((1, network.memory_size), wrong)
     y = network.predictor().predict(x_of(network, 30), np.zeros(1), None, memory)
     np.testing.assert_array_equal(y[0], network.frames[30])
     assert np.isfinite(memory).all()
 
 
-def sequence(network: Matching, frames: int = 80) -> tuple[np.ndarray, np.ndarray]:
-    """X (F, X) and phases (F,) of a character that requests one place of the clips after another."""
-    rng = np.random.default_rng(4)
-    rows = np.repeat(rng.choice(network.start_rows, 12), 7)[:frames]
-    return np.concatenate([x_of(network, row) for row in rows]), rng.random(frames)
-
-
-def test_a_crowd_equals_single_characters(made: Made) -> None:
-    _, _, network = made
-    sequences = [np.roll(sequence(network)[0], 5 * c, axis=0) for c in range(3)]
-    together, memory = network.predictor(), np.zeros((3, network.memory_size))
-    alone = [(network.predictor(), np.zeros((1, network.memory_size))) for _ in range(3)]
+def test_a_crowd_equals_single_characters(network: Matching) -> None:
+    """Each asks for one place of the clips after another."""
+    rows = np.repeat(np.random.default_rng(4).choice(network.start_rows, 12), 7)[:80]
+    wishes = np.concatenate([x_of(network, row) for row in rows])
+    predictor, phase = network.predictor(), np.array([0.1, 0.4, 0.8])
+    memory, alone = (np.zeros((3, network.memory_size)) for _ in range(2))
     for frame in range(40):
-        phase = np.array([0.1, 0.4, 0.8])
-        y = together.predict(np.stack([one[frame] for one in sequences]), phase, None, memory)
-        for c, (predictor, own) in enumerate(alone):
-            expected = predictor.predict(sequences[c][frame][None], phase[c : c + 1], None, own)
-            np.testing.assert_array_equal(y[c], expected[0])
-
-
-def test_int16_storage_hardly_changes_the_prediction(made: Made) -> None:
-    _, _, network = made
-    x, _ = sequence(network)
-    exact, near = (
-        network.predictor().predict(x, np.zeros(80)),
-        network.predictor(storage="int16").predict(x, np.zeros(80)),
-    )
+        x = wishes[[frame, frame - 5, frame - 10]]
+        y = predictor.predict(x, phase, None, memory)
+        for c in range(3):
+            own = predictor.predict(x[c : c + 1], phase[c : c + 1], None, alone[c : c + 1])
+            np.testing.assert_array_equal(y[c], own[0])
+    exact, near = (network.predictor(storage=name).predict(wishes, np.zeros(80)) for name in STORAGES)
     assert 0 < np.abs(exact - near).max() < 1e-3
-    with pytest.raises(ValueError, match="storage"):
-        network.predictor(storage="float8")
 
 
-def test_a_page_of_many_rows_has_the_first_part_of_each_run(made: Made) -> None:
-    _, _, network = made
+def test_a_page_of_many_rows_has_the_first_part_of_each_run(network: Matching) -> None:
     assert len(network.copy_for_page().remaining) == sum(FRAMES)
     short = network.copy_for_page(80)  # of 70 and 90 rows, half
     np.testing.assert_array_equal(short.remaining, [*range(34, -1, -1), *range(44, -1, -1)])
@@ -134,28 +115,23 @@ def test_a_page_of_many_rows_has_the_first_part_of_each_run(made: Made) -> None:
     assert short.start_rows.max() < 80 - 20
 
 
-@pytest.mark.parametrize(
-    ("name", "change"),
-    [
-        ("frames", lambda a: a[:-1]),
-        ("phase", lambda a: a + 2),
-        ("remaining", lambda a: a + 1),  # the last row would be followed by one that is not there
-        ("remaining", lambda a: a[::-1]),
-        ("columns", lambda a: a + 10_000),
-        ("feature_weights", lambda a: -a),
-        ("features", None),
-    ],
-)
-def test_a_malformed_array_is_refused(made: Made, name: str, change: Callable | None) -> None:
+WRONG: list[tuple[str, Callable[[np.ndarray], np.ndarray] | None]] = [
+    ("frames", lambda a: a[:-1]),
+    ("phase", lambda a: a + 2),
+    ("remaining", lambda a: a + 1),  # the last row would be followed by one that is not there
+    ("remaining", lambda a: a[::-1]),
+    ("columns", lambda a: a + 10_000),
+    ("feature_weights", lambda a: -a),
+    ("features", None),
+    *(("meta", lambda a, fact=fact: np.array(json.dumps(json.loads(str(a)) | fact)))
+      for fact in ({"every": 0}, {"every": "5"}, {"halflife": -1.0}, {"skeleton": None})),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("name", "change"), WRONG)
+def test_a_malformed_array_or_fact_is_refused(made: Made, name: str, change: Callable | None) -> None:
     arrays = {key: value for key, value in made[1].items() if key != name}
     if change is not None:
         arrays[name] = change(made[1][name])
     with pytest.raises(InputError, match=r"weights\.npz"):
         network_from_arrays("weights.npz", arrays)
-
-
-@pytest.mark.parametrize("change", [{"every": 0}, {"every": "5"}, {"halflife": -1.0}, {"skeleton": None}])
-def test_a_malformed_fact_is_refused(made: Made, change: dict[str, Any]) -> None:
-    meta = json.loads(str(made[1]["meta"])) | change
-    with pytest.raises(InputError, match=r"weights\.npz"):
-        network_from_arrays("weights.npz", {**made[1], "meta": np.array(json.dumps(meta))})

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field
 
@@ -17,9 +17,6 @@ from hobble.core.skeleton import Skeleton
 from hobble.models.matching import MatchingOptions
 from hobble.models.model import FinishedNetwork
 from hobble.rows.layout import RowLayout
-
-if TYPE_CHECKING:
-    from hobble.models.learned.network import Learned
 
 Units = Annotated[int, Field(gt=0, le=4096)]
 
@@ -31,6 +28,8 @@ class LearnedOptions(MatchingOptions):
     tenth of the memory of its frames.
     """
 
+    network: ClassVar[str] = "hobble.models.learned.network:Learned"
+
     kind: Literal["learned"] = "learned"  # type: ignore[assignment]
     latent: Annotated[int, Field(gt=0, le=1024)] = Field(
         32, description="numbers that the decompressor gets beside the features"
@@ -39,13 +38,6 @@ class LearnedOptions(MatchingOptions):
     units: Units = Field(256, description="units of the hidden layers of stepper and projector")
     steps: Positive = Field(1500, description="optimiser steps of each of the three trainings")
     seed: int = Field(1, description="seed of the first weights and of the order of the frames")
-
-    @classmethod
-    def network_class(cls) -> type[Learned]:  # type: ignore[override]
-        """As in `Options`."""
-        from hobble.models.learned.network import Learned
-
-        return Learned
 
     def build(self, clips: Sequence[str | Path], layout: RowLayout, skeleton: Skeleton) -> FinishedNetwork:
         """As in `BuiltOptions`; trains the three networks."""

@@ -57,6 +57,7 @@ class Learned(OnnxNetwork):
     """
 
     kind: ClassVar[str] = "learned"
+    description: ClassVar[str] = "learned motion matching"
     uses_phase: ClassVar[bool] = False
     plays_recorded_poses: ClassVar[bool] = True
 
@@ -119,11 +120,6 @@ class Learned(OnnxNetwork):
         """The number of weights and biases of all three networks."""
         networks = self.decompressor, self.stepper, self.projector
         return sum(array.size for layers in networks for arrays in layers for array in arrays)
-
-    @property
-    def description(self) -> str:
-        """As in `Network`."""
-        return f"learned motion matching of {len(self.columns)} features and {self.latent} latent numbers"
 
     def wish(self, z: Array) -> Array:
         """(C, n) the features that standardised inputs z (C, X) wish for, standardised.

@@ -81,10 +81,9 @@ def layers(*units: int) -> nn.Sequential:
 
 def _arrays(letters: str, network: nn.Sequential) -> dict[str, Array]:
     """The arrays of a file: weights (out, in) and biases (out,) of each layer."""
-    linear = [part for part in network if isinstance(part, nn.Linear)]
     return {
         f"{letter}{number}": tensor.detach().numpy().copy()
-        for number, layer in enumerate(linear)
+        for number, layer in enumerate(_linear(network))
         for letter, tensor in zip(letters, (layer.weight, layer.bias), strict=True)
     }
 
@@ -114,11 +113,8 @@ def _starts(remaining: NDArray[Any], frames: int) -> Tensor:
     return torch.from_numpy(rows if len(rows) else np.flatnonzero(remaining >= min(1, remaining.max())))
 
 
-def _first_and_last(network: nn.Sequential) -> tuple[nn.Linear, nn.Linear]:
-    first, last = network[0], network[-1]
-    assert isinstance(first, nn.Linear)
-    assert isinstance(last, nn.Linear)
-    return first, last
+def _linear(network: nn.Sequential) -> list[nn.Linear]:
+    return [part for part in network if isinstance(part, nn.Linear)]
 
 
 def _draw(rows: Tensor, count: int) -> Tensor:
@@ -172,7 +168,7 @@ def _train_decompressor(
     with torch.no_grad():
         latent = compressor(torch.cat([poses, features], dim=1))
         centre, spread = latent.mean(dim=0), latent.std(dim=0, correction=0).clamp(min=LEAST_STD)
-        first, last = _first_and_last(decompressor)
+        first, last = _linear(decompressor)
         first.bias.add_(first.weight[:, known:] @ centre)
         first.weight[:, known:] *= spread
         scale = torch.from_numpy(std.astype(np.float32))
@@ -203,7 +199,7 @@ def _train_stepper(options: Options, tables: Tables, state: Tensor) -> nn.Sequen
 
     _optimise("stepper", options, [stepper], loss)
     with torch.no_grad():
-        _, last = _first_and_last(stepper)
+        *_, last = _linear(stepper)
         last.weight.mul_(spread[:, None])
         last.bias.mul_(spread)
     return stepper

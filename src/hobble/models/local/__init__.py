@@ -29,14 +29,11 @@ class LocalOptions(MannOptions):
     experts, gate_layers, gate_units: as for `mann`.
     """
 
+    network: ClassVar[str] = "hobble.models.local:Local"
+
     kind: Literal["local"] = "local"  # type: ignore[assignment]
     gate_inputs: ClassVar[int] = 2 * len(PARTS) + GOAL_INPUTS
     uses_local_phases: ClassVar[bool] = True
-
-    @classmethod
-    def network_class(cls) -> type[Local]:
-        """As in `Options`."""
-        return Local
 
     def gate_columns(self, layout: RowLayout, skeleton: Skeleton) -> tuple[int, ...]:
         """The local phases, the gait now and at the end of the trajectory, and the trajectory's end."""
@@ -56,16 +53,12 @@ class Local(Mann):
     """
 
     kind: ClassVar[str] = "local"
+    description: ClassVar[str] = "network of experts that are gated by local phases"
 
     @property
     def memory_size(self) -> int:
         """As in `Network`: see `hobble.models.local.predictor`."""
         return 1 + 2 * self.layout.local_phases
-
-    @property
-    def description(self) -> str:
-        """As in `Network`."""
-        return f"network of {self.layers_in_words()} and {self.sets} experts, gated by local phases"
 
     @property
     def start(self) -> Array:

@@ -52,16 +52,13 @@ class MannOptions(BlendedOptions):
     gate_units: units of each of these. The defaults are those of Zhang et al. 2018.
     """
 
+    network: ClassVar[str] = "hobble.models.mann:Mann"
+
     kind: Literal["mann"] = "mann"
     gate_inputs: ClassVar[int] = GATE_INPUTS  # number of `gate_columns`
     experts: Annotated[int, Field(ge=2, le=32)] = 8
     gate_layers: Annotated[int, Field(ge=1, le=4)] = 2
     gate_units: Annotated[int, Field(gt=0, le=1024)] = 32
-
-    @classmethod
-    def network_class(cls) -> type[Mann]:
-        """As in `Options`."""
-        return Mann
 
     def trainable(self, flat: Any, sizes: tuple[int, ...], columns: tuple[int, ...]) -> TrainableMann:
         """As in `BlendedOptions`."""
@@ -86,6 +83,7 @@ class Mann(BlendedNetwork):
     """
 
     kind: ClassVar[str] = "mann"
+    description: ClassVar[str] = "mode-adaptive network"
     uses_phase: ClassVar[bool] = False
     # Reading the weights of all experts takes most of a prediction's time. As int16 they have half the size.
     default_storage: ClassVar[str] = "int16"
@@ -116,11 +114,6 @@ class Mann(BlendedNetwork):
         """The number of all weights and biases, because a prediction may need all experts."""
         layers = (*self.weights, *self.biases, *self.gate_weights, *self.gate_biases)
         return sum(array.size for array in layers)
-
-    @property
-    def description(self) -> str:
-        """As in `Network`."""
-        return f"mode-adaptive network of {self.layers_in_words()} and {self.sets} experts"
 
     def shares(self, z: Array, phase: Array) -> Array:
         """As in `BlendedNetwork`; the phase is ignored."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field
 
@@ -12,9 +12,6 @@ from hobble.core.section import Positive, PositiveFloat
 from hobble.core.skeleton import Skeleton
 from hobble.models.model import BuiltOptions, FinishedNetwork
 from hobble.rows.layout import RowLayout
-
-if TYPE_CHECKING:
-    from hobble.models.matching.network import Matching
 
 Weight = Annotated[float, Field(ge=0, le=1000, allow_inf_nan=False)]
 
@@ -27,6 +24,8 @@ class MatchingOptions(BuiltOptions):
     by up to 2.3 m. With the defaults here, feet slide 1.3 cm a step and the character leaves the path by up
     to 1.4 m.
     """
+
+    network: ClassVar[str] = "hobble.models.matching.network:Matching"
 
     kind: Literal["matching"] = "matching"
     every: Positive = Field(5, description="frames between two searches")
@@ -44,13 +43,6 @@ class MatchingOptions(BuiltOptions):
         50.0,
         description="weight of the channel values. It is high, because the chosen frame has to match them",
     )
-
-    @classmethod
-    def network_class(cls) -> type[Matching]:
-        """As in `Options`."""
-        from hobble.models.matching.network import Matching
-
-        return Matching
 
     def build(self, clips: Sequence[str | Path], layout: RowLayout, skeleton: Skeleton) -> FinishedNetwork:
         """As in `BuiltOptions`."""

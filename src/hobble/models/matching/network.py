@@ -71,6 +71,7 @@ class Matching(Network):
     """
 
     kind: ClassVar[str] = "matching"
+    description: ClassVar[str] = "motion matching"
     uses_phase: ClassVar[bool] = False
     plays_recorded_poses: ClassVar[bool] = True
 
@@ -145,11 +146,6 @@ class Matching(Network):
     def parameter_count(self) -> int:
         """How many numbers the tables `frames` and `features` hold."""
         return self.frames.size + self.features.size
-
-    @property
-    def description(self) -> str:
-        """As in `Network`."""
-        return f"motion matching over {len(self.frames):,} frames of clips"
 
     def input_features(self, z: Array) -> Array:
         """The weighted features (C, n) float32 of C characters, from their standardised inputs z (C, X)."""

@@ -38,13 +38,10 @@ class PfnnOptions(BlendedOptions):
 
     modes: ClassVar[tuple[str, ...]] = get_args(PhaseMode)
 
+    network: ClassVar[str] = "hobble.models.pfnn:Pfnn"
+
     kind: Literal["pfnn"] = "pfnn"
     control_points: Annotated[int, Field(ge=4, le=16)] = 4
-
-    @classmethod
-    def network_class(cls) -> type[Pfnn]:
-        """As in `Options`."""
-        return Pfnn
 
     @property
     def why_not_symmetric(self) -> str:
@@ -69,6 +66,7 @@ class Pfnn(BlendedNetwork):
     """
 
     kind: ClassVar[str] = "pfnn"
+    description: ClassVar[str] = "phase-functioned network"
     modes: ClassVar[tuple[str, ...]] = PfnnOptions.modes
     set_word: ClassVar[str] = "control points"
     set_range: ClassVar[tuple[int, int]] = (4, 64)  # a cyclic cubic spline needs four
@@ -81,11 +79,6 @@ class Pfnn(BlendedNetwork):
     def stored_numbers(self, mode: str) -> int:
         """As in `Network`: weights and biases at each of the mode's phases, or of each control point."""
         return (STORED_AND_BLENDED[mode][0] or self.sets) * self.parameter_count
-
-    @property
-    def description(self) -> str:
-        """As in `Network`."""
-        return f"phase-functioned network of {self.layers_in_words()} and {self.sets} control points"
 
     def shares(self, z: Array, phase: Array) -> Array:
         """As in `BlendedNetwork`."""

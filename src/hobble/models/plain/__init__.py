@@ -23,12 +23,9 @@ PHASE_INPUTS = 2  # sine and cosine of the phase, after the columns of X
 class PlainOptions(BlendedOptions):
     """A feed-forward network. By default its layers have the sizes of the phase-functioned network's."""
 
-    kind: Literal["plain"] = "plain"
+    network: ClassVar[str] = "hobble.models.plain:Plain"
 
-    @classmethod
-    def network_class(cls) -> type[Plain]:
-        """As in `Options`."""
-        return Plain
+    kind: Literal["plain"] = "plain"
 
     @property
     def why_not_symmetric(self) -> str:
@@ -48,12 +45,8 @@ class Plain(BlendedNetwork):
     """A feed-forward network. Its first layer gets X, then sine and cosine of the phase."""
 
     kind: ClassVar[str] = "plain"
+    description: ClassVar[str] = "feed-forward network that gets the phase"
     extra_inputs: ClassVar[int] = PHASE_INPUTS
-
-    @property
-    def description(self) -> str:
-        """As in `Network`."""
-        return f"feed-forward network of {self.layers_in_words()}, given the phase"
 
     def shares(self, z: Array, phase: Array) -> Array:
         """As in `BlendedNetwork`: 1 for the only set."""
