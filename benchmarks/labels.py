@@ -20,8 +20,7 @@ from hobble.labels.label import label_clip
 from hobble.labels.options import LabelOptions
 from hobble.motion.make import make_clip
 from hobble.motion.options import ClipMotion
-from hobble.synthetic.generate_clip import write_clip
-from hobble.synthetic.options import Synthetic
+from hobble.synthetic.generate_clip import Synthetic, write_clip
 
 ROOT = Path(__file__).resolve().parents[1]
 

@@ -32,8 +32,7 @@ from hobble.motion.edit import mirror_clip
 from hobble.motion.make import make_clip
 from hobble.motion.options import ClipMotion
 from hobble.motion.skeleton_file import load_skeleton
-from hobble.synthetic.generate_clip import write_clip
-from hobble.synthetic.options import Synthetic
+from hobble.synthetic.generate_clip import Synthetic, write_clip
 from hobble.terrain import patches as search
 from hobble.terrain.clip_fits import clip_fits
 from hobble.terrain.heightmaps import heightmaps

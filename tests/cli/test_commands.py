@@ -16,8 +16,7 @@ from hobble.channels.injury.status import read_status
 from hobble.cli import clips
 from hobble.cli.__main__ import COMMANDS, main
 from hobble.motion.read import read_bvh
-from hobble.synthetic.generate_clip import write_clip
-from hobble.synthetic.options import Synthetic
+from hobble.synthetic.generate_clip import Synthetic, write_clip
 
 
 @pytest.fixture(scope="module")

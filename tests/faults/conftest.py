@@ -10,8 +10,7 @@ import pytest
 
 from hobble.core.errors import HobbleError
 from hobble.core.skeleton import Skeleton
-from hobble.synthetic.generate_clip import write_clip
-from hobble.synthetic.options import Synthetic
+from hobble.synthetic.generate_clip import Synthetic, write_clip
 from tests.conftest import ROOT
 
 MB = 1 << 20

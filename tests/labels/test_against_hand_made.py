@@ -14,8 +14,7 @@ from hobble.labels.label import label_clip, mirror_labels
 from hobble.labels.options import LabelOptions as Options
 from hobble.motion.make import make_clip
 from hobble.motion.options import ClipMotion
-from hobble.synthetic.generate_clip import write_clip
-from hobble.synthetic.options import Synthetic
+from hobble.synthetic.generate_clip import Synthetic, write_clip
 
 SUFFIXES = (".phase", ".gait", "_footsteps.txt", "_gait.txt")
 PFNN = ["pfnn/LocomotionFlat04_000", "pfnn/LocomotionFlat09_000"]

@@ -14,8 +14,7 @@ import yaml
 
 from hobble.core.skeleton import Skeleton
 from hobble.motion.read import decode_channels, read_bvh
-from hobble.synthetic.generate_clip import write_clip
-from hobble.synthetic.options import Synthetic
+from hobble.synthetic.generate_clip import Synthetic, write_clip
 
 Array = np.ndarray
 CONTACT = 0.02  # cm2 per 60 Hz frame

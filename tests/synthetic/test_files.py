@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from hobble.core.errors import HobbleError
-from hobble.synthetic.generate_clip import write_clip
-from hobble.synthetic.options import Synthetic
+from hobble.synthetic.generate_clip import Synthetic, write_clip
 
 RECIPES = ["walk-straight", "walk", "jog", "walk-jog-walk", "uneven", "crouch"]
 

@@ -3,8 +3,7 @@
 from pathlib import Path
 
 from hobble.core.files import read_yaml
-from hobble.synthetic.generate_clip import write_clip
-from hobble.synthetic.options import Synthetic
+from hobble.synthetic.generate_clip import Synthetic, write_clip
 from hobble.workflow.job import job
 
 with job(snakemake):

@@ -28,7 +28,7 @@ from hobble.models.model import Options
 from hobble.motion.options import Download, MotionOptions
 from hobble.report import ReportOptions
 from hobble.runtime.options import Runtime
-from hobble.synthetic.options import Synthetic
+from hobble.synthetic.generate_clip import Synthetic
 from hobble.terrain.options import Terrain
 from hobble.training.options import Training
 

@@ -136,9 +136,6 @@ def plan_stances(
         if previous is not None and stays:
             ankle, turn = previous.ankle, previous.turn
 
-        def at(curve: Array, when: float) -> float:
-            return float(interpolate_curve(curve, when))
-
         planned[side].append(
             Stance(
                 land,
@@ -146,15 +143,20 @@ def plan_stances(
                 ankle,
                 turn,
                 swings=not stays,
-                land_pitch=np.radians(at(style.land_pitch[:, side], land)),
-                off_pitch=np.radians(at(style.off_pitch[:, side], leave)),
+                land_pitch=np.radians(_at(style.land_pitch[:, side], land)),
+                off_pitch=np.radians(_at(style.off_pitch[:, side], leave)),
                 rest_pitch=rest_pitch,
-                flat=at(style.flat, land),
-                heel_off=at(style.heel_off[:, side], (land + leave) / 2),
-                power=at(style.roll, leave),
+                flat=_at(style.flat, land),
+                heel_off=_at(style.heel_off[:, side], (land + leave) / 2),
+                power=_at(style.roll, leave),
             )
         )
     return planned
+
+
+def _at(curve: Array, when: float) -> float:
+    """The value of a curve (F,) at a frame with fractions."""
+    return float(interpolate_curve(curve, when))
 
 
 def _place_foot(
@@ -172,18 +174,15 @@ def _place_foot(
     other_foot: the last stance of the other foot, None if it has none yet.
     """
 
-    def in_mid_stance(curve: Array) -> float:
-        return float(interpolate_curve(curve, mid_stance))
-
-    moving = 1 - in_mid_stance(path.gait[:, 0])  # column 0 is the share of standing
-    facing = in_mid_stance(path.facing)
-    toe_out = np.radians(in_mid_stance(style.toe_out[:, side]))
+    moving = 1 - _at(path.gait[:, 0], mid_stance)  # column 0 is the share of standing
+    facing = _at(path.facing, mid_stance)
+    toe_out = np.radians(_at(style.toe_out[:, side], mid_stance))
     # From the body's place to the ankle, cm. Steps of a moving figure differ at random by some millimetres.
-    to_left = SIDE_SIGN[side] * in_mid_stance(style.width) + moving * rng.normal(0, 0.6)
-    forward = -in_mid_stance(style.behind) + moving * rng.normal(0, 0.8)
+    to_left = SIDE_SIGN[side] * _at(style.width, mid_stance) + moving * rng.normal(0, 0.6)
+    forward = -_at(style.behind, mid_stance) + moving * rng.normal(0, 0.8)
     yaw = facing + SIDE_SIGN[side] * toe_out
-    x = in_mid_stance(path.position[:, 0]) + to_left * np.cos(facing) + forward * np.sin(facing)
-    z = in_mid_stance(path.position[:, 1]) - to_left * np.sin(facing) + forward * np.cos(facing)
+    x = _at(path.position[:, 0], mid_stance) + to_left * np.cos(facing) + forward * np.sin(facing)
+    z = _at(path.position[:, 1], mid_stance) - to_left * np.sin(facing) + forward * np.cos(facing)
     if other_foot is not None:
         from_other = x - other_foot.ankle[0], z - other_foot.ankle[2]
         apart = SIDE_SIGN[side] * (from_other[0] * np.cos(facing) - from_other[1] * np.sin(facing))

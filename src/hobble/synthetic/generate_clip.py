@@ -8,31 +8,34 @@ import math
 import pathlib
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
+from pydantic import Field
 
 from hobble.core.bvh import write_bvh
 from hobble.core.clip import Clip
 from hobble.core.errors import HobbleError
 from hobble.core.files import write_text
+from hobble.core.section import Section
 from hobble.core.skeleton import Skeleton
 from hobble.synthetic.feet import landing_frames, move_foot, phase_curve, plan_stances
-from hobble.synthetic.options import Synthetic
-from hobble.synthetic.plan import (
-    GROUND,
-    Ground,
-    Segment,
-    gait_keys,
-    make_ground,
-    plan,
-    plan_path,
-    random_generator,
-)
+from hobble.synthetic.plan import GROUND, Ground, Segment, gait_keys, make_ground, plan, plan_path, rng_of
 from hobble.synthetic.pose import pose_figure
 from hobble.synthetic.style import LEFT, RIGHT, healthy_style
 
 SHORTEST = 60  # frames at 60 Hz: least length of a clip, so that a foot lands in it
+WRITTEN_LABEL_SUFFIXES = ("_footsteps.txt", "_gait.txt")  # endings of the label files that each clip gets
+
+
+class Synthetic(Section):
+    """Synthetic clips: their length, their frame rate and their seed."""
+
+    frames: Annotated[int, Field(ge=600, le=1_000_000_000)] = Field(
+        20_000, description="length of all clips together, in frames at 60 Hz"
+    )
+    fps: Literal[60, 120] = Field(120, description="frame rate of the files, frames a second")
+    seed: int = Field(1, description="seed of all random choices")
 
 
 @dataclass(frozen=True)
@@ -77,9 +80,10 @@ def walk_from_plan(
     """
     path = plan_path(segments, total, fps)
     style = healthy_style(path)
-    phase = phase_curve(style, fps, random_generator(seed, clip, "phase"))
-    right, left = (_frames_in_clip(landing_frames(phase, side), path.first, total) for side in (RIGHT, LEFT))
-    rng = random_generator(seed, clip, "walk")
+    phase = phase_curve(style, fps, rng_of(seed, clip, "phase"))
+    landings = (np.ceil(landing_frames(phase, side)).astype(int) - path.first for side in (RIGHT, LEFT))
+    right, left = (frames[(frames >= 0) & (frames < total)].tolist() for frames in landings)
+    rng = rng_of(seed, clip, "walk")
     terrain = make_ground(ground, rng)
     steps = plan_stances(path, style, phase, terrain, rng)
     feet = (move_foot(steps[LEFT], style, LEFT, terrain), move_foot(steps[RIGHT], style, RIGHT, terrain))
@@ -87,12 +91,6 @@ def walk_from_plan(
     in_clip = slice(path.first, path.first + total)  # the path also has frames before and after the clip
     motion = Clip(clip, skeleton, fps, rotations[in_clip], root[in_clip])
     return GeneratedWalk(motion, right, left, gait_keys(segments, total, fps), terrain)
-
-
-def _frames_in_clip(path_frames: np.ndarray, first: int, total: int) -> list[int]:
-    """Frames of the planned path as whole frames of the clip. Frames outside the clip are left out."""
-    frames = np.ceil(path_frames).astype(int) - first
-    return [int(f) for f in frames if 0 <= f < total]
 
 
 def write_clip(
@@ -134,13 +132,11 @@ def footsteps_text(right: Sequence[int], left: Sequence[int]) -> str:
     A landing of the right foot has no line if the left foot does not land before the right foot lands again.
     right, left: frames in which each foot lands. Frames count from 0 in the arguments, from 1 in the file.
     """
-    lines = []
-    lefts = np.asarray(left)
-    for landing, next_landing in itertools.pairwise([*right, np.inf]):
-        later_lefts = lefts[lefts > landing]
-        if len(later_lefts) and later_lefts[0] < next_landing:
-            lines.append(f"{landing + 1} {later_lefts[0] + 1}")
-    return "".join(f"{line}\n" for line in lines)
+    pairs = (
+        (landing, next((frame for frame in left if frame > landing), np.inf), following)
+        for landing, following in itertools.pairwise([*right, np.inf])
+    )
+    return "".join(f"{landing + 1} {after + 1}\n" for landing, after, end in pairs if after < end)
 
 
 def gait_text(keys: Sequence[tuple[int, str]]) -> str:

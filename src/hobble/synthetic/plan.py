@@ -99,7 +99,7 @@ def plan(recipe: str, frames: float, fps: float, seed: int, clip: str) -> list[S
         raise HobbleError(
             f"clip {clip}: there is no recipe {recipe!r}. Name one of these: {', '.join(RECIPES)}."
         )
-    rng = random_generator(seed, clip, "plan")
+    rng = rng_of(seed, clip, "plan")
     segments = RECIPES[recipe]
     mirror = 1.0 if rng.random() < 0.5 else -1.0  # factor of turns and headings
     seconds = frames / fps
@@ -125,7 +125,7 @@ def _vary(segment: Segment, mirror: float, stretch: float, rng: np.random.Genera
     )
 
 
-def random_generator(seed: int, clip: str, purpose: str) -> np.random.Generator:
+def rng_of(seed: int, clip: str, purpose: str) -> np.random.Generator:
     """The random generator of one clip for one purpose. It is the same on every machine and in every run."""
     return np.random.default_rng([seed, zlib.crc32(clip.encode()), zlib.crc32(purpose.encode())])
 
@@ -166,7 +166,7 @@ class PlannedPath:
 
 def plan_path(segments: Sequence[Segment], frames: int, fps: float) -> PlannedPath:
     """The path of a plan (a list of segments) for a clip of `frames` frames, with padding at both ends."""
-    first = padding_frames(fps)
+    first = round(4 * fps)  # four seconds of padding on each side
     total = frames + 2 * first
     segment = _segment_of_frame(segments, frames, fps)
     segment = np.pad(segment, (first, total - first - len(segment)), mode="edge")
@@ -193,11 +193,6 @@ def plan_path(segments: Sequence[Segment], frames: int, fps: float) -> PlannedPa
         velocity,
         gaussian_filter1d(gait, sigma, axis=0, mode="nearest"),
     )
-
-
-def padding_frames(fps: float) -> int:
-    """Number of frames of padding on each side of a clip: four seconds."""
-    return round(4 * fps)
 
 
 def _segment_of_frame(segments: Sequence[Segment], frames: int, fps: float) -> np.ndarray:

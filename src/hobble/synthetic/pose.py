@@ -1,5 +1,7 @@
 """Poses the figure: finds the hip positions and all joint rotations from the feet, the path and the style."""
 
+from typing import NamedTuple
+
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
@@ -22,6 +24,24 @@ MAX_STRETCH = {True: 0.9975, False: 0.98}
 SMOOTHING_TIME = {True: 0.03, False: 0.06}
 
 
+class _Walk(NamedTuple):
+    """What all parts of the pose depend on. phase: (F,) in cycles. noise: (F, 6), from `_noise`."""
+
+    skeleton: Skeleton
+    path: PlannedPath
+    style: Style
+    phase: Array
+    noise: Array
+
+    def wave(self, peak: Array | float, times: int = 1) -> Array:
+        """(F,) cosine with `times` periods in a cycle; it is 1 at the phase `peak`."""
+        return np.cos(2 * np.pi * times * (self.phase - peak))
+
+    def mid_stance(self, side: int) -> Array:
+        """(F,) phase in the middle of the stance of the foot `side` (LEFT or RIGHT)."""
+        return self.style.duty[:, side] / 2 + (0.5 if side == LEFT else 0.0)
+
+
 def _rotation(axis: Array, degrees: Array) -> Array:
     """(F, 4) rotations about an axis (3,). degrees: (F,)."""
     return quat.from_axis_angle(axis, np.radians(degrees))
@@ -41,15 +61,15 @@ def pose_figure(
     phase: (F,) in cycles. feet: motion of the left foot and of the right foot. rng: for small random
     turns and shifts of the trunk and head.
     """
-    noise = _noise(rng, len(path), path.fps, 6)
+    walk = _Walk(skeleton, path, style, phase, _noise(rng, len(path), path.fps, 6))
     yaw = quat.yaw(path.facing)
-    hips, chest = _pelvis_rotation(style, phase, yaw, noise), _chest_rotation(style, phase, yaw, noise)
-    root = _hip_positions(skeleton, path, style, phase, feet, ground, hips, noise)
+    hips, chest = _pelvis_rotation(walk, yaw), _chest_rotation(walk, yaw)
+    root = _hip_positions(walk, feet, ground, hips)
     world = np.tile(quat.IDENTITY, (len(path), len(skeleton.joints), 1))
-    _set_trunk_and_head(skeleton, world, path, style, phase, hips, chest, noise)
+    _set_trunk_and_head(walk, world, hips, chest)
     for side in (LEFT, RIGHT):
         _set_leg(skeleton, world, root, feet[side], side)
-        _set_arm(skeleton, world, path, style, phase, side)
+        _set_arm(walk, world, side)
     return local_rotations(skeleton, world), root
 
 
@@ -60,66 +80,45 @@ def _noise(rng: np.random.Generator, frames: int, fps: float, count: int) -> Arr
     return smooth / smooth.std(axis=0)
 
 
-def _wave(phase: Array, peak: Array | float, times: int = 1) -> Array:
-    """(F,) cosine with `times` periods in a cycle; it is 1 at the phase `peak`."""
-    return np.cos(2 * np.pi * times * (phase - peak))
-
-
-def _mid_stance(style: Style, side: int) -> Array:
-    """(F,) phase in the middle of the stance of the foot `side` (LEFT or RIGHT)."""
-    return style.duty[:, side] / 2 + (0.5 if side == LEFT else 0.0)
-
-
-def _pelvis_rotation(style: Style, phase: Array, yaw: Array, noise: Array) -> Array:
-    """(F, 4) world rotation. yaw: (F, 4) rotation to the facing direction. noise: from `_noise`."""
-    turn = style.pelvis_yaw * _wave(phase, 0.0) + 0.6 * noise[:, 0]
-    lean = -style.pelvis_list * _wave(phase, 0.25)
-    tilt = style.pelvis_tilt + 0.8 * _wave(phase, 0.0, 2)
+def _pelvis_rotation(walk: _Walk, yaw: Array) -> Array:
+    """(F, 4) world rotation. yaw: (F, 4) rotation to the facing direction."""
+    turn = walk.style.pelvis_yaw * walk.wave(0.0) + 0.6 * walk.noise[:, 0]
+    lean = -walk.style.pelvis_list * walk.wave(0.25)
+    tilt = walk.style.pelvis_tilt + 0.8 * walk.wave(0.0, 2)
     return quat.mul(yaw, quat.mul(_rotation(Y, turn), quat.mul(_rotation(Z, lean), _rotation(X, tilt))))
 
 
-def _chest_rotation(style: Style, phase: Array, yaw: Array, noise: Array) -> Array:
-    """(F, 4) world rotation. The chest turns opposite to the pelvis. yaw, noise: see `_pelvis_rotation`."""
-    turn = -style.chest_yaw * _wave(phase, 0.03) + 0.8 * noise[:, 1]
-    lean = style.lean + 0.8 * _wave(phase, 0.05, 2) + 0.8 * noise[:, 2]
+def _chest_rotation(walk: _Walk, yaw: Array) -> Array:
+    """(F, 4) world rotation. The chest turns opposite to the pelvis. yaw: see `_pelvis_rotation`."""
+    turn = -walk.style.chest_yaw * walk.wave(0.03) + 0.8 * walk.noise[:, 1]
+    lean = walk.style.lean + 0.8 * walk.wave(0.05, 2) + 0.8 * walk.noise[:, 2]
     return quat.mul(yaw, quat.mul(_rotation(Y, turn), _rotation(X, lean)))
 
 
-def _hip_positions(
-    skeleton: Skeleton,
-    path: PlannedPath,
-    style: Style,
-    phase: Array,
-    feet: tuple[FootPoses, FootPoses],
-    ground: Ground,
-    hips: Array,
-    noise: Array,
-) -> Array:
+def _hip_positions(walk: _Walk, feet: tuple[FootPoses, FootPoses], ground: Ground, hips: Array) -> Array:
     """(F, 3) positions of the hips, cm: along the path, with sway and bob, and so low that knees are bent.
 
-    hips: (F, 4) rotations of the pelvis. noise: from `_noise`.
+    hips: (F, 4) rotations of the pelvis.
     """
-    sway = style.sway * (_wave(phase, _mid_stance(style, LEFT)) - _wave(phase, _mid_stance(style, RIGHT))) / 2
+    path, style, noise, flat_ground = walk.path, walk.style, walk.noise, ground is flat
+    left, right = (walk.mid_stance(side) for side in (LEFT, RIGHT))
+    sway = style.sway * (walk.wave(left) - walk.wave(right)) / 2
     sway = sway + 0.3 * noise[:, 3]
     # Mean over both feet. The left foot is half a cycle behind, which is one period of bob and surge.
-    middle = (_mid_stance(style, RIGHT) + _mid_stance(style, LEFT) - 0.5) / 2
-    ahead = (
-        path.velocity
-        / np.maximum(path.speed, 1e-6)[:, None]
-        * (style.surge * _wave(phase, middle - 0.125, 2))[:, None]
-    )
+    middle = (right + left - 0.5) / 2
+    surge = (style.surge * walk.wave(middle - 0.125, 2))[:, None]
+    ahead = path.velocity / np.maximum(path.speed, 1e-6)[:, None] * surge
     aside, forward = sway + ahead[:, 0], ahead[:, 1]
     x = path.position[:, 0] + aside * np.cos(path.facing) + forward * np.sin(path.facing)
     z = path.position[:, 1] - aside * np.sin(path.facing) + forward * np.cos(path.facing)
     ground_height = gaussian_filter1d(ground(x, z), 0.16 * path.fps, mode="nearest")  # over 0.16 s
-    height = ground_height + style.height + style.bob * _wave(phase, middle, 2) + 0.2 * noise[:, 4]
+    height = ground_height + style.height + style.bob * walk.wave(middle, 2) + 0.2 * noise[:, 4]
     root = np.stack([x, height, z], axis=1)
     excess = np.zeros(len(path))
     for side, name in ((LEFT, "Left"), (RIGHT, "Right")):
-        excess = np.maximum(
-            excess, _too_high(skeleton, root, hips, feet[side], name, MAX_STRETCH[ground is flat])
-        )
-    down = smooth_above(excess, round(SMOOTHING_TIME[ground is flat] * path.fps))
+        too_high = _too_high(walk.skeleton, root, hips, feet[side], name, MAX_STRETCH[flat_ground])
+        excess = np.maximum(excess, too_high)
+    down = smooth_above(excess, round(SMOOTHING_TIME[flat_ground] * path.fps))
     return root - np.stack([0 * x, down, 0 * x], axis=1)
 
 
@@ -146,30 +145,21 @@ def leg_lengths(skeleton: Skeleton, side: str) -> tuple[float, float]:
     return upper, lower
 
 
-def _set_trunk_and_head(
-    skeleton: Skeleton,
-    world: Array,
-    path: PlannedPath,
-    style: Style,
-    phase: Array,
-    hips: Array,
-    chest: Array,
-    noise: Array,
-) -> None:
+def _set_trunk_and_head(walk: _Walk, world: Array, hips: Array, chest: Array) -> None:
     """Set the world rotations of pelvis, spine, neck and head. hips, chest: (F, 4) rotations."""
+    path, noise, index = walk.path, walk.noise, walk.skeleton.index
     # The head looks up to 8 degrees into a turn of the path.
     ahead = np.radians(4) * np.clip(np.gradient(path.facing) * path.fps, -2, 2)
-    pitch = 2.0 + style.nod * _wave(phase, 0.05, 2) + noise[:, 0]  # forward as a foot lands
-    head = quat.mul(
-        quat.yaw(path.facing + ahead),
-        quat.mul(_rotation(Y, 1.5 * noise[:, 5]), _rotation(X, pitch)),
-    )
+    pitch = 2.0 + walk.style.nod * walk.wave(0.05, 2) + noise[:, 0]  # forward as a foot lands
+    tilted = quat.mul(_rotation(Y, 1.5 * noise[:, 5]), _rotation(X, pitch))
+    head = quat.mul(quat.yaw(path.facing + ahead), tilted)
     for name in ("Hips", "LHipJoint", "RHipJoint"):
-        world[:, skeleton.index(name)] = hips
-    for name, share in (("LowerBack", 0.3), ("Spine", 0.65), ("Spine1", 1.0)):
-        world[:, skeleton.index(name)] = quat.slerp(hips, chest, np.full(len(path), share))
-    for name, share in (("Neck", 0.1), ("Neck1", 0.5), ("Head", 1.0)):
-        world[:, skeleton.index(name)] = quat.slerp(chest, head, np.full(len(path), share))
+        world[:, index(name)] = hips
+    for name, lower, upper, share in (
+        *(("LowerBack", hips, chest, 0.3), ("Spine", hips, chest, 0.65), ("Spine1", hips, chest, 1.0)),
+        *(("Neck", chest, head, 0.1), ("Neck1", chest, head, 0.5), ("Head", chest, head, 1.0)),
+    ):
+        world[:, index(name)] = quat.slerp(lower, upper, np.full(len(path), share))
 
 
 def _set_leg(skeleton: Skeleton, world: Array, root: Array, foot: FootPoses, side: int) -> None:
@@ -189,29 +179,26 @@ def _set_leg(skeleton: Skeleton, world: Array, root: Array, foot: FootPoses, sid
     world[:, skeleton.index(f"{name}ToeBase")] = foot.toes
 
 
-def _set_arm(
-    skeleton: Skeleton, world: Array, path: PlannedPath, style: Style, phase: Array, side: int
-) -> None:
+def _set_arm(walk: _Walk, world: Array, side: int) -> None:
     """Set the rotations of an arm. It swings opposite to its side's leg and bends more on its way forward."""
-    name, sign = ("Left", "Right")[side], SIDE_SIGN[side]
-    chest = world[:, skeleton.index("Spine1")]
+    path, style, index = walk.path, walk.style, walk.skeleton.index
+    name, sign, later = ("Left", "Right")[side], SIDE_SIGN[side], 0.0 if side == LEFT else 0.5
+    chest = world[:, index("Spine1")]
     # The arms follow the lean and turn of the chest about half.
     shoulders = quat.slerp(quat.yaw(path.facing), chest, np.full(len(path), 0.55))
-    swing = _wave(phase, 0.02 if side == LEFT else 0.52)
+    swing = walk.wave(0.02 + later)
     flexion = style.arm_mean[:, side] + style.arm_swing[:, side] * swing
-    elbow = style.elbow[:, side] + style.elbow_swing[:, side] * _wave(phase, 0.05 if side == LEFT else 0.55)
+    elbow = style.elbow[:, side] + style.elbow_swing[:, side] * walk.wave(0.05 + later)
     # In the rest pose an arm points sideways, along X. It is turned down about Z.
-    upper = quat.mul(
-        quat.mul(shoulders, _rotation(X, -flexion)), _rotation(Z, sign * (style.abduction[:, side] - 90))
-    )
+    down = _rotation(Z, sign * (style.abduction[:, side] - 90))
+    upper = quat.mul(quat.mul(shoulders, _rotation(X, -flexion)), down)
     upper = quat.mul(upper, _rotation(X, np.full(len(path), TWIST)))
     lower = quat.mul(upper, _rotation(Y, -sign * np.maximum(elbow, 2)))
     # The shoulder girdle goes along with the arm, and the hand hangs behind in the swing.
     along = style.arm_swing[:, side] * swing
-    world[:, skeleton.index(f"{name}Shoulder")] = quat.mul(chest, _rotation(Y, -sign * GIRDLE * along))
-    world[:, skeleton.index(f"{name}Arm")] = upper
-    world[:, skeleton.index(f"{name}ForeArm")] = lower
+    world[:, index(f"{name}Shoulder")] = quat.mul(chest, _rotation(Y, -sign * GIRDLE * along))
+    world[:, index(f"{name}Arm")] = upper
+    world[:, index(f"{name}ForeArm")] = lower
     hand = quat.mul(lower, _rotation(Y, -sign * (8.0 + HAND * along)))
-    initial = "L" if side == LEFT else "R"
-    for joint in (f"{name}Hand", f"{name}FingerBase", f"{name}HandIndex1", f"{initial}Thumb"):
-        world[:, skeleton.index(joint)] = hand
+    for joint in (f"{name}Hand", f"{name}FingerBase", f"{name}HandIndex1", f"{name[0]}Thumb"):
+        world[:, index(joint)] = hand

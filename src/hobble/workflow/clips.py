@@ -33,7 +33,7 @@ from hobble.core.clip_files import (
 from hobble.core.errors import HobbleError, InputError
 from hobble.core.files import check_regular, read_text
 from hobble.hurt.options import HURT_CHANNEL, Hurt
-from hobble.synthetic.options import WRITTEN_LABEL_SUFFIXES
+from hobble.synthetic.generate_clip import WRITTEN_LABEL_SUFFIXES
 
 DATASETS = "results/datasets"
 LABEL_SUFFIXES = (".phase", ".gait", "_footsteps.txt", "_gait.txt")  # of hand-made files <clip><suffix>
