@@ -19,10 +19,10 @@ from stability import random_targets, stability
 
 from hobble.core.processors import processor_name
 from hobble.database.chunks import Manifest
+from hobble.measures.accuracy_run import measure_accuracy
 from hobble.measures.measure import MeasureInputs
 from hobble.measures.responsivity import Options as Laps
 from hobble.measures.responsivity_run import measure_responsivity
-from hobble.measures.rollouts_run import measure_roll_outs
 from hobble.models.load import load_network
 from hobble.models.network import Network
 from hobble.runtime.animation import ProceduralAnimation
@@ -60,8 +60,8 @@ def roll_outs(weights: Path, database: Path) -> str:
         c["clip"]: c["split"] for c in Manifest.load(database).clips if c["split"] == "held_out" and c["rows"]
     }
     files = {name: database.parent / "clips" / f"{name}.npz" for name in clips}
-    found = measure_roll_outs(MeasureInputs("", {"weights": weights}, files, clips), lengths=LENGTHS)
-    return " ".join(f"{entry['held_out']['position_error_cm']:.2f}" for entry in found["lengths"])
+    found = measure_accuracy(MeasureInputs("", {"weights": weights}, files, clips), lengths=LENGTHS)
+    return " ".join(f"{entry['held_out']['position_error_cm']:.2f}" for entry in found["rollouts"])
 
 
 def main() -> None:
@@ -88,8 +88,8 @@ def main() -> None:
             lap = measure_responsivity(network, laps, configuration="", runtime=Runtime())
             print(
                 f"{name}: {lap['waypoints_reached']} of {lap['waypoints']} waypoints, at most "
-                f"{lap['path_overshoot_cm']:.0f} cm off the path, a lap {lap['mean_lap_seconds']} s, slide "
-                f"{lap['foot_slide_cm']:.2f} cm, turn {lap['largest_turn_degrees']:.0f} degrees",
+                f"{lap['path_overshoot_cm']:.0f} cm off the path, a lap {lap['mean_lap_seconds']} s, turn "
+                f"{lap['largest_turn_degrees']:.0f} degrees",
                 flush=True,
             )
         if options.minutes:

@@ -14,8 +14,8 @@ import numpy as np
 from runtime import SKELETON, load_skeleton, random_network
 
 from hobble.core.processors import processor_name
-from hobble.measures.rollouts_run import RollOutCrowd, RollOutInputs
-from hobble.measures.walks import CrowdTarget, channel_values, generate_walks
+from hobble.measures.accuracy_run import RollOutCrowd, RollOutInputs
+from hobble.measures.walks import CrowdTarget, generate_walks
 from hobble.models.load import load_network
 from hobble.models.network import Network
 from hobble.runtime.options import Runtime
@@ -35,11 +35,10 @@ def seconds(work: Callable[[], object]) -> float:
 def sweep(network: Network) -> tuple[float, float]:
     """CPU microseconds for a frame of one figure: a figure for each link at once, and one after another."""
     links = network.channels.get("injury") or ("",) * 30
-    hurt = channel_values(network, "injury", [{link: 5.0} if link else {} for link in links])
 
     def walk(which: slice) -> None:
-        channels = {name: rows[which] for name, rows in hurt.items()}
-        generate_walks(network, [CrowdTarget(FRAMES, ["walk"] * len(links[which]), channels)], RUNTIME)
+        cases = [{"injury": {link: 5.0}} for link in links[which]]
+        generate_walks(network, [CrowdTarget(FRAMES, ["walk"] * len(cases), cases)], RUNTIME)
 
     per, alone = 1e6 / FRAMES / len(links), [slice(i, i + 1) for i in range(len(links))]
     return per * seconds(lambda: walk(slice(None))), per * seconds(lambda: [walk(one) for one in alone])

@@ -26,10 +26,10 @@ import torch
 import yaml
 
 from hobble.database.reader import Database
+from hobble.measures.accuracy_run import measure_accuracy
 from hobble.measures.measure import MeasureInputs
 from hobble.measures.responsivity import Options as Laps
 from hobble.measures.responsivity_run import measure_responsivity
-from hobble.measures.rollouts_run import measure_roll_outs
 from hobble.models.load import load_network
 from hobble.models.pfnn import PfnnOptions
 from hobble.runtime.options import Runtime
@@ -57,13 +57,13 @@ def measure_recipe(
         weights = Path(folder) / "weights.npz"
         state = train(database, network=network, training=training, checkpoints=Path(folder), threads=threads)
         write_weights(weights, state.network, database, "benchmark", {})
-        rolled = measure_roll_outs(MeasureInputs("", {"weights": weights}, files, clips), lengths=LENGTHS)
+        rolled = measure_accuracy(MeasureInputs("", {"weights": weights}, files, clips), lengths=LENGTHS)
         character = load_network(weights)
     lap = measure_responsivity(
         character, Laps(laps=1, modes=()), configuration="", runtime=Runtime(), track=track
     )
     whole = HeldOutErrors(database, torch.device("cpu"), 0).errors(state.network, every_row=True)[0]
-    strayed = " ".join(f"{entry['held_out']['position_error_cm']:5.2f}" for entry in rolled["lengths"])
+    strayed = " ".join(f"{entry['held_out']['position_error_cm']:5.2f}" for entry in rolled["rollouts"])
     laps = f"{lap['waypoints_reached']}/{lap['waypoints']} {lap['laps'][0]['seconds']:4.0f}"
     laps += f" {lap['path_overshoot_cm']:5.0f} {lap['largest_turn_degrees']:4.0f}"
     return f"{state.history[-1][4]:7.4f} {whole:9.4f}  {strayed}  {laps}"

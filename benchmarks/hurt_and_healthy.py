@@ -21,7 +21,6 @@ from hobble.measures.accuracy_run import measure_accuracy
 from hobble.measures.measure import MeasureInputs
 from hobble.measures.responsivity import Options as Laps
 from hobble.measures.responsivity_run import measure_responsivity
-from hobble.measures.rollouts_run import measure_roll_outs
 from hobble.models.load import load_network
 from hobble.runtime.options import Runtime
 from hobble.training.options import Training
@@ -44,19 +43,19 @@ def values(folder: Path, files: dict[str, Path], splits: dict[str, str], minutes
     network = load_network(weights)
     out: dict[str, object] = {}
     inputs = MeasureInputs(folder.name, {"weights": weights}, files, splits)
-    steps, rolled = measure_accuracy(inputs), measure_roll_outs(inputs, lengths=LENGTHS)
+    found = measure_accuracy(inputs, lengths=LENGTHS)
     for split in ("train", "held_out"):
-        out[f"{split}: one step, share"] = steps[split]["mean"]
-        out[f"{split}: one step, cm"] = steps[split]["position_error_cm"]
-        for row in rolled["lengths"]:
+        out[f"{split}: one step, share"] = found[split]["mean"]
+        out[f"{split}: one step, cm"] = found[split]["position_error_cm"]
+        for row in found["rollouts"]:
             out[f"{split}: {row['length']} frames, cm"] = row[split]["position_error_cm"]
     lap = measure_responsivity(network, Laps(laps=1, modes=()), configuration="", runtime=Runtime())
     out["waypoints"] = f"{lap['waypoints_reached']} of {lap['waypoints']}"
     out["off the path, cm"] = lap["path_overshoot_cm"]
-    found = stability(network, minutes)
-    out["hips, cm"] = f"{found['hips_lowest_cm']:.0f} to {found['hips_highest_cm']:.0f}"
-    out["largest turn, degrees"] = found["largest_turn_degrees"]
-    out["foot slide, cm a step"] = found["foot_slide_cm"]
+    stable = stability(network, minutes)
+    out["hips, cm"] = f"{stable['hips_lowest_cm']:.0f} to {stable['hips_highest_cm']:.0f}"
+    out["largest turn, degrees"] = stable["largest_turn_degrees"]
+    out["foot slide, cm a step"] = stable["foot_slide_cm"]
     out["training, processor s"] = training_seconds(folder)
     return out
 

@@ -34,7 +34,7 @@ from hobble.workflow.datasets import batch_count
 ROOT = Path(__file__).resolve().parents[1]
 OF_BATCHES = {"synthetic_clips"} | {rule for rules in BATCH_RULES.values() for rule in rules}
 # Rules whose work grows with the motion, as far as one run can tell.
-GROWING = {*OF_BATCHES, "database_shard", "database_merge", "training", "recognition", "manners"}
+GROWING = {*OF_BATCHES, "database_shard", "database_merge", "training", "recognition"}
 SAMPLED = {one.name for one in all_measures() if "sample_frames" in one.options.model_fields}
 FPS = 60
 LINK, DELAY = 1.25e9, 30e-6  # bytes and seconds of a message between machines

@@ -17,7 +17,10 @@ ALLOWED = ("channels/__init__.py", "hurt/", "synthetic/")
 # What asks for one channel: its command, its films and their study. Measurements say so in `Measure.channel`.
 ENDS = (".py", "_run.py")
 ASKING = {
-    "injury": ("cli/", "measures/films.py", "measures/study.py"),
+    "injury": (
+        *("cli/", "measures/films.py", "measures/study.py"),
+        *("measures/recognition.py", "measures/recognition_run.py"),
+    ),
 }
 
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -28,9 +29,7 @@ def place(skeleton: Skeleton, at: Mapping[str, Array]) -> Array:
 
 
 def body(frames: int, speed: float, height: float = 72.0) -> dict[str, Array]:
-    """An upright figure that moves ahead at `speed` cm a frame with hanging arms, without knees and
-    ankles.
-    """
+    """An upright figure that moves ahead at `speed` cm a frame with hanging arms, without knees."""
 
     def up(height: float, left: float = 0.0) -> Array:
         return np.array([left, height, 0.0])
@@ -44,6 +43,16 @@ def body(frames: int, speed: float, height: float = 72.0) -> dict[str, Array]:
         at[f"{side}_elbow"] = at[f"{side}_shoulder"] - up(29)
         at[f"{side}_wrist"] = at[f"{side}_elbow"] - up(23)
     return at
+
+
+def swing(middle_and_half: tuple[float, float], wave: Array) -> Array:
+    return middle_and_half[0] + middle_and_half[1] * wave
+
+
+def down(degrees: Array) -> Array:
+    """Unit vectors (F, 3) that hang down and point forward by an angle."""
+    angle = np.radians(degrees)
+    return np.stack([0 * angle, -np.cos(angle), np.sin(angle)], axis=1)
 
 
 @dataclass(frozen=True)
@@ -78,9 +87,8 @@ class Stepper:
 
     def relative(self, side: str, frame: Array) -> Array:
         """How far the ankle is ahead of the hips, cm."""
-        stance = self.stance_right if side == "right" else self.stance_left
+        stance, ahead = getattr(self, f"stance_{side}"), getattr(self, f"ahead_{side}")
         lands = 0 if side == "right" else self.left_lands
-        ahead = self.ahead_right if side == "right" else self.ahead_left
         since = (frame - lands) % CYCLE
         swung = np.maximum(since - stance, 0) / (CYCLE - stance) * self.speed * CYCLE
         return ahead - self.speed * since + swung
@@ -110,59 +118,26 @@ class Swinger:
         for side, sign in SIDES.items():
             beat = wave * -sign
             at[f"{side}_hip"] = at["hips"] + sign * 9 * np.array([np.cos(up), np.sin(up), 0])
-            hip, knee = _swing(self.hip[side], beat), self.knee[side] * (1 - beat) / 2
-            at[f"{side}_knee"] = at[f"{side}_hip"] + THIGH * _down(hip)
-            at[f"{side}_heel"] = at[f"{side}_knee"] + SHANK * _down(hip - knee)
+            hip, knee = swing(self.hip[side], beat), self.knee[side] * (1 - beat) / 2
+            at[f"{side}_knee"] = at[f"{side}_hip"] + THIGH * down(hip)
+            at[f"{side}_heel"] = at[f"{side}_knee"] + SHANK * down(hip - knee)
             at[f"{side}_toe"] = at[f"{side}_heel"] + FOOT
-            arm = _swing(self.arm[side], beat)
-            at[f"{side}_elbow"] = at[f"{side}_shoulder"] + 29 * _down(arm)
-            at[f"{side}_wrist"] = at[f"{side}_elbow"] + 23 * _down(arm + self.elbow)
-        forward, left = (
-            np.tan(np.radians(_swing(lean, wave))) for lean in (self.trunk_forward, self.trunk_left)
-        )
+            arm = swing(self.arm[side], beat)
+            at[f"{side}_elbow"] = at[f"{side}_shoulder"] + 29 * down(arm)
+            at[f"{side}_wrist"] = at[f"{side}_elbow"] + 23 * down(arm + self.elbow)
+        leans = self.trunk_forward, self.trunk_left
+        forward, left = (np.tan(np.radians(swing(lean, wave))) for lean in leans)
         at["neck"] = at["hips"] + 50 * np.stack([left, np.ones(frames), forward], axis=1)
         return place(skeleton, at)
 
 
-def _swing(middle_and_half: tuple[float, float], wave: Array) -> Array:
-    return middle_and_half[0] + middle_and_half[1] * wave
-
-
-def _down(degrees: Array) -> Array:
-    """Unit vectors (F, 3) that hang down and point forward by an angle."""
-    angle = np.radians(degrees)
-    return np.stack([0 * angle, -np.cos(angle), np.sin(angle)], axis=1)
-
-
-def in_a_mirror(skeleton: Skeleton, positions: Array) -> Array:
-    """Joint positions with left and right swapped."""
-    return positions[:, skeleton.mirror_joints] * [-1.0, 1.0, 1.0]
-
-
 @pytest.fixture(scope="session")
-def stepper() -> type[Stepper]:
-    return Stepper
-
-
-@pytest.fixture(scope="session")
-def swinger() -> type[Swinger]:
-    return Swinger
-
-
-@pytest.fixture(scope="session")
-def mirror() -> Callable[[Skeleton, Array], Array]:
-    return in_a_mirror
-
-
-@pytest.fixture(scope="session")
-def cmu(shared: Path, root: Path) -> Callable[[str], Clip]:
+def cmu(shared: Path) -> Callable[[str], Clip]:
     """A clip of the CMU database or of Ferre et al. by name, read once."""
-    read: dict[str, Clip] = {}
 
+    @cache
     def get(name: str) -> Clip:
-        if name not in read:
-            folder = "ferre" if name.startswith("Injured") else "cmu"
-            read[name] = read_clip(shared / "mocap" / folder / f"{name}.bvh")
-        return read[name]
+        folder = "ferre" if name.startswith("Injured") else "cmu"
+        return read_clip(shared / "mocap" / folder / f"{name}.bvh")
 
     return get

@@ -4,12 +4,11 @@ import numpy as np
 import pytest
 
 from hobble.gait.cycles import CURVES, SAMPLES, _share_below, measure_cycles
+from tests.gait.conftest import CYCLE, LEG, Stepper, Swinger
 
-CYCLE, LEG = 60, 81.0
 
-
-def test_landings_stances_and_steps_of_a_made_walk_are_found(holden31, stepper):
-    made = stepper(stance_right=30, stance_left=42, ahead_right=10, ahead_left=30, left_lands=24)
+def test_landings_stances_and_steps_of_a_made_walk_are_found(holden31):
+    made = Stepper(stance_right=30, stance_left=42, ahead_right=10, ahead_left=30, left_lands=24)
     walk = measure_cycles(holden31, made.positions(holden31))
     # the ends of a clip are no landings: what the ankle did beyond is not known
     assert [cycle.start for cycle in walk.right] == [60, 120, 180, 240]
@@ -31,57 +30,36 @@ def test_landings_stances_and_steps_of_a_made_walk_are_found(holden31, stepper):
 
 
 def test_the_time_below_a_limit_is_interpolated_between_frames() -> None:
-    def share(*values: float) -> float:
-        return _share_below(np.array(values, float), 1.0)
-
-    assert share(0, 0, 0) == 1
-    assert share(1, 2, 1) == 0
-    assert share(0, 2) == 0.5
-    assert share(2, 0, 0, 4) == pytest.approx((0.5 + 1 + 0.25) / 3)
-    seconds = np.linspace(0, 2 * np.pi, 38)
-    assert share(*(1 + np.cos(seconds))) == pytest.approx(0.5, abs=1e-3)
+    cosine = tuple(1 + np.cos(np.linspace(0, 2 * np.pi, 38)))
+    for values, share in (((0, 0, 0), 1), ((1, 2, 1), 0), ((2, 0, 0, 4), 1.75 / 3), (cosine, 0.5)):
+        assert _share_below(np.array(values, float), 1.0) == pytest.approx(share, abs=1e-3)
 
 
-@pytest.fixture(scope="module")
-def swinging(holden31, swinger):
-    made = swinger(
+# Curve -> its mean and its range.
+MADE = {
+    "hip_flexion_R": (2, 28), "hip_flexion_L": (5, 40), "knee_flexion_R": (8, 16), "knee_flexion_L": (20, 40),
+    "hip_abduction_R": (0, 0), "arm_forward_R": (1, 10), "arm_forward_L": (-4, 34), "trunk_left": (3, 8),
+    "elbow_flexion_R": (20, 0), "trunk_forward": (5, 4), "pelvis_left_up": (6, 0), "pelvis_turn_left": (0, 0),
+    "shoulders_turn_left": (0, 0), "foot_pitch_L": (-17.10273, 0), "hips_height": (72 / LEG, 0),
+}  # fmt: skip
+
+
+def test_curves_of_a_made_walk_have_its_means_and_ranges(holden31):
+    made = Swinger(
         hip={"right": (2.0, 14.0), "left": (5.0, 20.0)},
         knee={"right": 16.0, "left": 40.0},
         arm={"right": (1.0, 5.0), "left": (-4.0, 17.0)},
     )
-    return measure_cycles(holden31, made.positions(holden31))
+    for cycle in measure_cycles(holden31, made.positions(holden31)).right:
+        for name, (mean, whole) in MADE.items():
+            curve = cycle.curves[CURVES.index(name)]
+            assert curve.shape == (SAMPLES,)
+            assert np.ptp(curve) == pytest.approx(whole, abs=1e-6), name
+            assert curve.mean() == pytest.approx(mean, abs=1e-5), name
 
 
-@pytest.mark.parametrize(
-    ("name", "mean", "whole"),
-    [
-        ("hip_flexion_R", 2, 28),
-        ("hip_flexion_L", 5, 40),
-        ("knee_flexion_R", 8, 16),
-        ("knee_flexion_L", 20, 40),
-        ("hip_abduction_R", 0, 0),
-        ("arm_forward_R", 1, 10),
-        ("arm_forward_L", -4, 34),
-        ("elbow_flexion_R", 20, 0),
-        ("trunk_forward", 5, 4),
-        ("trunk_left", 3, 8),
-        ("pelvis_left_up", 6, 0),
-        ("pelvis_turn_left", 0, 0),
-        ("shoulders_turn_left", 0, 0),
-        ("foot_pitch_L", -np.degrees(np.arctan2(4, 13)), 0),
-        ("hips_height", 72 / LEG, 0),
-    ],
-)
-def test_curves_of_a_made_walk_have_its_means_and_ranges(swinging, name, mean, whole):
-    for cycle in swinging.right:
-        curve = cycle.curves[CURVES.index(name)]
-        assert curve.shape == (SAMPLES,)
-        assert np.ptp(curve) == pytest.approx(whole, abs=1e-6)
-        assert curve.mean() == pytest.approx(mean, abs=1e-6)
-
-
-def test_cycles_do_not_depend_on_place_size_and_direction(holden31, stepper):
-    positions = stepper(ahead_left=35).positions(holden31)
+def test_cycles_do_not_depend_on_place_size_and_direction(holden31):
+    positions = Stepper(ahead_left=35).positions(holden31)
     turn = np.radians(130)
     rotation = np.array([[np.cos(turn), 0, np.sin(turn)], [0, 1, 0], [-np.sin(turn), 0, np.cos(turn)]])
     moved = 1.3 * positions @ rotation.T + [500, 0, -300]
@@ -93,12 +71,7 @@ def test_cycles_do_not_depend_on_place_size_and_direction(holden31, stepper):
         np.testing.assert_allclose(a.curves, b.curves, atol=1e-6)
 
 
-def standing(positions):
-    return positions - [0, 0, 1.5] * np.arange(len(positions))[:, None, None]
-
-
-def backward(positions):
-    return positions[::-1]
+PARTS = slice(None, None, -1), slice(20), slice(1)  # backward, and too short
 
 
 def on_a_circle(positions):
@@ -108,6 +81,10 @@ def on_a_circle(positions):
     return np.stack([out * np.cos(angle) - radius, positions[..., 1], out * np.sin(angle)], axis=-1)
 
 
-@pytest.mark.parametrize("change", [standing, backward, on_a_circle, lambda p: p[:20], lambda p: p[:1]])
-def test_only_straight_walking_has_cycles(holden31, stepper, change):
-    assert len(measure_cycles(holden31, change(stepper().positions(holden31)))) == 0
+def standing(positions):
+    return positions - [0, 0, 1.5] * np.arange(len(positions))[:, None, None]
+
+
+@pytest.mark.parametrize("change", [standing, on_a_circle, *(lambda p, s=s: p[s] for s in PARTS)])
+def test_only_straight_walking_has_cycles(holden31, change):
+    assert len(measure_cycles(holden31, change(Stepper().positions(holden31)))) == 0

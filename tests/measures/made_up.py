@@ -8,8 +8,11 @@ from typing import Any
 
 import numpy as np
 
+from hobble.core.quat import Array
+from hobble.measures.accuracy_run import RollOutCrowd, RollOutInputs
 from hobble.measures.measure import MeasureInputs
 from hobble.models.load import NEEDED_ROLES
+from hobble.models.network import Predictor
 from hobble.rows.clip_rows import Captured, ClipRows, save_clip_rows
 from hobble.rows.layout import GAITS, RowLayout
 
@@ -86,3 +89,15 @@ def random_network(path: Path) -> Path:
     meta = {"layout": LAYOUT.to_dict(), "skeleton": SKELETON, "channels": {"injury": ["Hips-Arm"]}}
     np.savez(path, **arrays, meta=np.array(json.dumps(meta)))
     return path
+
+
+def roll_out(
+    predictor: Predictor, inputs: RollOutInputs, starts: np.ndarray, length: int
+) -> tuple[list[Array], Array]:
+    """The joints of roll-outs that begin at frames `starts` (n,), which rise, and their last phases (n,).
+
+    For each age from 1 to `length` there is an array (n', J, 3), in the root frame of frame start + age - 1,
+    with heights minus that frame's mean. It holds the first n' roll-outs, those still inside the stretch.
+    """
+    crowd = RollOutCrowd(predictor, inputs, starts, np.minimum(starts + length, len(inputs.x)))
+    return [place for *_, place in crowd.frames()], crowd.phase

@@ -1,19 +1,36 @@
-"""Accuracy of the published network on the published rows, and the formula on made-up rows."""
+"""Errors of one step on published and on made-up rows, and roll-outs, which go on like the runtime."""
 
 import json
 from dataclasses import replace
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
-from hobble.core.errors import HobbleError, InputError
+from hobble.core.errors import InputError
 from hobble.measures import accuracy_run as module
-from hobble.measures.accuracy_run import at_stored_phases, joint_errors, measure_accuracy, predict_function
-from hobble.measures.measure import JointOptions, MeasureInputs
+from hobble.measures.accuracy_run import (
+    RollOutInputs,
+    at_stored_phases,
+    inputs_of_clip,
+    joint_errors,
+    joints_to_measure,
+    measure_accuracy,
+    predict_function,
+    roll_out_rows,
+    roll_out_sums,
+    stretches_of,
+    values_of_roll_outs,
+)
+from hobble.measures.sample import LoadedPart
+from hobble.measures.walks import in_root_coordinates
 from hobble.models.load import load_network
-from hobble.rows.clip_rows import pair_batches
-from hobble.rows.layout import RowLayout
-from tests.measures.made_up import LAYOUT, made_up_inputs, random_rows
+from hobble.models.network import Network
+from hobble.rows.clip_rows import ClipRows, pair_batches
+from hobble.rows.layout import RowLayout, channel_inputs
+from hobble.runtime.animation import ProceduralAnimation
+from tests.measures.made_up import LAYOUT, made_up_inputs, random_rows, roll_out
 
 
 @pytest.mark.shared
@@ -38,54 +55,55 @@ def test_an_error_of_a_tenth_in_one_joint_gives_the_documented_error():
     predicted[0, layout.y_joint_position] = [0, 81, 0, 3, 0, 4.5]
     np.testing.assert_allclose(joint_errors(layout, truth, predicted, [0, 1])[0], [[0.1, 9.0], [0.1, 0.5]])
     np.testing.assert_allclose(joint_errors(layout, truth, predicted, [1])[0], [[0.1, 0.5]])
-    assert np.isfinite(joint_errors(layout, np.zeros_like(truth), predicted, [0, 1])).all(), "at the root"
+    assert np.isfinite(joint_errors(layout, 0 * truth, predicted, [0, 1])).all(), "at the root"
 
 
-@pytest.mark.parametrize("fits", [1, 10])
-def test_the_errors_of_a_clip_cover_all_its_pairs(tmp_path, fits):
-    rows = random_rows("a", 37, fits, 5)
+def test_the_errors_of_a_clip_cover_all_its_pairs(tmp_path):
+    rows = random_rows("a", 37, 10, 5)
     inputs = made_up_inputs(tmp_path, {"a": rows})
-    network = load_network(inputs.weights)
-    relative, distance = np.concatenate(
-        [
+    network, errors = load_network(inputs.weights), []
+    for pairs in pair_batches(rows, rows.layout):
+        errors.append(
             joint_errors(LAYOUT, pairs.y, network.predict(pairs.x, pairs.p), range(3)).reshape(-1, 2)
-            for pairs in pair_batches(rows, rows.layout)
-        ]
-    ).T
+        )
+    relative, distance = np.concatenate(errors).T
     (got,) = measure_accuracy(inputs)["clips"]
-    assert got["frames"] == 37
     expected = {"mean": relative.mean(), "sd": relative.std(), "position_error_cm": distance.mean()}
     assert {key: got[key] for key in expected} == pytest.approx(expected, rel=1e-4)
-    for name, share in module.QUANTILES.items():
-        assert got[name] == pytest.approx(np.quantile(relative, share), rel=0.05)
+    assert got["frames"] == 37
 
 
-def test_accuracy_per_clip_and_split(tmp_path):
-    sizes = {"b": (20, 1), "a": (40, 10), "c": (30, 1), "none": (0, 1)}  # frames, fits
+def test_results_of_splits_are_means_of_their_clips_and_reproducible(tmp_path: Path, monkeypatch) -> None:
+    sizes = {"b": (90, 1), "a": (60, 10), "c": (40, 1), "none": (0, 1)}  # frames, fits
     clips = {name: random_rows(name, *size, i) for i, (name, size) in enumerate(sizes.items())}
     inputs = made_up_inputs(tmp_path, clips, held_out=("c", "none"))
-    result = measure_accuracy(inputs)
-    a, b, c, none = result["clips"]
-    assert [entry["clip"] for entry in result["clips"]] == ["a", "b", "c", "none"]
-    assert result["train"]["frames"] == 60
-    for key in ("mean", "position_error_cm"):  # every frame counts the same, whatever its fits
-        assert result["train"][key] == pytest.approx((40 * a[key] + 20 * b[key]) / 60)
-    assert result["train"]["mean_of_clips"] == pytest.approx((a["mean"] + b["mean"]) / 2)
-    same = ("frames", "mean", "sd", "position_error_cm", "p50")
-    assert [result["held_out"][key] for key in same] == [c[key] for key in same]
-    assert (none["mean"], none["p50"], result["held_out"]["clips"]) == (None, None, 1)
+    result = measure_accuracy(inputs, lengths=(1, 30))
+    assert [entry["length"] for entry in result["rollouts"]] == [1, 30]
+    for entry in (result, *result["rollouts"]):
+        a, b, c, none = entry["clips"]
+        assert [clip["clip"] for clip in entry["clips"]] == ["a", "b", "c", "none"]
+        for key in ("mean", "position_error_cm"):  # every frame counts the same, whatever its fits
+            both = (a["frames"] * a[key] + b["frames"] * b[key]) / (a["frames"] + b["frames"])
+            assert entry["train"][key] == pytest.approx(both)
+            assert entry["held_out"][key] == c[key]
+        assert none["mean"] is None
+    assert [entry["clips"][2]["ended"] for entry in result["rollouts"]] == [38, 1]
+    assert none["last_cm"] is None
     # Nearly the same in the mode constant, and with n - 1.
+    a, b, *_ = result["clips"]
     means = [entry["as_published"]["mean"] for entry in (a, b)]
     assert means == pytest.approx([a["mean"], b["mean"]], rel=0.05)
     assert means != [a["mean"], b["mean"]]
-    spread = {
-        "mean_of_clips": pytest.approx(np.mean(means)),
-        "sd_of_clips": pytest.approx(np.std(means, ddof=1)),
-    }
-    assert result["train"]["as_published"] == spread
+    published = {"mean_of_clips": np.mean(means), "sd_of_clips": np.std(means, ddof=1)}
+    assert result["train"]["as_published"] == pytest.approx(published)
     assert result["held_out"]["as_published"]["sd_of_clips"] is None
+    rows = roll_out_rows(result["rollouts"])
+    assert (len(rows), rows[0]["clip"]) == (2 * (2 + 4), None)
     json.dumps(result, allow_nan=False)
-    assert result == measure_accuracy(inputs)
+    # The same bits, however many poses and clips go at once.
+    for name, value in (("BATCH", 7), ("AT_ONCE", 1)):
+        monkeypatch.setattr(module, name, value)
+        assert measure_accuracy(inputs, lengths=(1, 30))["rollouts"] == result["rollouts"]
 
 
 def test_only_the_first_positions_of_a_clip_count_as_published(tmp_path, monkeypatch) -> None:
@@ -99,20 +117,14 @@ def test_only_the_first_positions_of_a_clip_count_as_published(tmp_path, monkeyp
 
 
 def test_equivalent_joints_leave_out_joints_of_larger_skeletons(tmp_path):
-    for skeleton, expected in (
-        ({"maps": {"holden31": {"Foot": "LeftFoot", "Hips": "Hips"}}}, ["Foot", "Hips"]),
-        ({"joints": {}}, None),
-    ):
-        (tmp_path / "skeleton.yaml").write_text(json.dumps(skeleton))
-        inputs = MeasureInputs("x", {"skeleton": tmp_path / "skeleton.yaml"})
-        assert module.joints_to_measure(inputs, JointOptions(joints="equivalent")) == expected
-        assert module.joints_to_measure(inputs, JointOptions()) is None
     inputs = made_up_inputs(tmp_path, {"a": random_rows("a", 20, 1, 0)})
-    each = [measure_accuracy(inputs, [name])["train"]["mean"] for name in ("Foot", "Hips")]
-    both = measure_accuracy(inputs, ["Foot", "Hips"])
+    network, maps = load_network(inputs.weights), {"maps": {"holden31": {"Foot": "LeftFoot", "Hips": "Hips"}}}
+    assert joints_to_measure(network, maps, "equivalent") == [0, 2]
+    for skeleton, joints in (({"joints": {}}, "equivalent"), (maps, "all")):
+        assert joints_to_measure(network, skeleton, joints) == [0, 1, 2]
+    each = [measure_accuracy(inputs, [joint])["train"]["mean"] for joint in (0, 2)]
+    both = measure_accuracy(inputs, [0, 2])
     assert (both["joints"], both["train"]["mean"]) == (2, pytest.approx(np.mean(each)))
-    with pytest.raises(HobbleError, match="Tail"):
-        measure_accuracy(inputs, ["Tail"])
 
 
 def test_rows_of_another_layout_are_refused(tmp_path):
@@ -124,3 +136,85 @@ def test_rows_of_another_layout_are_refused(tmp_path):
     )
     with pytest.raises(InputError, match=r"a\.npz: its rows .* are not those the network has learnt"):
         measure_accuracy(made_up_inputs(tmp_path, {"a": other}))
+
+
+def hills(x: np.ndarray, z: np.ndarray) -> np.ndarray:
+    return 8 * np.sin(x / 70) + 6 * np.cos(z / 50)
+
+
+def recorded(network: Network, frames: int, ground: Any) -> tuple[RollOutInputs, np.ndarray]:
+    """The inputs of a running character in each frame, and its joints (F, J, 3) in the root frame."""
+    figure = ProceduralAnimation(network, foot_locking=False)
+    figure.next_pose((0.0, 2.0))
+    layout, controller, state = network.layout, figure._controller, figure.state
+    rows = []
+    for f in range(frames):
+        phase, speed = float(state.phase[0]), 0.0 if 25 <= f < 45 else 2.5
+        target = (speed * np.sin(f / 40), speed * np.cos(f / 40))
+        figure.next_pose(target, injury={"LeftUpLeg-LeftLeg": 4}, terrain=ground)
+        root, yaw = controller.root[0].copy(), float(controller.yaw[0])
+        local = in_root_coordinates(state.joint_position[0], root, np.array(yaw))
+        rows.append((controller.x[0].copy(), controller.y[0].copy(), phase, root, yaw, local))
+    x, y, phases, roots, yaws, locals_ = (np.array(values) for values in zip(*rows, strict=True))
+    step = np.diff(roots, axis=0, append=roots[-1:])[:, None]
+    velocity = in_root_coordinates(step, np.zeros((frames, 3)), yaws)[:, 0, ::2]
+    moving = np.maximum(0, 1 - x[:, layout.x_gait][:, layout.samples // 2]) ** 0.25
+    turn = -np.diff(yaws, append=yaws[-1])
+    return RollOutInputs(x, y, roots[:, 1], phases, turn, velocity, moving), locals_
+
+
+@pytest.mark.parametrize("ground", [None, hills])
+def test_a_roll_out_equals_the_motion_of_the_runtime(hurtable: Network, ground: Any) -> None:
+    """With the runtime's inputs, joints and phase equal those of the runtime."""
+    scale = hurtable.x_std.copy()  # one that feels its own velocities and its phase
+    scale[hurtable.layout.x_joint_velocity] = 1.0
+    hurtable = replace(hurtable, x_std=scale, y_std=np.full_like(hurtable.y_std, 0.2))
+    inputs, local = recorded(hurtable, 80, ground)
+    starts = np.array([1, 2, 17, 40, 79])
+    made, phase = roll_out(hurtable.predictor(), inputs, starts, 60)
+    assert [len(place) for place in made] == [5] + [4] * 39 + [3] * 20
+    for age, place in enumerate(made):
+        np.testing.assert_allclose(place, local[starts[: len(place)] + age], atol=1e-3)
+    np.testing.assert_allclose(phase[:2], inputs.phase[starts[:2] + 60], atol=1e-4)
+    # The pose is its own: a start from another pose stays another for a while.
+    other = RollOutInputs(inputs.x.copy(), *list(vars(inputs).values())[1:])
+    other.x[1, hurtable.layout.x_joint_position] += 5
+    moved, _ = roll_out(hurtable.predictor(), other, starts[:1], 2)
+    assert np.abs(moved[0] - local[1]).max() > 1
+
+
+def clip_rows(network: Network, rows: int, seed: int, gap: int | None = None) -> ClipRows:
+    """Random rows; with a `gap`, a new stretch begins there."""
+    assert network.skeleton is not None
+    found = random_rows("a", rows, 1, seed, network.layout, network.skeleton.to_dict(), 1.0)
+    found.frame[gap if gap is not None else rows :] += 20
+    return found
+
+
+def clip_roll_outs(network: Network, rows: ClipRows, *lengths: int) -> dict[int, dict[str, Any]]:
+    """Length -> errors of all roll-outs of the clip."""
+    stretches = stretches_of(LoadedPart(rows, 0, len(rows)), network.layout)
+    sums = {n: roll_out_sums(network.predictor(), stretches, range(31), n).sum(axis=0) for n in lengths}
+    return {n: values_of_roll_outs(of_length) for n, of_length in sums.items()}
+
+
+def test_short_roll_outs_start_twice_and_long_ones_four_times_within_their_length(hurtable: Network) -> None:
+    found = clip_roll_outs(hurtable, clip_rows(hurtable, 240, 1, gap=90), 1, 10, 20, 100, 200)
+    # Of 90 and 150 frames in a row the first of each starts none.
+    for length, step in ((1, 1), (10, 5), (20, 10), (100, 25)):
+        starts = [(n, s) for n in (90, 150) for s in range(1, n, step)]
+        assert found[length]["frames"] == sum(min(length, n - s) for n, s in starts)
+        assert found[length]["ended"] == sum(s + length < n for n, s in starts)
+    assert (found[200]["ended"], found[200]["last_cm"]) == (0, None)
+
+
+def test_errors_of_roll_outs_are_distances_from_the_clip(hurtable: Network) -> None:
+    rows = clip_rows(hurtable, 40, 2)
+    inputs, layout = inputs_of_clip(rows, np.arange(40), rows.layout), hurtable.layout
+    read = channel_inputs("injury", rows.channels["injury"])
+    np.testing.assert_array_equal(inputs.x[:, layout.x_channel("injury")], read)
+    made, _ = roll_out(hurtable.predictor(), inputs, np.arange(1, 40), 1)
+    truth = inputs.y[1:, layout.y_joint_position].reshape(39, 31, 3)
+    distance = np.linalg.norm(truth - made[0], axis=-1).mean()
+    found = clip_roll_outs(hurtable, rows, 1)[1]
+    assert found["position_error_cm"] == pytest.approx(distance, rel=1e-5)

@@ -13,17 +13,12 @@ from tests.measures.made_up import SKELETON, random_rows
 
 LAYOUT = RowLayout(3, channels=(("injury", 2),))
 FRAMES = 50
-
-
-@pytest.fixture
-def world() -> dict[str, np.ndarray]:
-    """A figure of three joints on a curved path."""
-    rng = np.random.default_rng(1)
-    t = np.arange(FRAMES + 1) / 20
-    root = np.stack([60 * np.sin(t), 0 * t, 80 * t], axis=1)
-    joints = root[:, None] + rng.normal(0, 10, (1, 3, 3)) + np.sin(3 * t)[:, None, None] * [[1.0, 2, 3]]
-    joints[..., 1] += 50
-    return {"yaw": 0.4 + 0.8 * np.sin(t), "root": root, "joints": joints}
+# A figure of three joints on a curved path.
+T = np.arange(FRAMES + 1) / 20
+YAW = 0.4 + 0.8 * np.sin(T)
+ROOT = np.stack([60 * np.sin(T), 0 * T, 80 * T], axis=1)
+SHAPE = np.random.default_rng(1).normal([0.0, 50, 0], 10, (1, 3, 3))
+JOINTS = ROOT[:, None] + SHAPE + np.sin(3 * T)[:, None, None] * [[1.0, 2, 3]]
 
 
 def level(vectors: np.ndarray, yaw: np.ndarray) -> np.ndarray:
@@ -32,15 +27,14 @@ def level(vectors: np.ndarray, yaw: np.ndarray) -> np.ndarray:
 
 
 @pytest.fixture
-def rows(world) -> ClipRows:
+def rows() -> ClipRows:
     """Rows as the format defines them. The ground of the first fit is 3 cm below the world's zero."""
-    yaw, root, joints = world["yaw"], world["root"], world["joints"]
-    out, here = random_rows("a", FRAMES, 2, 0, LAYOUT, SKELETON), yaw[:-1]
+    out, here = random_rows("a", FRAMES, 2, 0, LAYOUT, SKELETON), YAW[:-1]
     y = np.zeros((FRAMES, LAYOUT.y_size))
-    y[:, LAYOUT.y_root_velocity] = level(np.diff(root, axis=0)[:, None], here)[:, 0, ::2]
-    y[:, LAYOUT.y_turn] = -np.diff(yaw)[:, None]
-    y[:, LAYOUT.y_joint_position] = in_root_coordinates(joints[:-1], root[:-1], here).reshape(FRAMES, -1)
-    y[:, LAYOUT.y_joint_velocity] = level(np.diff(joints, axis=0), here).reshape(FRAMES, -1)
+    y[:, LAYOUT.y_root_velocity] = level(np.diff(ROOT, axis=0)[:, None], here)[:, 0, ::2]
+    y[:, LAYOUT.y_turn] = -np.diff(YAW)[:, None]
+    y[:, LAYOUT.y_joint_position] = in_root_coordinates(JOINTS[:-1], ROOT[:-1], here).reshape(FRAMES, -1)
+    y[:, LAYOUT.y_joint_velocity] = level(np.diff(JOINTS, axis=0), here).reshape(FRAMES, -1)
     gait = out.x[:, LAYOUT.x_gait].reshape(FRAMES, len(GAITS), LAYOUT.samples)
     gait[:] = 0
     gait[:, 2, LAYOUT.samples // 2 :] = 1
@@ -49,10 +43,9 @@ def rows(world) -> ClipRows:
     return replace(out, y=y, mean=np.tile([-3.0, 99.0], FRAMES))
 
 
-def test_captured_motion_is_recovered_from_its_rows(rows, world) -> None:
+def test_captured_motion_is_recovered_from_its_rows(rows) -> None:
     (found,) = captured_stretches(rows)
-    yaw, root, joints = world["yaw"], world["root"][:-1], world["joints"][:-1]
-    way = level((root - root[0])[:, None], np.full(FRAMES, yaw[0]))[:, 0]
+    way, joints = level((ROOT[:-1] - ROOT[0])[:, None], np.full(FRAMES, YAW[0]))[:, 0], JOINTS[:-1]
     np.testing.assert_allclose(found.root, way, atol=1e-9)
     np.testing.assert_allclose(found.local[..., 1], joints[..., 1] + 3, atol=1e-9)  # above the ground
     np.testing.assert_allclose(found.acceleration[1:-1], acceleration(joints).max(axis=1), atol=1e-9)

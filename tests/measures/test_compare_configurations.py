@@ -11,12 +11,7 @@ import yaml
 
 from hobble.core.errors import InputError
 from hobble.core.files import write_tables
-from hobble.measures.compare import (
-    ConfigurationResults,
-    compare_configurations,
-    comparison_tables,
-    read_results,
-)
+from hobble.measures import compare
 from hobble.measures.responsivity_run import parameter_counts
 
 SIZES = {
@@ -36,36 +31,36 @@ RECOGNISED = {
 }
 
 
-def results(name: str) -> ConfigurationResults:
+def results(name: str) -> compare.ConfigurationResults:
     """A frame takes .1 ms plus 1 ns a computation, and twice that in the mode cubic."""
 
-    def spread(mean: float, sd: float) -> dict[str, Any]:
-        return {"frames": 100, "mean": mean, "sd": sd, "position_error_cm": 1.0, "mean_of_clips": mean}
+    def error(mean: float | None, **more: Any) -> dict[str, Any]:
+        return {"frames": 100, "mean": mean, "sd": 0.02, "position_error_cm": 1.0, **more}
 
     def timed(ms: float) -> dict[str, Any]:
-        spread = {"sd": 0.1, "median": ms / 4, "p99": ms, "whole_call": ms}
-        return {"predict": ms / 2, "total": ms, "spread": spread, "sd": {"predict": 0.1}}
+        return {"predict": ms / 2, "total": ms, "spread": {"median": ms / 4, "p99": ms}}
 
     counts, clips = parameter_counts(SIZES[name]), CLIPS[name]
     modes, once = [], 0.1 + 1e-6 * counts["true"]
     for mode, ms in zip(MODES, (once, 2 * once), strict=True):
         laps = [{"lap": n, "milliseconds": timed((n + 0.5) * ms / 2)} for n in (1, 2)]
         modes.append({"mode": mode, "laps": laps, "milliseconds": timed(ms), "laps_finished": 1})
-    nothing = {"frames": 0, "mean": None, "sd": None, "mean_of_clips": None}
-    of_clips = [{"clip": clip, "split": "train", **spread(mean, 0.01)} for clip, mean in clips.items()]
-    train = spread(float(np.mean(list(clips.values()))), 0.02)
-    stored = {mode: count * counts["true"] for mode, count in zip(MODES, (50, 4), strict=True)}
     rolled = {split: {"frames": 5, "last_cm": 2.0} for split in ("train", "held_out")}
     measurements = {
-        "accuracy": {"joints": 31, "train": train, "held_out": nothing, "clips": of_clips},
+        "accuracy": {
+            "joints": 31,
+            "train": error(float(np.mean(list(clips.values())))),
+            "held_out": error(None),
+            "clips": [error(mean, clip=clip, split="train") for clip, mean in clips.items()],
+            "rollouts": [{"length": n, **rolled, "clips": []} for n in (1, 60)],
+        },
         "responsivity": {
             "parameters": counts,
             "bytes_each": 4,
-            "stored": stored,
+            "stored": {"constant": 50 * counts["true"], "cubic": 4 * counts["true"]},
             "exact": "cubic",
             "modes": modes,
         },
-        "rollouts": {"lengths": [{"length": n, **rolled, "clips": []} for n in (1, 60)]},
         "injury": NOT_MADE,
         "recognition": RECOGNISED if name == "ava" else NOT_MADE,
     }
@@ -78,7 +73,7 @@ def results(name: str) -> ConfigurationResults:
     own = "held_out_turn" if name == "ava" else "held_out_mse"
     history = {"pass": [1.0, 2.0], "train_mse": [0.5, 0.4], own: [0.25, None]}
     pipeline = {"stages": stages, "database": {"bytes": 300}}
-    return ConfigurationResults(name, {"configuration": model}, measurements, pipeline, history)
+    return compare.ConfigurationResults(name, {"configuration": model}, measurements, pipeline, history)
 
 
 @pytest.fixture(scope="module")
@@ -88,43 +83,43 @@ def published(root: Path) -> dict[str, Any]:
 
 @pytest.fixture(scope="module")
 def compared(published: dict[str, Any]) -> dict[str, Any]:
-    return dict(compare_configurations(list(map(results, SIZES)), published))
+    return dict(compare.compare_configurations(list(map(results, SIZES)), published))
 
 
-def ours(rows: list[dict[str, Any]]) -> dict[tuple[str, str], Any]:
+def ours_of(rows: list[dict[str, Any]]) -> dict[tuple[str, str], Any]:
     """(measure, configuration) -> our number beside the published one."""
     return {(row["measure"], row["configuration"]): row["ours"] for row in rows}
 
 
 def test_the_fit_recovers_the_line_of_the_frame_times(compared) -> None:
-    fits = {(f["whose"], f["mode"], f["step"], f["computations"]): f for f in compared["milliseconds"]["fit"]}
-    fit = fits["hobble", "cubic", "median", "true"]  # a quarter of twice .1 ms and 1 ns a computation
-    assert (fit["slope"], fit["intercept"]) == pytest.approx((0.5e-6, 0.05))
-    assert (fit["r2"], fit["points"]) == (pytest.approx(1), 3)
-    theirs = fits["published", None, "total", "table_6_1_as_printed"]
-    slope, intercept = np.polyfit([335501, 598157, 335501, 1566701], [0.376, 0.499, 0.382, 1.55], 1)
-    assert (theirs["slope"], theirs["intercept"]) == pytest.approx((slope, intercept))
+    ours, theirs = compared["milliseconds"]["fit"]
+    counts = [parameter_counts(sizes)["table_6_1_as_printed"] for sizes in SIZES.values()]
+    assert counts == [335_501, 598_157, 1_566_701]
+    times = [0.1 + 1e-6 * parameter_counts(sizes)["true"] for sizes in SIZES.values()]
+    line = np.polyfit(counts, times, 1)
+    assert (ours["slope"], ours["intercept"]) == pytest.approx(line)
+    line = np.polyfit([335501, 598157, 335501, 1566701], [0.376, 0.499, 0.382, 1.55], 1)
+    assert (theirs["slope"], theirs["intercept"]) == pytest.approx(line)
+    times = ours_of(compared["milliseconds"]["against_published"])
+    assert times["milliseconds for each computation of Table 6.1", "all"] == ours["slope"]
 
 
-def test_a_pair_is_compared_on_the_clips_that_both_have_by_equation_3_2(compared) -> None:
+def test_a_pair_is_compared_by_equation_3_2_over_the_means_of_clips_and_laps(compared) -> None:
     found = {(d["a"], d["b"], d["over"]): d for d in compared["difference"]}
     # No clip is held out, and `ava` has one clip only.
-    assert set(found) == {
-        *(("holden", "holden-xl", over) for over in ("train", "a", RELEASED)),
-        *((a, "ava", over) for a in ("holden", "holden-xl") for over in ("train", "a")),
-    }
-    row = found["holden", "holden-xl", "train"]  # means .03 and .025, sd .02 of frames
-    assert row["difference"] == pytest.approx(2 * 0.005 / 0.04)
-    assert (row["sd_of_means_a"], row["sd_of_means_b"]) == pytest.approx((0.0002**0.5, 0.00005**0.5)), "n - 1"
-    assert row["difference_of_means"] == pytest.approx(2 * 0.005 / (0.0002**0.5 + 0.00005**0.5))
-    assert found["holden", "ava", "train"]["difference_of_means"] is None, "one clip does not spread"
+    pairs = (("holden", "holden-xl"), ("holden", "ava"), ("holden-xl", "ava"))
+    assert list(found) == [(*pair, "train") for pair in pairs]
+    spread = 0.0002**0.5 + 0.00005**0.5  # of .02 and .04, and of .02 and .03, with n - 1
+    assert found["holden", "holden-xl", "train"]["difference"] == pytest.approx(2 * 0.005 / spread)
+    assert found["holden", "ava", "train"]["difference"] is None, "one clip does not spread"
     times = {(d["a"], d["b"], d["over"]): d["difference"] for d in compared["milliseconds"]["difference"]}
-    assert len(times) == 3 * len(MODES)
-    assert times["holden", "holden-xl", "cubic"] == pytest.approx(2 * 2e-6 * (860_471 - 597_815) / 0.2)
+    assert list(times) == [(*pair, mode) for pair in pairs for mode in MODES]
+    ms = [0.1 + 1e-6 * parameter_counts(SIZES[name])["true"] for name in pairs[0]]  # of laps .75 and 1.25
+    assert times["holden", "holden-xl", "cubic"] == pytest.approx(2 * (ms[1] - ms[0]) / sum(ms) / 0.5**1.5)
 
 
 def test_published_numbers_stand_beside_ours_of_the_same_name(compared) -> None:
-    found = ours(compared["against_published"])
+    found = ours_of(compared["against_published"])
     sd = 0.0002**0.5
     assert found["standard deviation of the means of training clips", "holden"] == pytest.approx(sd)
     assert found["eq. 3.2, error", "holden to holden-xl"] == pytest.approx(0.01 / (sd + 0.00005**0.5))
@@ -136,15 +131,11 @@ def test_published_numbers_stand_beside_ours_of_the_same_name(compared) -> None:
     assert found["parameters of a phase", "ava"] == parameters
     people = [value for (measure, _), value in found.items() if measure.startswith("hurt part")]
     assert people == [0.5, 0.8, 0.9]
-    times = ours(compared["milliseconds"]["against_published"])
+    times = ours_of(compared["milliseconds"]["against_published"])
     ms = 0.1 + 1e-6 * 597_815  # mean of two laps of .75 and 1.25 times it, in the mode constant
     assert times["a frame", "holden"] == pytest.approx(ms)
     assert times["standard deviation of the means of laps", "holden"] == pytest.approx(0.5 * ms / 2**0.5)
     assert times["training, time", "holden"] == 60
-    counts = [335_501, 598_157, 1_566_701]
-    each = [0.1 + 1e-6 * parameter_counts(sizes)["true"] for sizes in SIZES.values()]
-    slope = times["milliseconds for each computation of Table 6.1", "all"]
-    assert slope == pytest.approx(np.polyfit(counts, each, 1)[0])
 
 
 def test_the_published_data_are_consistent_with_what_the_text_says_of_them(published) -> None:
@@ -169,7 +160,7 @@ def test_the_published_data_are_consistent_with_what_the_text_says_of_them(publi
 
 
 def test_tables_with_different_columns_survive_csv(compared, tmp_path) -> None:
-    found = comparison_tables(compared)
+    found = compare.comparison_tables(compared)
     write_tables(tmp_path, found)
     rows = {}
     for name, table in found.items():
@@ -182,7 +173,6 @@ def test_tables_with_different_columns_survive_csv(compared, tmp_path) -> None:
     assert clips == [(name, clip) for name, of in CLIPS.items() for clip in of]
     laps = [(r["configuration"], r["mode"], r["lap"]) for r in rows["responsivity"]]
     assert laps == [(name, mode, lap) for name in SIZES for mode in MODES for lap in "12"]
-    assert float(rows["responsivity"][0]["milliseconds_sd_predict"]) == 0.1
     lengths = [(r["length"], r["split"]) for r in rows["rollouts"]]
     assert lengths == 3 * [("1", "train"), ("1", "held_out"), ("60", "train"), ("60", "held_out")]
     last = [(r["held_out_turn"], r["held_out_mse"]) for r in rows["training"][-2:]]
@@ -196,4 +186,4 @@ def test_a_damaged_history_is_named(tmp_path) -> None:
     (tmp_path / "history.csv").write_text("pass,train_mse\n1,half\n")
     files = [str(tmp_path / name) for name in ("configuration.yaml", "pipeline.json", "history.csv")]
     with pytest.raises(InputError, match=r"history\.csv"):
-        read_results("holden", *files, [])
+        compare.read_results("holden", *files, [])

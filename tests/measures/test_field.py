@@ -8,15 +8,6 @@ import pytest
 
 from hobble.measures import field_run as module
 from hobble.measures.field import Options, hints, rows, section
-from hobble.measures.field_run import (
-    Command,
-    Motion,
-    compare_with_captured,
-    follow_path,
-    measure_field,
-    paths,
-    response,
-)
 from hobble.motion.skeleton_file import find_skeleton, load_skeleton
 from hobble.runtime.options import Runtime
 from hobble.synthetic.generate_clip import generate_walk
@@ -40,17 +31,17 @@ class Point:
 
 
 def test_paths_are_closed_and_have_a_point_for_each_centimetre():
-    for name, path in paths().items():
+    for name, path in module.paths().items():
         assert np.hypot(*(np.roll(path, -1, axis=0) - path).T) == pytest.approx(1.0, abs=0.01), name
-    assert np.hypot(*paths()["circle"].T) == pytest.approx(250.0)
+    assert np.hypot(*module.paths()["circle"].T) == pytest.approx(250.0)
 
 
 def test_a_point_that_does_as_asked_is_as_far_off_as_its_look_ahead_says(monkeypatch):
     monkeypatch.setattr(module, "ProceduralAnimation", Point)
-    cm, degrees = follow_path(None, Runtime(), paths()["circle"], 1)
+    found = module.follow_path(None, Runtime(), module.paths()["circle"])
     # It goes on the circle from whose tangent the point ahead is seen: L^2 / 2R inside, with L = 32 cm.
-    assert cm == pytest.approx(32**2 / 500, abs=0.3)
-    assert degrees < 1.0
+    assert found["cm"] == pytest.approx(32**2 / 500, abs=0.3)
+    assert found["degrees"] < 1.0
 
 
 def test_response_is_the_time_to_most_of_the_asked_speed(monkeypatch):
@@ -59,10 +50,10 @@ def test_response_is_the_time_to_most_of_the_asked_speed(monkeypatch):
     monkeypatch.setattr(module, "ProceduralAnimation", Point)
     for frames, expected in ((1, 12 / 60), (60, (48 + 7) / 60), (10_000, None)):
         monkeypatch.setattr(Point, "frames", frames)
-        assert response(None, Runtime(), "walk", 2.0) == pytest.approx(expected, abs=0.02)
+        assert module.response(None, Runtime(), "walk", 2.0) == pytest.approx(expected, abs=0.02)
 
 
-def captured_commands() -> list[Command]:
+def captured_commands() -> list[module.Command]:
     """Two synthetic walks, as if captured."""
     skeleton = load_skeleton(find_skeleton("holden31"), "holden31").skeleton
     out = []
@@ -70,7 +61,7 @@ def captured_commands() -> list[Command]:
         clip = generate_walk("a", skeleton, 400, "walk", 60.0, seed).clip
         velocity = np.gradient(clip.root[:, ::2], axis=0)
         gait = np.tile([0.0, 1, 0, 0, 0, 0], (len(clip), 1))
-        out.append(Command(velocity, gait, velocity, Motion(clip.positions, clip.rotations)))
+        out.append(module.Command(velocity, gait, velocity, (clip.positions, clip.rotations)))
     return out
 
 
@@ -78,7 +69,7 @@ def test_captured_motion_that_is_walked_again_exactly_is_equal_to_itself(monkeyp
     commands = captured_commands()
     monkeypatch.setattr(module, "walk_commands", lambda network, runtime, asked: [c.motion for c in asked])
     skeleton = load_skeleton(find_skeleton("holden31"), "holden31").skeleton
-    found = compare_with_captured(SimpleNamespace(skeleton=skeleton), Runtime(), commands)
+    found = module.compare_with_captured(SimpleNamespace(skeleton=skeleton), Runtime(), commands)
     assert found["character"].pop("frechet") == pytest.approx(0.0, abs=1e-6)
     assert found["captured"].pop("frechet") > 0
     assert found["character"] == found["captured"]
@@ -86,7 +77,7 @@ def test_captured_motion_that_is_walked_again_exactly_is_equal_to_itself(monkeyp
 
 
 def test_the_measurement_of_a_network_and_its_section(network):
-    found = measure_field(network, Runtime(), Options(field_seconds=2), {"train": captured_commands()})
+    found = module.measure_field(network, Runtime(), Options(field_seconds=2), {"train": captured_commands()})
     published = {"field": [{"measure": "paths_circle_cm", "value": 2.98, "source": "MANN"}]}
     assert found["split"] == "train"
     assert found["asked"]["captured"]["jerk"] > 0

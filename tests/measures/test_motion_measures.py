@@ -11,7 +11,6 @@ from hobble.measures.walks import (
     feet_in_stance,
     foot_slide,
     gait_measures,
-    in_root_coordinates,
     largest_turn,
 )
 
@@ -44,14 +43,6 @@ def test_bend_and_asymmetry_of_known_poses_are_exact() -> None:
     assert asymmetry(3.0, 1.0) == pytest.approx(1.0)
     assert asymmetry(None, 1.0) is None
     assert asymmetry(0.0, 0.0) is None
-
-
-def test_poses_in_the_root_frame_do_not_depend_on_place_and_heading() -> None:
-    yaw = np.array([0.0, 0.9])
-    root = np.array([[0, 0, 0], [5.0, 0, -3]])
-    body = np.array([[1.0, 2, 3], [-1, 0, 4]])
-    world = np.stack([quat.rotate(quat.yaw(a), body) + r for a, r in zip(yaw, root, strict=True)])
-    np.testing.assert_allclose(in_root_coordinates(world, root, yaw), [body, body], atol=1e-12)
 
 
 def test_cadence_stance_and_step_length_of_a_known_walk_are_exact(holden31: Skeleton) -> None:

@@ -1,30 +1,44 @@
-"""Naming what hurts: the discriminant on known classes, the features of a figure, windows, and the tables."""
+"""Naming what hurts and what mood shows: the discriminant on known classes, windows, and the tables."""
 
 import json
+from collections.abc import Sequence
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
+from hobble.channels import channel
 from hobble.core import quat
 from hobble.core.skeleton import Skeleton, forward_kinematics
 from hobble.gait.recognise import learn
+from hobble.measures import recognition as page
 from hobble.measures import recognition_run as module
 from hobble.measures.recognition_run import (
     HEALTHY,
+    NONE,
+    STEP,
+    USED,
+    WINDOW,
+    Window,
     confusion_rows,
-    measure_recognition,
+    manner_windows,
+    measure_injuries,
+    measure_manners,
+    recognise_left_out,
     walking_windows,
 )
 from hobble.measures.walks import gait_features
-from hobble.measures.windows import Window, feature_table, named_left_out
+from hobble.models.network import Network
+from hobble.report.parts import Paragraph
 from hobble.rows.clip_rows import Captured
 from hobble.runtime.options import Runtime
 from tests.measures.made_up import captured_walk
 
 RUNTIME = Runtime(steering=1.0)
 KNEE, ARM = "LeftUpLeg-LeftLeg", "RightArm-RightForeArm"
+OF_WALK = (USED - WINDOW) // STEP + 1  # windows of a generated walk
 
 
 def figure(skeleton: Skeleton, frames: int, knee: float, elbow: float, seed: int) -> np.ndarray:
@@ -67,26 +81,19 @@ SPLITS = {f"{link}-{n}": "train" if n == 1 else "held_out" for link in (None, KN
 
 
 def judged(network, motion, splits=SPLITS) -> dict[str, Any]:
-    return measure_recognition(network, motion, splits, configuration="x", runtime=RUNTIME, people=0.82)
+    return measure_injuries(network, motion, splits, runtime=RUNTIME, people=0.82)
 
 
 def test_two_classes_are_separated_along_fishers_direction() -> None:
-    """Fisher's direction is the inverse covariance times the difference of the means."""
+    """The inverse of the mean covariance times the difference of the means, of unequally many examples."""
     rng = np.random.default_rng(3)
-    # That of both classes, which count the same however many there are of each.
     one, other = np.array([[3.0, 1.5], [1.5, 1.0]]), np.array([[1.0, 0.5], [0.5, 3.0]])
-    spread = (one + other) / 2
-    a = rng.multivariate_normal([0, 0], one, 4000)
-    b = rng.multivariate_normal([1, -1], other, 1000)
+    a, b = rng.multivariate_normal([0, 0], one, 4000), rng.multivariate_normal([1, -1], other, 1000)
     found = learn(np.concatenate([a, b]), ["a"] * 4000 + ["b"] * 1000)
-    across = found.weights[:, 1] - found.weights[:, 0]
-    expected = np.linalg.solve(spread, [1.0, -1.0])
-    np.testing.assert_allclose(
-        across / np.linalg.norm(across), expected / np.linalg.norm(expected), atol=0.05
-    )
-    # Half way between the means neither is likelier, whatever their numbers.
-    middle = found.scores(np.array([[0.5, -0.5]]))[0]
-    assert abs(middle[0] - middle[1]) < 0.2
+    across, expected = found.weights @ [-1, 1], np.linalg.solve((one + other) / 2, [1.0, -1.0])
+    unit = [v / np.linalg.norm(v) for v in (across, expected)]
+    np.testing.assert_allclose(*unit, atol=0.05)
+    assert abs(found.scores(np.array([[0.5, -0.5]])) @ [-1, 1]) < 0.2, "half way between the means"
     assert found.likeliest_classes(np.array([[-1.0, 1.0], [2.0, -2.0]])) == ["a", "b"]
 
 
@@ -115,14 +122,15 @@ def test_captured_windows_are_named_after_the_link_that_hurts(hurtable, motion) 
         assert part["confusion"][KNEE] == {c: part["windows"] // 3 * (c == KNEE) for c in found["classes"]}
     assert found["chance"] == pytest.approx(1 / 3, abs=1e-5)
     # Whatever an untrained network does, each walk is judged: 2 links, 4 severities, 3 speeds; 3 healthy.
-    walks = found["generated"]["by_walk"]
-    assert walks["walks"] == 2 * 4 * 3 + 3
-    assert found["generated"]["windows"] % walks["walks"] == 0
+    assert found["generated"]["windows"] == (2 * 4 * 3 + 3) * OF_WALK
     assert [s["severity"] for s in found["generated"]["by_severity"]] == [0, 3, 5, 7, 10]
     json.dumps(found, allow_nan=False)
     table = confusion_rows(found)
     assert sum(r["windows"] for r in table if r["motion"] == "generated") == found["generated"]["windows"]
-    assert judged(hurtable, motion) == found
+    shown = page.recognition_chart(found)
+    assert list(shown.options)[1].endswith(
+        "cross-validated: 100\N{NO-BREAK SPACE}% right, 100\N{NO-BREAK SPACE}% if the side does not count"
+    )
 
 
 def test_windows_hold_straight_walking_with_one_injury(hurtable) -> None:
@@ -131,10 +139,9 @@ def test_windows_hold_straight_walking_with_one_injury(hurtable) -> None:
     # Four parts of 100 frames; windows of 60 begin every 15 frames and stay in their part.
     assert [w.part for w in windows] == [quarter for quarter in range(4) for _ in range(3)]
     assert {(w.label, w.severity) for w in windows} == {(KNEE, 5.0)}
-    aside = replace(good, velocity=good.velocity[:, ::-1])
-    assert walking_windows(aside, hurtable) == []
-    assert walking_windows(replace(good, velocity=0.1 * good.velocity), hurtable) == []
-    assert walking_windows(replace(good, gait=0 * good.gait), hurtable) == []
+    aside, slow = {"velocity": good.velocity[:, ::-1]}, {"velocity": 0.1 * good.velocity}
+    for change in (aside, slow, {"gait": 0 * good.gait}):
+        assert walking_windows(replace(good, **change), hurtable) == []
     severity = good.channels["injury"].copy()
     severity[150:] = 0  # half way through the second part, in which no window is all of a kind
     healed = walking_windows(replace(good, channels={"injury": severity}), hurtable)
@@ -158,19 +165,6 @@ def test_without_sides_both_legs_are_one_class(holden31: Skeleton) -> None:
     assert found["right_without_side"] == 0.75
 
 
-def test_cross_validation_never_learns_from_the_windows_it_names() -> None:
-    """If windows differ only in their labels, the names are guesses."""
-    rng = np.random.default_rng(6)
-    windows = [
-        Window("a", f"{n % 2}", {f"{d}": float(v) for d, v in enumerate(rng.normal(size=60))}, 5.0, n // 10)
-        for n in range(40)
-    ]
-    named = named_left_out(windows, [w.part for w in windows])
-    assert np.mean(named == [w.label for w in windows]) < 0.8
-    table, labels = feature_table([w.values for w in windows]), [w.label for w in windows]
-    assert learn(table, labels).likeliest_classes(table) == labels
-
-
 def test_too_little_data_is_reported_with_its_reason(hurtable, motion) -> None:
     assert judged(hurtable, motion[:2])["reason"] == module.TOO_FEW
     assert confusion_rows(judged(hurtable, motion[:2])) == []
@@ -179,3 +173,118 @@ def test_too_little_data_is_reported_with_its_reason(hurtable, motion) -> None:
     assert found["classes"] == sorted([HEALTHY, KNEE])
     assert ARM in found["captured"]["held_out"]["confusion"]
     assert found["captured"]["held_out"]["right"] == pytest.approx(0.5)  # both clips of the arm are wrong
+
+
+FRAMES = 300
+
+
+@pytest.fixture
+def both(hurtable) -> Network:
+    """A network of random weights with 25 severities and five moods, all of which were seen in training."""
+    links = hurtable.channels["injury"][:25]
+    layout = replace(hurtable.layout, channels=(("injury", 25), ("mood", 5)))
+    moods = channel("mood").columns(hurtable.skeleton)
+    return replace(hurtable, layout=layout, channels={"injury": links, "mood": moods})
+
+
+def moody(
+    network: Network, name: str, mood: str | None, *, lean: float, hurt: float = 0.0, value: float = 1.0
+):
+    """A captured clip of a figure that glides straight ahead; its trunk leans forward by `lean` cm."""
+    skeleton, rng = network.skeleton, np.random.default_rng(sum(map(ord, name)))
+    local = np.tile(network.y_mean[network.layout.y_joint_position].reshape(-1, 3), (FRAMES, 1, 1))
+    local = local + rng.normal(0, 0.3, local.shape)
+    local[:, [skeleton.role("neck"), skeleton.role("head")], 2] += lean
+    channels = {key: np.zeros((FRAMES, len(columns))) for key, columns in network.channels.items()}
+    channels["injury"][150:, 0] = hurt
+    if mood:
+        channels["mood"][:, network.channels["mood"].index(mood)] = value
+    return captured_walk(name, local, channels)
+
+
+LEANS = ((None, 0.0), ("sad", 12.0), ("old", 30.0))
+
+
+@pytest.fixture
+def moods(both: Network) -> list[Captured]:
+    return [moody(both, f"{m}-{n}", m, lean=lean + n) for m, lean in LEANS for n in (1, 2, 3)]
+
+
+def measure_moods(network: Network, motion: Sequence[Captured]) -> Any:
+    people = {one.clip: one.clip for one in motion}
+    return measure_manners(network, "mood", motion, dict.fromkeys(people, "train"), people, Runtime())
+
+
+def test_windows_with_an_injury_or_half_a_mood_are_left_out(both: Network) -> None:
+    whole = (FRAMES - WINDOW) // STEP + 1
+    found = manner_windows(moody(both, "a", "sad", lean=0), both, "mood")
+    assert [w.label for w in found] == ["sad"] * whole
+    found = manner_windows(moody(both, "a", "sad", lean=0, hurt=3.0), both, "mood")
+    assert len(found) == (150 - WINDOW) // STEP + 1
+    assert manner_windows(moody(both, "a", "sad", lean=0, value=0.5), both, "mood") == []
+
+
+def window(who: str, manner: str, *values: float) -> Window:
+    return Window(who, manner, dict(enumerate(map(float, values))))
+
+
+def test_whole_people_are_left_out() -> None:
+    """Each clip is like the other clip of its person and unlike all others."""
+    rng = np.random.default_rng(2)
+    windows, people = [], {}
+    for person in range(12):
+        own, manner = rng.normal(0, 1, 6), "sad" if person % 2 else NONE
+        for take in (1, 2):
+            name = f"{person}-{take}"
+            people[name] = str(person)
+            windows += [window(name, manner, *(own + rng.normal(0, 0.02, 6))) for _ in range(20)]
+    by_clip = recognise_left_out(windows, {name: name for name in people}, [0.6])
+    by_person = recognise_left_out(windows, people, [0.6])
+    assert by_clip["people"] == 24
+    assert by_person["people"] == 12
+    assert by_person["people_of"] == {NONE: 6, "sad": 6}
+    assert by_clip["windows"] == by_person["windows"] == 480
+    assert by_clip["right"] > by_person["right"] + 0.2
+
+
+def test_manners_are_named_and_their_effects_measured(
+    both: Network, moods: list[Captured], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Captured windows stand for the generated figures."""
+    real = {
+        m: [w.values for w in manner_windows(moody(both, f"{m}-9", m, lean=lean + 1), both, "mood")]
+        for m, lean in LEANS
+    }
+
+    def generated_values(network: Network, walks: Sequence[Any], runtime: Runtime, features: Any):
+        return [real[next(iter(channels["mood"]), None)] for channels, _ in walks]
+
+    monkeypatch.setattr(module, "generated_values", generated_values)
+    found = measure_moods(both, moods)
+    assert found["manners"] == ["old", "sad"]
+    assert found["captured"]["right"] == 1.0
+    assert found["captured"]["shrinkage"] == 0.6, "of equals the largest"
+    assert found["right_at_1"] == 1.0
+    effect = found["effects"][2]
+    assert (effect["manner"], effect["effect"]) == ("old", "trunk")
+    rest = both.y_mean[both.layout.y_joint_position].reshape(-1, 3)
+    neck, hips = (rest[both.skeleton.role(part)] for part in ("neck", "hips"))
+
+    def lean(cm: float) -> float:
+        return float(np.degrees(np.arctan2(neck[2] + cm - hips[2], neck[1] - hips[1])))
+
+    assert effect["captured"] == pytest.approx(lean(32) - lean(2), abs=0.2)
+    assert effect["generated"] == effect["generated_at_half"] == pytest.approx(lean(31) - lean(1), abs=0.2)
+
+
+def test_a_network_walks_in_every_manner_and_mixture(both: Network, moods: list[Captured]) -> None:
+    found = measure_moods(both, moods)
+    assert [row["windows"] for row in found["generated"]] == [3 * OF_WALK] * 6
+    assert [row["manners"] for row in found["generated"]] == [
+        [], ["old"], ["sad"], ["old"], ["sad"], ["old", "sad"],
+    ]  # fmt: skip
+    material = SimpleNamespace(network={"skeleton": {}})
+    shown = page.section({"applies": False, "channels": [found]}, material).parts[1:]
+    assert len({part.content.name for part in shown if not isinstance(part.content, Paragraph)}) == 5
+    assert measure_moods(both, moods[:6:2]) is None, "one mood in training"
+    assert [part.content for part in page.section({}, material).parts] == [None]

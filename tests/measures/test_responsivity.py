@@ -8,7 +8,7 @@ import pytest
 from hobble.measures import responsivity_run as module
 from hobble.measures.measure import flat_rows
 from hobble.measures.responsivity import Options
-from hobble.measures.responsivity_run import lap_starts, measure_responsivity, turn_was_limited, walk_laps
+from hobble.measures.responsivity_run import lap_starts, measure_responsivity, walk_laps
 from hobble.runtime.controller import STEPS
 from hobble.runtime.options import Runtime
 from hobble.runtime.waypoints import Waypoint
@@ -33,22 +33,12 @@ def test_finished_laps_are_counted_and_timed(steady) -> None:
     result = run(steady, track((0.0, 0.0), (30.0, 0.0), (60.0, 0.0)))
     rows = flat_rows(result["modes"], "laps", "mode")
     assert list(rows[0])[:4] == ["mode", "lap", "finished", "frames"]
-    assert {"milliseconds_predict", "milliseconds_sd_predict", "milliseconds_spread_p99"} <= set(rows[0])
+    assert {"milliseconds_predict", "milliseconds_spread_p99"} <= set(rows[0])
     modes = ("constant", "linear", "cubic")
     assert [(row["mode"], row["lap"]) for row in rows] == [(mode, lap) for mode in modes for lap in (1, 2)]
     assert (result["laps_finished"], [lap["waypoints_reached"] for lap in result["laps"]]) == (2, [3, 3])
     assert all(lap["finished"] and lap["frames"] < 20 for lap in result["laps"])
-    assert (result["track"]["metres"], result["track"]["x"]) == (1.2, [0.0, 0.3, 0.6])
-
-
-def test_only_turns_that_were_limited_count_as_held_back() -> None:
-    rng = np.random.default_rng(3)
-    taken = rng.normal(size=(5, 4, 4))
-    taken /= np.linalg.norm(taken, axis=-1, keepdims=True)
-    predicted = -taken  # the same rotations
-    assert not turn_was_limited(predicted, taken).any()
-    predicted[2, 1] = predicted[2, 2]
-    assert turn_was_limited(predicted, taken).tolist() == [False, False, True, False, False]
+    assert result["track"]["x"] == [0.0, 0.3, 0.6]
 
 
 def test_a_lap_that_is_never_finished_ends_after_its_time(steady) -> None:
@@ -66,7 +56,6 @@ def test_a_lap_that_is_never_finished_ends_after_its_time(steady) -> None:
     path = result["runs"][0]  # along z from the third waypoint, a quarter of a second from place to place
     np.testing.assert_allclose(path["x"], np.zeros(480 // 15), atol=0.02)
     np.testing.assert_allclose(np.diff(path["z"])[2:], 15 * 0.015, atol=0.02)
-    assert max(path["off_cm"]) == pytest.approx(first["path_overshoot_cm"], abs=25)
 
 
 def test_laps_begin_at_one_waypoint_after_another_and_in_later_rounds_further_ahead() -> None:
@@ -87,8 +76,7 @@ def test_the_way_to_the_waypoint_where_a_lap_begins_does_not_belong_to_it(steady
     *_, (lap, path, seconds) = walk_laps(steady, RUNTIME, 3, 300, track((0.0, 4000.0), (0.0, 0.0)))
     assert (lap["frames"], lap["waypoints_reached"]) == (300, 0)
     assert (path["z"][0], path["z"][-1]) == pytest.approx((1.0, 1.0 - 0.5 * 0.015 * 285), abs=0.03)
-    assert seconds.shape == (300, len(STEPS) + 1)
-    assert (seconds[:, -1] >= seconds[:, :-1].sum(axis=1)).all()
+    assert seconds.shape == (300, len(STEPS))
 
 
 def test_each_mode_runs_its_own_laps(network) -> None:
@@ -106,10 +94,9 @@ def test_each_mode_runs_its_own_laps(network) -> None:
 
 
 def test_known_times_of_steps_give_known_medians() -> None:
-    """Two frames: steps of 1 to 6 ms, and of twice that. The whole call takes 1 ms more."""
+    """Two frames: steps of 1 to 6 ms, and of twice that."""
     steps = np.arange(1.0, 7.0)
-    found = module.milliseconds(np.array([[*steps, 22.0], [*(2 * steps), 43.0]]) / 1000)
+    found = module.milliseconds(np.array([steps, 2 * steps]) / 1000)
     assert [found[step] for step in STEPS] == pytest.approx(1.5 * steps)
-    assert [found["sd"][step] for step in STEPS] == pytest.approx(0.5 * steps)
     assert found["total"] == pytest.approx(31.5)
-    assert found["spread"] == pytest.approx({"sd": 10.5, "median": 31.5, "p99": 41.79, "whole_call": 32.5})
+    assert found["spread"] == pytest.approx({"median": 31.5, "p99": 41.79})

@@ -14,15 +14,12 @@ from hobble.core.files import write_tables
 @pytest.fixture
 def checkout(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A folder in which the workflow has made the results of `test`."""
-    folder = tmp_path / "results/test"
-    clips = [
-        {"clip": c, "split": "train", "mean": m, "position_error_cm": 2.0}
-        for c, m in (("a", 0.1), ("b", 0.2))
-    ]
+    folder, of_clip = tmp_path / "results/test", {"split": "train", "position_error_cm": 2.0}
+    clips = [{"clip": clip, "mean": mean, **of_clip} for clip, mean in (("a", 0.1), ("b", 0.2))]
     laps = [{"mode": m, "milliseconds_total": 0.1 * n} for m in ("constant", "cubic") for n in (1, 3)]
-    write_tables(folder / "evaluation/accuracy", {"clips": clips, "excerpts": []})
-    write_tables(folder / "evaluation/responsivity", {"laps": laps})
     history = [{"pass": p, "section": s, "train_mse": 1 / (p + s)} for p in (1, 2) for s in (1, 2)]
+    write_tables(folder / "evaluation/accuracy", {"clips": clips, "empty": []})
+    write_tables(folder / "evaluation/responsivity", {"laps": laps})
     write_tables(folder / "network", {"history": history})
     write_tables(tmp_path / "results/compare/tables", {"stages": [{"stage": "training", "seconds": 3.5}]})
     monkeypatch.chdir(tmp_path)
@@ -36,11 +33,6 @@ def test_each_table_is_a_data_frame_with_its_numbers(checkout: Path) -> None:
     assert hobble.results("compare")["stages"]["seconds"].sum() == 3.5
     with pytest.raises(HobbleError, match=r"results/none has no tables. Make them: snakemake"):
         hobble.results("none")
-    with pytest.raises(AttributeError, match="no attribute 'result'"):
-        hobble.result  # noqa: B018
-
-
-def test_published_tables_are_data_frames(checkout: Path) -> None:
     published = hobble.results("published")
     assert published["laps"]["holden"].std() == pytest.approx(0.0173, abs=5e-5)
     assert len(published["clip_means"]) == 80

@@ -2,7 +2,6 @@
 
 import csv
 import json
-from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -70,31 +69,28 @@ def tables_of(folder: Path, people: list[Callable[[Any], dict[str, Any]]]) -> di
 
 
 def test_the_films_hurt_what_the_captions_of_the_published_tables_name() -> None:
-    assert Counter(film.kind for film in FILMS) == {ONE_PART: 4, SEVERAL_PARTS: 5, CHANGE_OF_GAIT: 4}
-    assert [set(f.severities) for f in FILMS] == [
-        {"left shank"}, {"right thigh"}, {"right shank"}, {"left forearm"},
-        {"left shank", "right thigh"}, {"left shank", "right thigh"},
-        {"left shank", "right shank"}, {"left shank", "right shank"}, {"right thigh", "right shank"},
-        {"left shank"}, {"right thigh"}, {"right shank"}, {"left forearm"},
+    assert [dict(f.severities) for f in FILMS[4:9]] == [
+        {"left shank": 5, "right thigh": 10}, {"left shank": 10, "right thigh": 10},
+        {"left shank": 5, "right shank": 10}, {"left shank": 10, "right shank": 10},
+        {"right thigh": 10, "right shank": 10},
     ]  # fmt: skip
-    assert [next(iter(FILMS[i].severities.values())) for i in (4, 5, 6, 7)] == [5, 10, 5, 10]
+    alone = ["left shank", "right thigh", "right shank", "left forearm"]
+    for films, kind in ((FILMS[:4], ONE_PART), (FILMS[9:], CHANGE_OF_GAIT)):
+        assert [(dict(f.severities), f.kind) for f in films] == [({part: 10}, kind) for part in alone]
+    assert [f.gaits[0] != f.gaits[1] for f in FILMS] == [False] * 9 + [True] * 4
+
+
+def test_injuries_begin_one_after_the_other_and_rise_before_the_gait_changes() -> None:
     for film in FILMS:
-        assert (film.gaits[0] != film.gaits[1]) == (film.kind == CHANGE_OF_GAIT)
-
-
-@pytest.mark.parametrize("film", FILMS, ids=lambda film: str(film.number))
-def test_injuries_begin_one_after_the_other_and_rise_before_the_gait_changes(film) -> None:
-    states = [film.at(f) for f in range(-60, round(film.seconds * FPS))]
-    begins = [next(i for i, (hurt, _) in enumerate(states) if part in hurt) for part in film.severities]
-    assert begins[0] == 60 + 3 * FPS + 1
-    assert begins == sorted(set(begins))
-    assert states[-1] == (dict(film.severities), film.gaits[1])
-    for part, severity in film.severities.items():
-        values = [hurt.get(part, 0) for hurt, _ in states]
-        assert values == sorted(values)
-        assert values[-1] == severity
-    changes = [i for i, (_, gait) in enumerate(states) if gait != film.gaits[0]]
-    assert all(states[i][0] == film.severities for i in changes)
+        states = [film.at(f) for f in range(-60, round(film.seconds * FPS))]
+        begins = [next(i for i, (hurt, _) in enumerate(states) if part in hurt) for part in film.severities]
+        assert begins[0] == 60 + 3 * FPS + 1
+        assert begins == sorted(set(begins))
+        assert states[-1] == (dict(film.severities), film.gaits[1])
+        for part in film.severities:
+            values = [hurt.get(part, 0) for hurt, _ in states]
+            assert values == sorted(values)
+        assert all(hurt == film.severities for hurt, gait in states if gait != film.gaits[0])
 
 
 @pytest.mark.parametrize(("healthy", "hurt"), [(10, 10), (7, 10), (10, 7), (4, 12), (12, 4)])
@@ -113,10 +109,9 @@ def test_the_published_answers_give_the_published_tables(tmp_path: Path) -> None
     write_study(tmp_path)
     made = tables_of(tmp_path, [printed_answer(i) for i in range(PEOPLE)])
     assert tuple(made) == (*NUMERALS, "scores")
-    for numeral in NUMERALS[:-1]:
-        for row in made[numeral]:
-            if row["about"] != "noticed" or row["choice"] == "yes":
-                assert row["people"] == row["published_people"], (numeral, row)
+    for row in (row for numeral in NUMERALS[:-1] for row in made[numeral]):
+        if row["about"] != "noticed" or row["choice"] == "yes":
+            assert row["people"] == row["published_people"], row
     summary = {row["about"]: row for row in made["XVI"]}
     # As counted from Tables III to XV by hand; Table XVI prints 3.6 and .69, 3.2 and .84, 3.5 and .70.
     by_hand = {"fluidity": (3.63077, 0.64857), "progress": (3.27692, 0.81051), "realism": (3.56154, 0.72977)}
@@ -170,9 +165,7 @@ def test_the_command_writes_fourteen_tables_with_the_published_beside_ours(
     assert rows[-1]["people"] == rows[-1]["published_people"] == "8"
     text = (tmp_path / "out" / "tables.md").read_text()
     assert "## Table VIII: film 6, several parts: left shank 10, right thigh 10" in text
-    assert "| Ferre et al. (2019) | yes: 5 (62 %) | no: 3 (38 %) | | | |" in text.replace(
-        "|  |", "| |"
-    ).replace("  ", " ")
+    assert "| Ferre et al. (2019) | yes: 5 (62 %) | no: 3 (38 %) |  |  |  |" in text
 
 
 @pytest.mark.parametrize(
@@ -183,9 +176,7 @@ def test_the_command_writes_fourteen_tables_with_the_published_beside_ours(
         (lambda d: d | {"answers": [d["answers"][0], *d["answers"]]}, "film 13 is answered twice"),
         (lambda d: d | {"answers": [d["answers"][0] | {"parts": ["tail"]}]}, "answer 1: no such part: tail"),
         (lambda d: d | {"answers": [d["answers"][0] | {"fluidity": 6}]}, "answer 1: fluidity: .* 'fair'"),
-        (lambda d: d | {"answers": [d["answers"][0] | {"noticed": True}]}, "answer 1: noticed: "),
         (lambda d: d | {"answers": [d["answers"][0] | {"film": 14}]}, "there is no film 14"),
-        (lambda d: d | {"answers": ["\x1b[31m"]}, "answer 1: "),
         (lambda d: d | {"answers": 3}, "has no list `answers`"),
         (lambda d: [d], "answers another questionnaire"),
     ],

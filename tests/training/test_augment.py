@@ -13,7 +13,7 @@ import torch
 from hobble.core.quat import Array
 from hobble.database.reader import Block, Database
 from hobble.database.write import write_database
-from hobble.measures.rollouts_run import RollOutInputs
+from hobble.measures.accuracy_run import RollOutInputs
 from hobble.rows.clip_rows import ClipRows
 from hobble.training import augment
 from hobble.training.augment import (
@@ -26,7 +26,7 @@ from hobble.training.augment import (
     VersionPoses,
     x_pose,
 )
-from tests.measures.whole_roll_outs import roll_out
+from tests.measures.made_up import roll_out
 
 from .conftest import change, clip_rows
 

@@ -47,7 +47,7 @@ def test_a_hurt_version_has_the_mood_of_its_clip(base: Path) -> None:
     assert set(project.configuration("both").splits) == both
     database = project.configuration("both").database
     assert database.endswith("mine/database/injury+mood"), "in the order of the list of channels"
-    people = project.configuration("both").measure_params("manners")["people"]
+    people = project.configuration("both").measure_params("recognition")["people"]
     assert {clip for clip, person in people.items() if person == "ann"} == {c for c in both if c[0] in "ac"}
     assert {person for clip, person in people.items() if clip[0] == "b"} == {"b"}
     assert project.configuration("both").measure_params("accuracy")["people"] == {}

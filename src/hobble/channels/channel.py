@@ -61,7 +61,7 @@ class Channel(ABC):
     `Options` is None, every data set has the channel, else only data sets with this section have it. slows:
     whether values above 0 make the body slower. If so, `hobble.channels.speed_limits` learns from the
     database how fast such a body goes. manner: whether each column is a way of walking that
-    lasts for a whole clip, such as a mood. If so, `hobble.measures.manners` measures whether a recogniser
+    lasts for a whole clip, such as a mood. If so, `hobble.measures.recognition` measures whether a recogniser
     finds it in generated walks. exponent: of the curve through which a network reads the values, see
     `read_through_curve`. targets: folders of results/<configuration>/ that
     only a configuration with this channel can have.

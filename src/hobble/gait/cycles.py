@@ -119,10 +119,8 @@ def measure_cycles(skeleton: Skeleton, positions: Array, fps: float = 60.0) -> W
 def join_walks(walks: Iterable[WalkCycles]) -> WalkCycles:
     """The cycles of several clips of one person as one walk, in which the frame numbers have no meaning."""
     walks = tuple(walks)
-    chained = itertools.chain.from_iterable
-    return WalkCycles(
-        walks[0].fps, tuple(chained(w.right for w in walks)), tuple(chained(w.left for w in walks))
-    )
+    sides = (tuple(c for walk in walks for c in getattr(walk, side)) for side in ("right", "left"))
+    return WalkCycles(walks[0].fps, *sides)
 
 
 def find_landings(forward: Array, fps: float) -> list[int]:
@@ -137,18 +135,17 @@ def find_landings(forward: Array, fps: float) -> list[int]:
     around = np.lib.stride_tricks.sliding_window_view(np.pad(forward, reach, mode="edge"), 2 * reach + 1)
     least_swing = np.maximum(LEAST_SWING, LEAST_SWING_SHARE * np.ptp(around, axis=1))
     landed: list[int] = []
-    high = low = 0  # frames of the highest and the lowest value since the movement last changed direction
-    rising = True
+    extreme, sign = (
+        0,
+        1,
+    )  # frame of the furthest value since the movement last changed direction, and direction
     for i, value in enumerate(forward):
-        if rising:
-            high = i if value > forward[high] else high
-            if forward[high] - value >= least_swing[high]:
-                landed.append(high)
-                rising, low = False, i
-        else:
-            low = i if value < forward[low] else low
-            if value - forward[low] >= least_swing[low]:
-                rising, high = True, i
+        if sign * value > sign * forward[extreme]:
+            extreme = i
+        if sign * (forward[extreme] - value) >= least_swing[extreme]:
+            if sign > 0:
+                landed.append(extreme)
+            extreme, sign = i, -sign
     return [i for i in landed if i > 0]  # in frame 0 the ankle may have gone back for some time already
 
 
@@ -263,16 +260,12 @@ def _cycle(walk: _Signals, start: int, left_landing: int, end: int, fps: float) 
     seconds = (end - start) / fps
     speed = float(np.linalg.norm(walk.hips[end] - walk.hips[start])) / seconds
     right_ahead = walk.curves["ankle_forward_R"] - walk.curves["ankle_forward_L"]
-    standing = {
-        side: _share_below(walk.ankle_speed[side][start : end + 1], STANDING_SPEED * speed) for side in SIDES
-    }
     width = [walk.across["L"][i] - walk.across["R"][i] for i in (start, left_landing)]
     values = (  # in the order of SCALARS
         seconds,
         speed,
         (left_landing - start) / (end - start),
-        standing["R"],
-        standing["L"],
+        *(_share_below(walk.ankle_speed[side][start : end + 1], STANDING_SPEED * speed) for side in "RL"),
         float(right_ahead[start]),
         float(-right_ahead[left_landing]),
         float(np.mean(width)),

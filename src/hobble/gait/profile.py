@@ -7,7 +7,7 @@ Kinect v2 and gated recurrent neural networks", IEEE Access 8. Their profiles ar
 `benchmarks/derive_gait.py` writes.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from functools import cache
 from pathlib import Path
 
@@ -75,7 +75,7 @@ def profile_of_walk(walk: WalkCycles) -> dict[str, float]:
 def profile_of_curves(curves: Array, scalars: Array) -> dict[str, float]:
     """The profile of curves (22, 50) in the order of CURVES, and scalars (8,) in the order of SCALARS."""
     statistics = [float(statistic(curve)) for curve in curves for statistic in (np.ptp, np.mean)]
-    return dict(zip(PROFILE_NAMES, (*map(float, scalars), *statistics), strict=True))
+    return _named((*map(float, scalars), *statistics))
 
 
 def mirror_profile(values: Profile) -> dict[str, float]:
@@ -95,7 +95,7 @@ def healthy_profile(clips: Sequence[Clip]) -> Profile:
     if clips:
         return profile_of_walk(join_walks(map(measure_clip, clips)))
     mean = np.mean([list(person[NORMAL].values()) for person in read_people()], axis=0)
-    return dict(zip(PROFILE_NAMES, map(float, mean), strict=True))
+    return _named(map(float, mean))
 
 
 @cache
@@ -103,12 +103,13 @@ def read_people() -> tuple[Mapping[str, Profile], ...]:
     """For each of the ten people: gait of GAITS -> profile. The impaired leg is the right one."""
     profiles = load_npz(PEOPLE_FILE)["profiles"].astype(float)  # (gaits, people, 52)
     return tuple(
-        {
-            gait: dict(zip(PROFILE_NAMES, row.tolist(), strict=True))
-            for gait, row in zip(GAITS, of_person, strict=True)
-        }
+        {gait: _named(row.tolist()) for gait, row in zip(GAITS, of_person, strict=True)}
         for of_person in profiles.swapaxes(0, 1)
     )
+
+
+def _named(values: Iterable[float]) -> dict[str, float]:
+    return dict(zip(PROFILE_NAMES, values, strict=True))
 
 
 def measure_effects(walk: Profile, healthy: Profile, side: str = RIGHT) -> dict[str, float]:

@@ -11,33 +11,21 @@ are modelled by a Gaussian distribution. Its mean is s times the mean over peopl
 the covariance over people, plus the covariance of healthy walks.
 """
 
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache, cached_property
 from pathlib import Path
 
 import numpy as np
+from scipy.special import softmax
 
 from hobble.core.clip import Clip
 from hobble.core.files import load_npz
 from hobble.core.quat import Array
+from hobble.gait import profile
 from hobble.gait.cycles import WalkCycles, measure_clip
-from hobble.gait.profile import (
-    ARMS,
-    LEFT,
-    NORMAL,
-    RIGHT,
-    TRUNK,
-    TRUNK_FORWARD,
-    TRUNK_LEFT,
-    Profile,
-    features,
-    healthy_profile,
-    measure_effects,
-    mirror_profile,
-    profile_of_walk,
-    read_people,
-)
+from hobble.gait.profile import ARMS, LEFT, NORMAL, RIGHT, TRUNK, TRUNK_FORWARD, TRUNK_LEFT, Profile, features
 
 SIDES = (RIGHT, LEFT)
 HEALTHY_FILE = Path(__file__).with_name("healthy.npz")
@@ -134,27 +122,25 @@ def compare_clip(clip: Clip, healthy: Profile, seconds: float = 4.0) -> WalkComp
 
 def compare_walk(walk: WalkCycles, frames: int, healthy: Profile, seconds: float = 4.0) -> WalkComparison:
     """Compare the cycles of a motion of `frames` frames with a healthy profile. See `compare_clip`."""
-    whole = profile_of_walk(walk)
-    windows = [profile_of_walk(part) for _, part in windows_with_cycles(walk, frames, seconds)]
+    whole = profile.profile_of_walk(walk)
+    windows = [profile.profile_of_walk(part) for _, part in windows_with_cycles(walk, frames, seconds)]
     return WalkComparison(
         len(walk),
         recognise(whole, healthy),
         grade_walk(whole, healthy),
         [recognise(window, healthy) for window in windows],
         [grade_walk(window, healthy) for window in windows],
-        {side: measure_effects(whole, healthy, side) for side in SIDES},
+        {side: profile.measure_effects(whole, healthy, side) for side in SIDES},
     )
 
 
-def windows_with_cycles(
-    walk: WalkCycles, frames: int, seconds: float = 4.0, step: float = 1.0
-) -> list[tuple[int, WalkCycles]]:
+def windows_with_cycles(walk: WalkCycles, frames: int, seconds: float = 4.0) -> list[tuple[int, WalkCycles]]:
     """(first frame, cycles) of each window of a clip that has LEAST_CYCLES or more cycles.
 
-    A window begins every `step` seconds and lasts `seconds` seconds. frames: number of frames of the clip.
+    A window begins every second and lasts `seconds` seconds. frames: number of frames of the clip.
     """
     length = round(seconds * walk.fps)
-    starts = range(0, max(frames - length, 0) + 1, max(1, round(step * walk.fps)))
+    starts = range(0, max(frames - length, 0) + 1, max(1, round(walk.fps)))
     parts = ((start, walk.within(start, start + length)) for start in starts)
     return [
         (start, part)
@@ -165,8 +151,7 @@ def windows_with_cycles(
 
 def shares_of_answers(answers: Sequence[Answer]) -> dict[str, float]:
     """Answer, such as "antalgic right" -> its share of the answers."""
-    names = [answer.name for answer in answers]
-    return {name: names.count(name) / len(names) for name in dict.fromkeys(names)}
+    return {name: count / len(answers) for name, count in Counter(a.name for a in answers).items()}
 
 
 def examples_of_people(numbers: Iterable[int] | None = None) -> tuple[Array, list[str]]:
@@ -174,12 +159,12 @@ def examples_of_people(numbers: Iterable[int] | None = None) -> tuple[Array, lis
 
     numbers: which people, from 0; None: all. A class is "normal", or "antalgic right" and so on.
     """
-    people = read_people()
+    people = profile.read_people()
     values, classes = [], []
     for person in people if numbers is None else (people[number] for number in numbers):
-        healthy = person[NORMAL]
+        healthy, mirrored = person[NORMAL], profile.mirror_profile(person[NORMAL])
         for gait, walk in person.items():
-            for side, w, h in ((RIGHT, walk, healthy), (LEFT, mirror_profile(walk), mirror_profile(healthy))):
+            for side, w, h in ((RIGHT, walk, healthy), (LEFT, profile.mirror_profile(walk), mirrored)):
                 values.append(list(features(w, h).values()))
                 classes.append(gait if gait == NORMAL else f"{gait} {side}")
     return np.array(values), classes
@@ -251,7 +236,7 @@ def recognise(walk: Profile, healthy: Profile, discriminant: Discriminant | None
     """
     discriminant = discriminant or classifier_of_all_people()
     scores = discriminant.scores(np.array([list(features(walk, healthy).values())]))[0]
-    return _answer([_kind_of_class(name) for name in discriminant.classes], _softmax(scores))
+    return _answer([_kind_of_class(name) for name in discriminant.classes], softmax(scores))
 
 
 @dataclass(frozen=True)
@@ -285,7 +270,7 @@ class Grader:
         means, whitening, log_peaks = self._densities
         squared_distances = np.sum(np.einsum("nij,nj->ni", whitening, x - means) ** 2, axis=1)
         scores = log_peaks - 0.5 * squared_distances
-        probabilities = _softmax(scores)
+        probabilities = softmax(scores)
         of_limps = probabilities[1:].reshape(len(self.kinds), len(STRENGTHS))
         # The strength of each kind is the mean over STRENGTHS, weighted by probability.
         strengths = [0.0, *(float(STRENGTHS @ limp / (limp.sum() or 1.0)) for limp in of_limps)]
@@ -303,7 +288,7 @@ def learn_grader(numbers: Iterable[int] | None = None, healthy: Array | None = N
     numbers: which people, from 0; None: all. healthy: None: `healthy_covariance`.
     """
     values, classes = examples_of_people(numbers)
-    names = list(features(*2 * (healthy_profile([]),)))
+    names = list(features(*2 * (profile.healthy_profile([]),)))
     class_of_row = np.array(classes)
     impaired = [name for name in dict.fromkeys(classes) if name != NORMAL]  # such as "antalgic right"
     means = {_kind_of_class(name): values[class_of_row == name].mean(axis=0) for name in impaired}
@@ -359,11 +344,6 @@ def _kind_of_class(name: str) -> tuple[str, str]:
     """(label, side) of a class of `examples_of_people`; the side of "normal" is empty."""
     label, _, side = name.partition(" ")
     return label, side
-
-
-def _softmax(scores: Array) -> Array:
-    out = np.exp(scores - scores.max())
-    return out / out.sum()
 
 
 def _answer(

@@ -1,4 +1,4 @@
-"""How well the network predicts the next frame, on training and held-out clips.
+"""How well the network predicts the next frame, and how well it goes on from its own poses, on both splits.
 
 The relative error of a joint (eq. 3.1 of Segerstedt 2021) is the distance between its predicted and its
 captured position, divided by its distance from the root. JSON files have it as a fraction, pages show it in
@@ -7,16 +7,18 @@ captured position, divided by its distance from the root. JSON files have it as 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from itertools import product
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
+from pydantic import Field
 
 from hobble.core.files import Json
+from hobble.core.section import Positive
 from hobble.measures import compare, measure
 from hobble.measures.measure import SPLITS, Row
-from hobble.measures.shown import boxes, ours_and_published
+from hobble.measures.shown import ours_and_published
 from hobble.report import parts
 from hobble.report.parts import SPLITS as SPLIT_LABELS
 from hobble.report.parts import Chart, Compared, Hint, PageSection, SectionPart, Trace
@@ -25,8 +27,16 @@ if TYPE_CHECKING:
     from hobble.report.gather import ReportMaterial
 
 
-class Options(measure.JointOptions, measure.SampleOptions):
+class Options(measure.SampleOptions):
     """The keys of this measurement in a configuration's section `evaluation`."""
+
+    joints: Literal["all", "equivalent"] = Field(
+        "all",
+        description="`equivalent`: only the joints that have a counterpart on the skeleton holden31",
+    )
+    rollouts: tuple[Positive, ...] = Field(
+        (1, 10, 60, 300), min_length=1, description="lengths of roll-outs, in frames"
+    )
 
 
 MEASURE = measure.Measure(
@@ -34,28 +44,23 @@ MEASURE = measure.Measure(
     module=__name__,
     inputs=("weights", "clips", "summaries", "skeleton"),
     options=Options,
-    # For each thousand frames: 12 MB and 0.2 s. At least 10 minutes.
-    cost=measure.Cost(mb_per_1000_frames=12, seconds_per_1000_frames=0.2, least_minutes=10),
+    runtime=("mode",),
+    cost=measure.Cost(memory_mb=120, mb_per_1000_frames=30, seconds_per_1000_frames=0.8, least_minutes=30),
 )
+FRAMES_PER_SECOND = 60
 COLOURS = {"train": "@muted", "held_out": "@accent"}  # split -> its colour in the charts
 NAMES = {"held_out": "held out", "train": "training"}  # split -> its name on the page
-# Edges of a box, as plotly names them -> keys of accuracy.json.
-BOX = {"lowerfence": "p05", "q1": "p25", "median": "p50", "q3": "p75", "upperfence": "p95", "mean": "mean"}
 CLIP_HEADS = {
     key: parts.in_words(key) for key in ("clip", "split", "frames", "mean", "sd", "position_error_cm")
 }
 ERROR_AXIS = parts.axis("relative error, %", rangemode="tozero")
-# Key of a difference between two configurations in compare.json -> what it is divided by (eq. 3.2).
-DEVIATIONS = {"difference_of_means": "sd of the means of clips", "difference": "sd of single frames"}
 
 
 def section(found: Json, material: ReportMaterial) -> PageSection:
     """Charts, tables, and a view of captured and predicted motion. Empty without measured clips."""
     if not found.get("clips"):
         return PageSection("accuracy", [])
-    # Readers may take the number in _hurt1 for a severity, so endings of names are explained.
-    endings = [end for end in ("_hurt1", "_mirror") if any(end in row["clip"] for row in found["clips"])]
-    introduction = parts.words("accuracy.introduction", *(f"accuracy.{end[1:]}" for end in endings))
+    introduction = parts.words("accuracy.introduction")
     of_clips = parts.table(
         f"{material.name}-accuracy", _measured(found), CLIP_HEADS, show={"split": NAMES.__getitem__}
     )
@@ -63,12 +68,12 @@ def section(found: Json, material: ReportMaterial) -> PageSection:
     seconds = sum(found[split]["frames"] for split in NAMES) / 60
     duration = parts.format_duration(seconds)
     shown = [
-        SectionPart(0, parts.Paragraph(introduction + _about_sample(found))),
+        SectionPart(0, parts.Paragraph(introduction + measure.sample_sentence(found))),
         SectionPart(
             9, parts.Paragraph(parts.words("accuracy.caveat", duration=duration, dataset=material.dataset))
         ),
         SectionPart(10, published_table(found, material), open=True),
-        SectionPart(30, clip_boxes(found, material)),
+        SectionPart(50, roll_out_chart(found)),
         SectionPart(60, of_clips),
         SectionPart(90, parts.TemplatePart("captured.html.j2")),
     ]
@@ -79,53 +84,6 @@ def _measured(found: Json) -> list[dict[str, Any]]:
     """The entries of the clips that were measured: held-out clips first, each split by rising error."""
     rows = [row for row in found.get("clips", ()) if row["mean"] is not None]
     return sorted(rows, key=lambda row: (row["split"] != "held_out", row["mean"]))
-
-
-def _about_sample(found: Json) -> str:
-    """Which part of the clips was measured, with confidence intervals; empty if all clips were measured."""
-    if not found.get("sample"):
-        return ""
-    means = [
-        f"{NAMES[split]} {100 * found[split]['mean']:.2f} ± {100 * found[split]['interval']['mean']:.2f} %"
-        for split in NAMES
-        if found[split].get("interval")
-    ]
-    sample = measure.sample_in_words(found)
-    return " " + parts.words("accuracy.sample", sample=sample, means=", ".join(means))
-
-
-def clip_boxes(found: Json, material: ReportMaterial) -> Chart:
-    """A box for each clip: quantiles of its error over frames and joints. Published means are diamonds.
-
-    Held-out clips come first, then the others by their mean error. A line is at the published mean of all
-    clips.
-    """
-    rows = _measured(found)[::-1]  # plotly puts the first at the bottom
-    traces = []
-    for split, fill, line in (("held_out", "@accent-wash", "@accent"), ("train", "@sunken", "@faint")):
-        if chosen := [row for row in rows if row["split"] == split]:
-            place = {"orientation": "h", "y": [row["clip"] for row in chosen], "fillcolor": fill}
-            traces.append(quantile_boxes(NAMES[split], chosen, COLOURS[split], line, **place))
-    means = material.published["clip_means"].get(material.name, ())
-    theirs = dict(zip(compare.published_clips(material.published), means, strict=False))
-    if shown := [row["clip"] for row in rows if row["clip"] in theirs]:
-        diamond = {"symbol": "diamond-open", "size": 7, "color": "@ink"}
-        x = [100 * theirs[clip] for clip in shown]
-        traces.append(parts.marker_trace("published mean", x, shown, diamond))
-    published = material.published_entry("accuracy")
-    mean = (
-        parts.reference_line(100 * published["mean"], f"{published['label']}, published") if published else {}
-    )
-    clips = parts.ordered_axis(row["clip"] for row in rows)
-    layout = {"xaxis": ERROR_AXIS, "yaxis": clips, "boxmode": "overlay", **mean}
-    more = ["held_out"] if any(row["split"] == "held_out" for row in rows) else []
-    return parts.chart("accuracy-boxes", traces, layout, max(260, 110 + 21 * len(rows)), more=more)
-
-
-def quantile_boxes(name: str, errors: Sequence[Json], colour: str, line: str, **more: Any) -> Trace:
-    """Boxes of the relative error in %, one for each entry of accuracy.json in `errors`."""
-    values = {edge: [100 * entry[key] for entry in errors] for edge, key in BOX.items()}
-    return boxes(name, line, **values, marker={"color": colour}, **more)
 
 
 def published_table(found: Json, material: ReportMaterial) -> parts.Table:
@@ -160,26 +118,14 @@ def figures(found: Json, material: ReportMaterial) -> Iterator[parts.KeyFigure]:
     for order, (split, label) in enumerate(SPLIT_LABELS.items(), 10):
         part = found.get(split)
         if part and part["mean"] is not None:
-            note = f"of a joint's distance from the root; {_centimetres(part, split, material)}"
+            centimetres = parts.format_number(part["position_error_cm"])
+            note = f"of a joint's distance from the root; {centimetres} cm per joint on average"
+            if interval := part.get("interval"):
+                note += f"; 95 % confidence interval: ± {100 * interval['mean']:.2f} %"
             if (published := material.published_entry("accuracy")) and split == "held_out":
                 mean = 100 * published["mean"]
                 note += f"; published for {published['label']}: {mean:.2f} %, on other clips"
             yield parts.KeyFigure(f"Error on {label}", f"{100 * part['mean']:.2f}", "%", note, order)
-
-
-def _centimetres(part: Json, split: str, material: ReportMaterial) -> str:
-    """The mean position error in words: of the predicted joints, and of the joints as the runtime draws them.
-
-    The runtime draws a joint halfway between its predicted position and its old position plus the predicted
-    velocity. This error is left out if the measurement `rollouts` has no roll-outs of one frame.
-    """
-    error = parts.format_number(part["position_error_cm"])
-    lengths = {entry["length"]: entry for entry in material.results_of("rollouts").get("lengths", ())}
-    drawn = lengths.get(1, {}).get(split, {}).get("position_error_cm")
-    if drawn is None:
-        return f"{error} cm per joint on average"
-    as_drawn = parts.format_number(drawn)
-    return f"{error} cm per joint as predicted; {as_drawn} cm as drawn (explained under Accuracy)"
 
 
 def hints(found: Json, material: ReportMaterial) -> Iterator[Hint]:
@@ -199,16 +145,10 @@ def hints(found: Json, material: ReportMaterial) -> Iterator[Hint]:
             yield Hint("good", head, "A larger network may do better.", 30)
         else:
             yield Hint("fact", f"{head}.", "That is usual.", 30)
-    yield from _worst_clip(_measured(found))
-
-
-def _worst_clip(rows: Sequence[Json]) -> Iterator[Hint]:
-    """A hint on the clip with the largest error, if that is far above the median of all clips."""
-    if len(rows) < 4:
-        return
-    median = float(np.median([row["mean"] for row in rows]))
-    worst = max(rows, key=lambda row: row["mean"])
-    if worst["mean"] > 1.8 * median:
+    rows = _measured(found)
+    median = float(np.median([row["mean"] for row in rows] or [0.0]))
+    worst = max(rows, key=lambda row: row["mean"], default=None)
+    if worst and len(rows) > 3 and worst["mean"] > 1.8 * median:
         source = worst["clip"].removesuffix("_mirror")
         whose = "its labels" if source == worst["clip"] else f"the labels of {source}, which it mirrors,"
         text = parts.words("accuracy.worst", times=f"{worst['mean'] / median:.1f}", whose=whose)
@@ -222,34 +162,32 @@ def compared(
 
     all_measured: the results of each configuration. published: the content of published.yaml.
 
-    Two configurations are compared over each split, and over each clip on which both were measured. The
-    errors of the network that Holden et al. released are beside those of any network on the same clips.
+    Two configurations are compared over each split, by the means of its clips. The errors of the network that
+    Holden et al. released are beside those of any network on the same clips.
     """
     found = {m.name: m.results_of("accuracy") for m in all_measured}
-    series = {
-        name: {split: {**of[split], "means": clip_means(of, split)} for split in SPLITS}
-        | {entry["clip"]: entry for entry in of["clips"]}
-        for name, of in found.items()
-    }
-    differences = compare.pair_differences(
-        {name: {over: one for over, one in of.items() if one["frames"]} for name, of in series.items()}
-    )
-    beside: list[Row] = []
+    means = {name: {split: clip_means(of, split) for split in SPLITS} for name, of in found.items()}
+    differences, beside = compare.pair_differences(means), []
     for split in SPLITS:
-        statistics = {name: compare.mean_and_sd(of[split]["means"]) for name, of in series.items()}
+        statistics = {name: measure.mean_and_sd(of[split]) for name, of in means.items()}
         of_means = f"standard deviation of the means of {SPLIT_LABELS[split]}"
         for at, key, what in ((0, "mean", f"relative error, {SPLIT_LABELS[split]}"), (1, "sd", of_means)):
             ours = {name: values[at] for name, values in statistics.items()}
             beside += compare.beside_ours(what, published["accuracy"], key, ours)
     on_training = [row for row in differences if row["over"] == "train"]
     beside += compare.published_differences("error", on_training, published)
-    for name, (clip, theirs) in product(found, published["released_clips"].items()):
-        if mine := series[name].get(clip):
-            row = {"configuration": name, "source": "release"}
-            ours_mean = mine.get("as_published", mine)["mean"]
-            beside.append(compare.published_row(f"relative error, {clip}", row, theirs, ours_mean))
+    released = published["released_clips"]
+    for name, of in found.items():
+        row = {"configuration": name, "source": "release"}
+        for clip in (clip for clip in of["clips"] if clip["clip"] in released):
+            what, mine = f"relative error, {clip['clip']}", clip.get("as_published", clip)["mean"]
+            beside.append(compare.published_row(what, row, released[clip["clip"]], mine))
     return compare.ComparisonAddition(
-        entries=[{"dataset": m.dataset, **found[m.name], "configuration": m.name} for m in all_measured],
+        entries=[
+            {**of, "rollouts": [{k: v for k, v in r.items() if k != "clips"} for r in of["rollouts"]]}
+            | {"configuration": name}
+            for name, of in found.items()
+        ],
         about={name: {"joints": of["joints"]} for name, of in found.items()},
         differences=differences,
         against_published=beside,
@@ -257,8 +195,17 @@ def compared(
 
 
 def tables(compared: Json) -> dict[str, list[Row]]:
-    """One table: the errors of every clip in every configuration."""
-    return {"accuracy": measure.flat_rows(compared["accuracy"], "clips", "configuration")}
+    """Two tables, for every configuration: the errors of every clip; those of roll-outs of each length."""
+    rolled: list[Row] = [
+        {"configuration": entry["configuration"], "length": of["length"], "split": split, **of[split]}
+        for entry in compared["accuracy"]
+        for of in entry["rollouts"]
+        for split in SPLITS
+    ]
+    return {
+        "accuracy": measure.flat_rows(compared["accuracy"], "clips", "configuration"),
+        "rollouts": rolled,
+    }
 
 
 def clip_means(found: Json, split: str) -> list[float]:
@@ -268,14 +215,17 @@ def clip_means(found: Json, split: str) -> list[float]:
 
 
 def compared_section(compared: Compared) -> PageSection:
-    """The spread of the errors, differences between configurations, and errors of single clips."""
-    charts = enumerate((error_boxes(compared), difference_map(compared), clip_lines(compared)))
-    shown = [SectionPart(10 + 20 * place, each) for place, each in charts]
+    """The spread of the errors, those of roll-outs, and errors of single clips."""
+    charts = error_boxes(compared), compared_roll_outs(compared), clip_lines(compared)
+    shown = [SectionPart(10 * place, each) for place, each in enumerate(charts, 1)]
     return PageSection("accuracy", shown, title="Accuracy", order=10, long=True)
 
 
 def compared_values(compared: Compared) -> Iterator[parts.ComparedValue]:
-    """The error on each split, and the number of measured joints."""
+    """The error on each split, in roll-outs of about a second, and the number of measured joints.
+
+    Of the roll-outs it is that on held-out clips, or on training clips if there are no held-out ones.
+    """
     entries = {entry["configuration"]: entry for entry in compared["accuracy"]}
     for order, split, label in ((10, "held_out", "held-out error"), (20, "train", "training error")):
         values = {name: entry[split]["mean"] for name, entry in entries.items()}
@@ -283,37 +233,41 @@ def compared_values(compared: Compared) -> Iterator[parts.ComparedValue]:
         yield parts.ComparedValue(order, column, values)
     joints = {name: entry["joints"] for name, entry in entries.items()}
     yield parts.ComparedValue(70, parts.Column.count("joints"), joints)
+    rolled = {name: {of["length"]: of for of in e["rollouts"]} for name, e in entries.items()}
+    lengths = {length for of in rolled.values() for length in of}
+    length = min(lengths, key=lambda n: abs(n - FRAMES_PER_SECOND), default=0)
+    for split, label in SPLIT_LABELS.items():
+        errors = {
+            name: of.get(length, {}).get(split, {}).get("position_error_cm") for name, of in rolled.items()
+        }
+        if any(value is not None for value in errors.values()):
+            of_what = f"in roll-outs of {length} frames on {label}"
+            far = "the joints of {name} are {value} cm from the captured joints on average, " + of_what
+            column = parts.Column.number("roll-out error, cm")
+            yield parts.ComparedValue(25, column, errors, "Closest to captured motion", far)
+            return
 
 
 def error_boxes(compared: Compared) -> Chart:
-    """A box for each configuration: the spread of its error over all frames of a split. A menu selects it.
+    """A box for each configuration, over the mean errors of its clips, and published ones beside ours.
 
-    With a value for each clip, boxes are of the means of clips, published ones beside ours.
+    A menu selects the split. Diamonds are published means over all clips.
     """
-    colours, options = parts.configuration_colours(compared), {}
+    names, options = parts.configuration_names(compared), {}
     published = {row["configuration"]: 100 * row["mean"] for row in compared["published"]["accuracy"]}
-    marks = parts.marker_trace(
-        "published mean",
-        [name for name in published if name in colours],
-        [mean for name, mean in published.items() if name in colours],
-        {"symbol": "diamond-open", "size": 10, "color": "@ink"},
-        hovertemplate="%{x}: %{y:.2f} % published<extra></extra>",
-    )
-    their_clips = compared["published"]["clip_means"]
+    known = [name for name in names if name in published]
+    diamond = {"symbol": "diamond-open", "size": 10, "color": "@ink"}
+    hover = "%{x}: %{y:.2f} % published<extra></extra>"
+    means = [published[name] for name in known]
+    marks = parts.marker_trace("published mean", known, means, diamond, hovertemplate=hover)
     for split, label in SPLIT_LABELS.items():
-        of_split = {e["configuration"]: e for e in compared["accuracy"] if e[split]["mean"] is not None}
-        if not of_split:
-            continue
-        options[label] = [
-            quantile_boxes(name, [entry[split]], colours[name], colours[name], x=[name], boxmean=True)
-            for name, entry in of_split.items()
-        ] + [marks] * bool(marks["x"])
-        means = {name: clip_means(entry, split) for name, entry in of_split.items()}
-        of_clips, theirs = (
-            {name: [100 * v for v in values] for name, values in each.items()}
-            for each in (means, their_clips)
-        )
-        options[f"{label}, a value for each clip"] = ours_and_published(list(of_split), of_clips, theirs)
+        of_split = {entry["configuration"]: clip_means(entry, split) for entry in compared["accuracy"]}
+        if any(of_split.values()):
+            ours, theirs = (
+                {name: [100 * value for value in values] for name, values in each.items()}
+                for each in (of_split, compared["published"]["clip_means"])
+            )
+            options[label] = ours_and_published(names, ours, theirs) + [marks] * bool(known)
     layout = {"yaxis": ERROR_AXIS, "showlegend": False}
     return parts.chart("compare-boxes", layout=layout, height=400, choose="Clips", options=options)
 
@@ -348,17 +302,40 @@ def clip_lines(compared: Compared) -> Chart | None:
     return parts.chart("compare-clips", layout=layout, height=420, choose="Shown", options=options)
 
 
-def difference_map(compared: Compared) -> Chart:
-    """The difference of each two configurations. A menu selects the split and the kind of deviation."""
-    names, options = parts.configuration_names(compared), {}
-    hover, look = "%{y} and %{x}: %{z:.3f}<extra></extra>", {"texttemplate": "%{z:.2f}", "xgap": 3, "ygap": 3}
-    for (split, label), (key, kind) in product(SPLIT_LABELS.items(), DEVIATIONS.items()):
-        # compare.json has each pair in one order only.
-        values = {frozenset((r["a"], r["b"])): r[key] for r in compared["difference"] if r["over"] == split}
-        if any(value is not None for value in values.values()):
-            cells = [[values.get(frozenset((a, b))) for b in names] for a in names]
-            options[f"{label}, {kind}"] = [parts.heatmap(names, names, cells, hover, **look)]
-    category = {"type": "category"}
-    layout = {"xaxis": category, "yaxis": {**category, "autorange": "reversed", "automargin": True}}
-    height, choose = max(240, 90 + 42 * len(names)), "Clips and deviation"
-    return parts.chart("compare-difference", layout=layout, height=height, choose=choose, options=options)
+def roll_out_chart(found: Json) -> Chart:
+    """How the error grows in roll-outs, with a line for each split."""
+    entries = found["rollouts"]
+    traces = [t for split, name in NAMES.items() for t in _error_line(name, entries, split, COLOURS[split])]
+    return parts.chart("rollouts", traces, _length_axes(traces), sample=measure.sample_sentence(found))
+
+
+def compared_roll_outs(compared: Compared) -> Chart:
+    """How the error grows when the networks continue from their own poses."""
+    options: dict[str, list[Trace]] = {}
+    colours = parts.configuration_colours(compared)
+    for (split, label), entry in product(SPLIT_LABELS.items(), compared["accuracy"]):
+        name = entry["configuration"]
+        if line := _error_line(name, entry["rollouts"], split, colours[name]):
+            options[label] = options.get(label, []) + line
+    layout = _length_axes(trace for traces in options.values() for trace in traces)
+    return parts.chart("compare-rollouts", layout=layout, choose="Clips", options=options, sample="")
+
+
+def _error_line(name: str, entries: Iterable[Json], split: str, colour: str) -> list[Trace]:
+    """The line of the mean error of a split over the length of roll-outs; [] if none was measured.
+
+    entries: one for each length. If only a sample was measured, bars show 95 % confidence intervals.
+    """
+    known = [entry for entry in entries if (entry.get(split) or {}).get("position_error_cm") is not None]
+    if not known:
+        return []
+    x, y = [entry["length"] for entry in known], [entry[split]["position_error_cm"] for entry in known]
+    style: dict[str, Any] = {"mode": "lines+markers"}
+    if widths := [e[split]["interval"]["position_error_cm"] for e in known if "interval" in e[split]]:
+        style["error_y"] = {"type": "data", "array": widths, "color": "@faint", "thickness": 1}
+    return [parts.line_trace(name, x, y, colour, **style)]
+
+
+def _length_axes(traces: Iterable[Trace]) -> dict[str, Any]:
+    frames = parts.log_axis("frames", [x for trace in traces for x in trace["x"]])
+    return {"xaxis": frames, "yaxis": parts.axis("cm per joint", rangemode="tozero")}

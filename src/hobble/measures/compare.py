@@ -14,32 +14,25 @@ from hobble.measures.measure import Row, flatten, functions
 from hobble.models import network_options
 
 
-def difference_in_sds(
-    mean_a: float | None, sd_a: float | None, mean_b: float | None, sd_b: float | None
-) -> float | None:
-    """The difference of two means, in units of the mean of both standard deviations.
+def difference_in_sds(a: Sequence[float], b: Sequence[float]) -> float | None:
+    """The difference of the means of two samples, in units of the mean of their standard deviations (n - 1).
 
-    This is 2 |mean_a - mean_b| / (sd_a + sd_b), equation 3.2 of Segerstedt 2021. None if a value is unknown,
-    or both standard deviations are 0.
+    This is 2 |mean of a - mean of b| / (sd of a + sd of b), equation 3.2 of Segerstedt 2021. None if a sample
+    has fewer than two values, or both standard deviations are 0.
 
-    >>> difference_in_sds(3.0, 0.5, 1.0, 1.5)
-    2.0
+    >>> difference_in_sds([2.0, 4.0], [0.0, 0.0])
+    4.242640687119285
     """
-    if mean_a is None or mean_b is None or sd_a is None or sd_b is None or sd_a + sd_b == 0:
+    if min(len(a), len(b)) < 2:
         return None
-    return 2 * abs(mean_a - mean_b) / (sd_a + sd_b)
+    spread = np.std(a, ddof=1) + np.std(b, ddof=1)
+    return float(2 * abs(np.mean(a) - np.mean(b)) / spread) if spread else None
 
 
-def fit_line(x: Sequence[float], y: Sequence[float]) -> dict[str, Any]:
-    """The least-squares line y = intercept + slope x through points, and its coefficient of determination r2.
-
-    All are None if x has fewer than two different values; `r2` is None if all y are equal.
-    """
-    if len(set(x)) < 2:
-        return {"slope": None, "intercept": None, "r2": None, "points": len(x)}
-    slope, intercept = np.polyfit(x, y, 1)
-    r2 = float(np.corrcoef(x, y)[0, 1] ** 2) if len(set(y)) > 1 else None
-    return {"slope": float(slope), "intercept": float(intercept), "r2": r2, "points": len(x)}
+def fit_line(x: Sequence[float], y: Sequence[float]) -> dict[str, float | None]:
+    """The least-squares line y = intercept + slope x through points; None if x has fewer than two values."""
+    slope, intercept = map(float, np.polyfit(x, y, 1)) if len(set(x)) > 1 else (None, None)
+    return {"slope": slope, "intercept": intercept}
 
 
 @dataclass(frozen=True)
@@ -95,8 +88,7 @@ class ComparisonAddition:
     """What one measurement adds to compare.json.
 
     entries: the results of each configuration, under the measurement's name. about: configuration -> entries
-    to add to its description. differences: rows of `compare_series` with the names `a` and `b` of both
-    configurations and `over`, what was compared: a split, a clip or a phase mode. against_published: rows of
+    to add to its description. differences: rows of `pair_differences`. against_published: rows of
     `published_row`. milliseconds: what was measured with a clock, key -> rows. `difference` and
     `against_published` are such keys, and a measurement may have others.
     """
@@ -108,41 +100,17 @@ class ComparisonAddition:
     milliseconds: Mapping[str, Sequence[Row]] = field(default_factory=dict, repr=False)
 
 
-def compare_series(a: Json, b: Json) -> dict[str, Any]:
-    """Means and standard deviations of two series, and their difference by eq. 3.2 of Segerstedt 2021.
+def pair_differences(means: Mapping[str, Mapping[str, Sequence[float]]]) -> list[dict[str, Any]]:
+    """How much each two configurations differ in each thing that both measured, see `difference_in_sds`.
 
-    a, b: have `mean` and `sd` over single frames, and may have `means`, the mean of each clip or lap.
-    `difference` is |mean_a - mean_b| in units of the average sd. `difference_of_means` is the same for the
-    means and the sd of `means` (with n - 1), as in the publication. It is None if a or b has fewer than two
-    means.
-    """
-    (mean_a, sd_a), (mean_b, sd_b) = (mean_and_sd(series.get("means", ())) for series in (a, b))
-    return {
-        **{f"{key}_{name}": series[key] for name, series in (("a", a), ("b", b)) for key in ("mean", "sd")},
-        "difference": difference_in_sds(a["mean"], a["sd"], b["mean"], b["sd"]),
-        "sd_of_means_a": sd_a,
-        "sd_of_means_b": sd_b,
-        "difference_of_means": difference_in_sds(mean_a, sd_a, mean_b, sd_b),
-    }
-
-
-def pair_differences(series: Mapping[str, Mapping[str, Json]]) -> list[dict[str, Any]]:
-    """`compare_series` of each two configurations, over each thing that both measured.
-
-    series: configuration -> split, clip or phase mode -> its series.
+    means: configuration -> split or phase mode -> the mean of each clip or lap.
     """
     return [
-        {"a": a, "b": b, "over": over, **compare_series(series[a][over], series[b][over])}
-        for a, b in combinations(series, 2)
-        for over in series[a]
-        if over in series[b]
+        {"a": a, "b": b, "over": over, "difference": difference_in_sds(of_a, means[b][over])}
+        for a, b in combinations(means, 2)
+        for over, of_a in means[a].items()
+        if of_a and means[b].get(over)
     ]
-
-
-def mean_and_sd(values: Sequence[float]) -> tuple[float | None, float | None]:
-    """Mean and standard deviation (n - 1) of a sample; None for those that need more values."""
-    mean = float(np.mean(values)) if len(values) else None
-    return mean, float(np.std(values, ddof=1)) if len(values) > 1 else None
 
 
 def published_row(
@@ -254,7 +222,7 @@ def published_differences(over: str, rows: Sequence[Json], published: Json) -> l
     mode `constant`.
     """
     ours = {
-        f"{a} to {b}": row["difference_of_means"]
+        f"{a} to {b}": row["difference"]
         for row in rows
         for a, b in ((row["a"], row["b"]), (row["b"], row["a"]))
     }

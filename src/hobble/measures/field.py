@@ -23,7 +23,6 @@ if TYPE_CHECKING:
 class Options(Section):
     """The keys of this measurement in a configuration's section `evaluation`."""
 
-    path_laps: Positive = Field(1, description="laps of the circle, the square and the star")
     field_seconds: Positive = Field(30, description="seconds of the straight walk")
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -14,7 +14,7 @@ from hobble.core.skeleton import Skeleton, local_rotations
 from hobble.measures.measure import MeasureInputs, Outcome
 from hobble.measures.motion_quality import FPS, cleanness, compare_windows, window_features
 from hobble.measures.sample import HURT_VERSION, ClipPart, clip_parts
-from hobble.measures.walks import in_world
+from hobble.measures.walks import in_world, record
 from hobble.models.load import load_network
 from hobble.models.network import Network
 from hobble.rows.clip_rows import captured_stretches, headings, rotate_by_yaw
@@ -34,16 +34,8 @@ LONGEST, SHORTEST = 20 * FPS, 3 * FPS  # frames of a captured stretch that is wa
 MOST_STRETCHES = 60
 
 
-@dataclass(frozen=True)
-class Motion:
-    """F frames of one body. positions: (F, J, 3) cm, in the world. rotations: (F, J, 4), to the parent."""
-
-    positions: Array = field(repr=False)
-    rotations: Array = field(repr=False)
-
-    def part(self, frames: slice) -> Motion:
-        """Some of its frames."""
-        return Motion(self.positions[frames], self.rotations[frames])
+# F frames of a body: positions (F, J, 3), cm, in the world, and rotations (F, J, 4), relative to the parent.
+Motion = tuple[Array, Array]
 
 
 @dataclass(frozen=True)
@@ -83,17 +75,17 @@ def _polygon(corners: Array) -> Array:
     return np.concatenate(sides)
 
 
-def follow_path(network: Network, runtime: Runtime, path: Array, laps: int) -> tuple[float, float]:
+def follow_path(network: Network, runtime: Runtime, path: Array) -> dict[str, float]:
     """Mean distance (cm) and angle (degrees) between the asked and the walked path.
 
     Each frame, the character at WALK speed is asked to go to the point that the path reaches after LOOK_AHEAD
-    frames. The first half lap is not measured. path: (N, 2), a point for each cm.
+    frames. Of one and a half laps, the first half is not measured. path: (N, 2), a point for each cm.
     """
     start, ahead = path[0], path[5] - path[0]
     animation = ProceduralAnimation(network, position=start, facing=ahead, **dict(runtime))
     at, passed, place = 0, 0, start
     distances, angles = [], []
-    for _ in range(int((laps + 0.5) * len(path) / WALK * 3)):  # at a third of the speed it gives up
+    for _ in range(int(1.5 * len(path) / WALK * 3)):  # at a third of the speed it gives up
         way = path[(at + round(LOOK_AHEAD * WALK)) % len(path)] - place
         pose = animation.next_pose(way / max(float(np.hypot(*way)), 1e-6) * WALK, gait="walk")
         before, place = place, pose.root[::2].copy()
@@ -103,16 +95,11 @@ def follow_path(network: Network, runtime: Runtime, path: Array, laps: int) -> t
         at, passed = (at + step) % len(path), passed + step
         if passed > len(path) // 2:
             distances.append(float(np.hypot(*(path[at] - place))))
-            angles.append(_angle(place - before, path[(at + 1) % len(path)] - path[at]))
-        if passed >= (laps + 0.5) * len(path):
+            (a, b), (c, d) = place - before, path[(at + 1) % len(path)] - path[at]
+            angles.append(np.degrees(abs(np.arctan2(a * d - b * c, a * c + b * d))))
+        if passed >= 1.5 * len(path):
             break
-    return round(float(np.mean(distances)), 3), round(float(np.mean(angles)), 3)
-
-
-def _angle(a: Array, b: Array) -> float:
-    """Degrees between two vectors (2,)."""
-    cross, dot = a[0] * b[1] - a[1] * b[0], a @ b
-    return float(np.degrees(abs(np.arctan2(cross, dot))))
+    return {"cm": round(float(np.mean(distances)), 3), "degrees": round(float(np.mean(angles)), 3)}
 
 
 def response(network: Network, runtime: Runtime, gait: str, speed: float) -> float | None:
@@ -134,38 +121,39 @@ def response(network: Network, runtime: Runtime, gait: str, speed: float) -> flo
 def straight_walk(network: Network, runtime: Runtime, seconds: float) -> Motion:
     """A straight walk at WALK speed, after SETTLING."""
     gait = [float(name == "walk") for name in network.gaits]
-    frames = SETTLING + round(seconds * FPS)
-    asked = (np.tile(np.array(values), (frames, 1, 1)) for values in ([0.0, WALK], gait, [0.0, 0.0]))
-    return walk(network, runtime, *asked)[0].part(slice(SETTLING, None))
+    target = {"target_velocity": [0.0, WALK], "gait": gait}
+    return after_settling(walk(network, runtime, [target] * (SETTLING + round(seconds * FPS)), 1)[0])
 
 
 def walk_commands(network: Network, runtime: Runtime, commands: Sequence[Command]) -> list[Motion]:
     """The character's motion for each command, all as one crowd."""
     longest = max(map(len, commands))
-    asked = (
-        np.stack([_lengthened(getattr(command, name), longest) for command in commands], axis=1)
-        for name in ("velocity", "gait", "ahead")
-    )
-    walked = zip(walk(network, runtime, *asked), commands, strict=True)
-    return [motion.part(slice(len(command))) for motion, command in walked]
+
+    def of_all(name: str) -> Array:
+        """(F, C, ...); the last value of a shorter command is repeated."""
+        each = [getattr(command, name) for command in commands]
+        return np.stack([np.pad(v, ((0, longest - len(v)), (0, 0)), "edge") for v in each], axis=1)
+
+    asked = zip(*map(of_all, ("velocity", "gait", "ahead")), strict=True)
+    targets = [{"target_velocity": v, "gait": gait, "facing": ahead} for v, gait, ahead in asked]
+    walked = walk(network, runtime, targets, len(commands))
+    return [(p[: len(c)], r[: len(c)]) for (p, r), c in zip(walked, commands, strict=True)]
 
 
-def walk(network: Network, runtime: Runtime, velocity: Array, gait: Array, ahead: Array) -> list[Motion]:
-    """The motion of C characters, who start standing. velocity, gait, ahead: (F, C, ...), see `Command`."""
+def walk(
+    network: Network, runtime: Runtime, targets: Iterable[Mapping[str, Any]], count: int
+) -> list[Motion]:
+    """The motion of `count` characters, who start standing. targets: see `walks.record`."""
     assert network.skeleton is not None
-    shape = *velocity.shape[:2], len(network.skeleton.joints)
-    animation = ProceduralAnimation(network, characters=shape[1], **dict(runtime))
-    positions, rotations = np.empty((*shape, 3), np.float32), np.empty((*shape, 4), np.float32)
-    for frame in range(len(velocity)):
-        pose = animation.next_pose(velocity[frame], facing=ahead[frame], gait=gait[frame])
-        positions[frame], rotations[frame] = pose.positions, pose.rotations
+    recorded = record(network, runtime, targets, ("positions", "rotations"), count)
+    positions, rotations = (values.astype(np.float32) for values in recorded)
     local = local_rotations(network.skeleton, rotations)
-    return [Motion(positions[:, i], local[:, i]) for i in range(shape[1])]
+    return [(positions[:, i], local[:, i]) for i in range(count)]
 
 
-def _lengthened(values: Array, frames: int) -> Array:
-    """(frames, ...) the values (F, ...), with the last one repeated."""
-    return np.concatenate([values, np.repeat(values[-1:], frames - len(values), axis=0)])
+def after_settling(motion: Motion) -> Motion:
+    """The motion without its first SETTLING frames, in which a character who starts standing speeds up."""
+    return motion[0][SETTLING:], motion[1][SETTLING:]
 
 
 def commands_of_clips(inputs: MeasureInputs, skeleton: Skeleton, split: str) -> list[Command]:
@@ -195,18 +183,19 @@ def _commands_of(part: ClipPart, skeleton: Skeleton) -> Iterator[Command]:
         yaw = headings(rows.y[captured.rows][:, layout.y_turn][:, 0].astype(float))
         turns = rows.y[captured.rows][:, layout.y_joint_rotation].reshape(len(captured), -1, 3)
         positions = in_world(captured.local, captured.root, yaw)
-        motion = Motion(positions, local_rotations(skeleton, world_rotations(turns, yaw)))
+        rotations = local_rotations(skeleton, world_rotations(turns, yaw))
         ahead = np.column_stack([np.sin(yaw), np.cos(yaw)])
         velocity = rotate_by_yaw(captured.velocity, yaw)
         for first in range(0, len(captured) - SHORTEST + 1, LONGEST):
             frames = slice(first, first + LONGEST)
             if len(velocity[frames]) >= SHORTEST:
-                yield Command(velocity[frames], captured.gait[frames], ahead[frames], motion.part(frames))
+                motion = positions[frames], rotations[frames]
+                yield Command(velocity[frames], captured.gait[frames], ahead[frames], motion)
 
 
 def mean_cleanness(skeleton: Skeleton, motions: Sequence[Motion]) -> dict[str, float]:
     """Skating, rotation of joints, jerk and contact speed of motions: means over them."""
-    found = [cleanness(skeleton, motion.positions, motion.rotations) for motion in motions]
+    found = [cleanness(skeleton, *motion) for motion in motions]
     return {key: round(float(np.nanmean([one[key] for one in found])), 4) for key in found[0]}
 
 
@@ -220,12 +209,10 @@ def compare_with_captured(
     """
     skeleton = network.skeleton
     assert skeleton is not None
-    rest = slice(SETTLING, None)
-    captured = [command.motion.part(rest) for command in commands]
-    walked = [motion.part(rest) for motion in walk_commands(network, runtime, commands)]
-
+    captured = [after_settling(command.motion) for command in commands]
+    walked = [after_settling(motion) for motion in walk_commands(network, runtime, commands)]
     mine, theirs = (
-        [window_features(skeleton, motion.positions) for motion in motions] for motions in (walked, captured)
+        [window_features(skeleton, positions) for positions, _ in motions] for motions in (walked, captured)
     )
     half = np.repeat(np.arange(len(theirs)) % 2 == 0, list(map(len, theirs)))
     windows = compare_windows(np.concatenate(mine), np.concatenate(theirs), half)
@@ -241,11 +228,10 @@ def measure_field(
 ) -> dict[str, Any]:
     """The content of field.json (docs/artefacts.md). commands: split -> its captured stretches."""
     assert network.skeleton is not None
-    walked = {name: follow_path(network, runtime, path, options.path_laps) for name, path in paths().items()}
     split = next((name for name in ("held_out", "train") if commands.get(name)), None)
     straight = straight_walk(network, runtime, options.field_seconds)
     return {
-        "paths": {name: {"cm": cm, "degrees": degrees} for name, (cm, degrees) in walked.items()},
+        "paths": {name: follow_path(network, runtime, path) for name, path in paths().items()},
         "response": {
             "walk": response(network, runtime, "walk", WALK),
             "jog": response(network, runtime, "jog", JOG),

@@ -26,12 +26,12 @@ from hobble.core.quat import Array
 from hobble.core.smooth import gaussian
 from hobble.figure.pack import links_of_bones
 from hobble.measures.study import PARTS, QUESTIONS
+from hobble.measures.walks import record
 from hobble.models.network import Network
 from hobble.report.parts import embedded
 from hobble.report.raster import FPS, BodyRenderer, Camera, Picture, webp
 from hobble.report.stimuli import draw_loop
 from hobble.report.templates import load_template, own_file
-from hobble.runtime.animation import ProceduralAnimation
 from hobble.runtime.generated import make_loop
 from hobble.runtime.options import Runtime
 
@@ -141,16 +141,13 @@ def film_motion(
     links: part that hurts in it -> link; a part without a link stays healthy. Returns positions (F, J, 3) in
     the world, cm, and rotations (F, J, 4).
     """
-    animation = ProceduralAnimation(network, **dict(runtime))
-    poses = []
-    for frame in range(-round(WARM_UP_SECONDS * FPS), round(film.seconds * FPS)):
+    warm_up, targets = round(WARM_UP_SECONDS * FPS), []
+    for frame in range(-warm_up, round(film.seconds * FPS)):
         severities, gait = film.at(frame)
         injury = {links[part]: severity for part, severity in severities.items() if part in links}
-        pose = animation.next_pose(np.array([0.0, SPEEDS[gait]]), None, gait, **{INJURY: injury})
-        if frame >= 0:
-            poses.append((pose.positions, pose.rotations))
-    positions, rotations = map(np.array, zip(*poses, strict=True))
-    return positions, rotations
+        targets.append({"target_velocity": [0.0, SPEEDS[gait]], "gait": gait, INJURY: injury})
+    positions, rotations = record(network, runtime, targets, ("positions", "rotations"))
+    return positions[warm_up:, 0], rotations[warm_up:, 0]
 
 
 def distance_from_healthy(positions: Array, healthy: Array) -> float:

@@ -1,4 +1,4 @@
-"""How the gait changes as the severity of each link rises from 0 to 10 and falls again.
+"""How the gait changes as the severity of each link rises from 0 to 10.
 
 A link is the piece of the body between two neighbouring joints. Its label in files is a pair of joints, such
 as "LeftUpLeg-LeftLeg". Readers of the page see a name such as "left thigh". `found` is the content of
@@ -8,8 +8,7 @@ injury.json.
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from itertools import product
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from pydantic import Field
@@ -17,7 +16,7 @@ from pydantic import Field
 from hobble.core.files import Json
 from hobble.core.section import PositiveFloat, Section
 from hobble.measures.compare import ComparisonAddition, ConfigurationResults
-from hobble.measures.measure import Cost, Measure
+from hobble.measures.measure import Cost, Measure, flatten
 from hobble.measures.shown import STRIP_HEIGHT, STRIP_WIDTH, grouped, line, strip, strips, with_spoken_names
 from hobble.report import parts
 from hobble.runtime.options import Runtime
@@ -43,19 +42,11 @@ MEASURE = Measure(
     cost=Cost(memory_mb=600, least_minutes=60),
 )
 UNTRAINED = "never hurt in training"
-GAIT_COLOURS = {"walk": "@accent", "jog": "@g2"}
 COLOURS = ("@accent", "@g2", "@g3", "@g4", "@g5", "@g0")  # of the lines in a chart
-# The marker of links that were never hurt in training.
-HOLLOW = {"symbol": "circle-open", "size": 8, "line": {"width": 1.2}}
-# The charts of each link at severity 10: name, key of a response, label of the axis, its least range.
-EFFECTS = (
-    ("injury-pose", "from_healthy_cm", "cm per joint at severity 10", 2.0),
-    ("injury-speed", "speed_share", "share of the healthy speed", 1.0),
-)
-# The small charts of a sweep: name -> title, unit, keys of a row -> labels of the lines, from the first
-# colour on.
+# Groups of small charts: name -> title, unit, keys of a row -> labels of the lines, from the first colour on.
+Panels = Mapping[str, tuple[str, str, Mapping[str, str]]]
 BOTH_SIDES = {"{}_left": "left", "{}_right": "right"}
-PANELS: Mapping[str, tuple[str, str, Mapping[str, str]]] = {
+SWEEPS: Panels = {
     "pose": ("Pose", "cm", {"from_healthy": "from healthy", "from_worst": "from severity 10"}),
     "speed": ("Speed", "cm/s", {"speed": "speed"}),
     "stance": ("Time on each foot", "share", BOTH_SIDES),
@@ -65,6 +56,18 @@ PANELS: Mapping[str, tuple[str, str, Mapping[str, str]]] = {
     "lean": ("Lean of the trunk", "degrees", {"lean_forward": "forward", "lean_left": "to the left"}),
     "hip": ("Height of the hips", "cm", {"hip_height": "hips"}),
     "rough": ("Largest acceleration of a joint", "cm per frame²", {"largest_acceleration": "joint"}),
+}
+SECOND_SWEEP: Panels = {
+    "pose": ("Pose", "cm", {"from_first_cm": "from first", "from_second_cm": "from second"}),
+    "speed": (
+        "Speed",
+        "cm/s",
+        {"speed": "both", "speed_of_first": "only the first", "speed_of_second": "only the second"},
+    ),
+}
+INTO_A_JOG: Panels = {
+    "pose": ("Pose", "cm", {"jog_from_healthy_cm": "of the jog", "walk_from_healthy_cm": "of the walk"}),
+    "speed": ("Speed", "cm/s", {"jog_speed": "of the jog", "walk_speed": "of the walk"}),
 }
 
 
@@ -77,31 +80,36 @@ def section(found: Json, material: ReportMaterial) -> parts.PageSection:
 def _parts(found: Json, material: ReportMaterial) -> list[parts.SectionPart]:
     skeleton, published = material.network["skeleton"], material.published["severities"]
     found = with_spoken_names(found, skeleton)
-    rows, responses, jogs, sweep = (found[k] for k in ("rows", "responses", "into_a_jog", "second_sweep"))
+    rows, responses = found["rows"], found["responses"]
     untrained = {r["link"] for r in responses if not r["trained"]}
+    of_links = grouped(sorted(rows, key=lambda row: row["link"] in untrained), "link")
+    swept = {
+        link + (f" ({UNTRAINED})" if link in untrained else ""): (of_link, (3.5, 6.5))
+        for link, of_link in of_links.items()
+    }
+    pairs = {
+        f"{second} over {first} at {at:g}": (of_pair, published[f"second_over_{at:g}"].values())
+        for (first, second, at), of_pair in grouped(
+            found["second_sweep"], "first", "second", "first_severity"
+        ).items()
+    }
+    of_jogs = grouped([row for row in found["into_a_jog"] if row["link"]], "link")
+    jogs = {link: (of_link, (3.5, 7.5)) for link, of_link in of_jogs.items()}
+    more = ["untrained"] if untrained else []
 
     def say(key: str, records: parts.Records) -> parts.Table:
         return parts.told_table(f"{material.name}-{key}", records, f"injury.{key.removeprefix('injury-')}")
 
-    flat = [
-        r | {f"{way}_{key}": rho for way in ("spearman", "spearman_falling") for key, rho in r[way].items()}
-        for r in responses
-    ]
     ranges = range_records([row for row in rows if row["link"] not in untrained], published["one_link"])
     return [
-        parts.SectionPart(0, parts.ChartGroup([effect_chart(responses, *each) for each in EFFECTS])),
-        parts.SectionPart(10, say("injury-responses", flat)),
+        parts.SectionPart(0, say("injury-responses", [flatten(row) for row in responses]), open=True),
         parts.SectionPart(15, strip_chart(found["strips"], skeleton)),
-        parts.SectionPart(20, sweep_charts(rows, found["falling"], untrained) if rows else None),
+        parts.SectionPart(20, panels("sweeps", SWEEPS, swept, "Link", more) if swept else None),
         parts.SectionPart(25, say("injury-ranges", ranges), open=True),
-        parts.SectionPart(42, second_sweep_chart(sweep, published)),
+        parts.SectionPart(42, panels("second-sweep", SECOND_SWEEP, pairs, "Injuries") if pairs else None),
         parts.SectionPart(45, say("second-thresholds", found["second_thresholds"]), open=True),
-        parts.SectionPart(51, say("second-sweep", sweep)),
-        parts.SectionPart(
-            60, parts.ChartGroup([divided_chart(found["divided"]), jog_chart(jogs, untrained)])
-        ),
-        parts.SectionPart(65, say("into-a-jog", jogs)),
-        parts.SectionPart(70, say("injury", rows)),
+        parts.SectionPart(60, divided_chart(found["divided"])),
+        parts.SectionPart(65, panels("into-a-jog", INTO_A_JOG, jogs, "Link") if jogs else None),
     ]
 
 
@@ -116,27 +124,15 @@ def compared(all_measured: Sequence[ConfigurationResults], published: Json) -> C
 
 
 def compared_section(compared: parts.Compared) -> parts.PageSection:
-    """A table with a row for each measure, and a column for each gait of each configuration with injuries.
+    """A table with a row for each measure, and a column for each configuration with injuries.
 
     Empty if no configuration has a character that can be hurt.
     """
-    summaries = {
-        f"{entry['configuration']}, {gait}": summary
-        for entry in compared["injury"]
-        for gait, summary in (entry.get("summary") or {}).items()
-    }
+    summaries = {e["configuration"]: e["summary"] for e in compared["injury"] if e.get("summary")}
     rows = [
         {"measure": label} | {column: summary.get(key) for column, summary in summaries.items()}
         for key, label in parts.told("injury.means")["rows"].items()
     ]
-    # The measurement `recognition` gives one share for each configuration. It is from walks, not from jogs.
-    shares = {
-        f"{e['configuration']}, walk": e["generated"]["right"]
-        for e in compared["recognition"]
-        if e.get("applies")
-    }
-    if shares:
-        rows.append({"measure": parts.words("injury.recognised")} | {c: shares.get(c) for c in summaries})
     means = parts.table("compare-injury", rows, title=parts.told("injury.means")["title"])
     content = [
         parts.SectionPart(0, parts.Paragraph(parts.words("injury.introduction"))),
@@ -166,8 +162,8 @@ def range_records(rows: parts.Records, ranges: Json) -> list[dict[str, object]]:
     """
     ends = [high for _, high in (ranges["little"], ranges["changing"])] + [ranges["as_trained"][0]]
     records = []
-    for (gait, link), of_link in grouped(rows, "gait", "link").items():
-        record: dict[str, object] = {"gait": gait, "link": link}
+    for link, of_link in grouped(rows, "link").items():
+        record: dict[str, object] = {"link": link}
         at = {row["severity"]: row for row in of_link}
         for what, key in (("pose", "from_healthy"), ("speed", "speed")):
             whole = at[10][key] - at[0][key]
@@ -178,96 +174,41 @@ def range_records(rows: parts.Records, ranges: Json) -> list[dict[str, object]]:
     return records
 
 
-def _thresholds(severities: Collection[float]) -> list[dict]:
-    """Dotted vertical lines."""
-    return [shape for at in severities for shape in parts.reference_line(at, "")["shapes"]]
+def panels(
+    name: str,
+    charts: Panels,
+    options: Mapping[str, tuple[parts.Records, Collection[float]]],
+    choose: str,
+    more: Sequence[str] = (),
+) -> parts.ChartGroup:
+    """A group of small charts over severity. captions.yaml has its title and caption under its `name`.
 
-
-def second_sweep_chart(rows: parts.Records, published: Json) -> parts.Chart:
-    """A second injury swept over a first one at 5 and at 10, with lines at the published thresholds."""
-    options: dict[str, list[parts.Trace]] = {}
-    layouts: dict[str, dict] = {}
-    # Option -> unit, and key of a row -> label of its line.
-    shows = {
-        "pose": ("cm", {"from_first_cm": "from first", "from_second_cm": "from second"}),
-        "speed": ("cm/s", {"speed": "speed"}),
-    }
-    for (first, second, severity), of_pair in grouped(rows, "first", "second", "first_severity").items():
-        thresholds = _thresholds(published[f"second_over_{severity:g}"].values())
-        for what, (unit, lines) in shows.items():
-            option = f"{second} over {first} at {severity:g}, {what}"
-            options[option] = [
-                line(label, of_pair, key, colour, mode="lines+markers")
+    options: text in the menu -> the rows to show, and severities of published thresholds. These are dotted
+    lines in the charts of pose and speed. choose: the menu's label. more: see `parts.chart`.
+    """
+    drawn = []
+    for panel, (title, unit, lines) in charts.items():
+        traces = {
+            option: [
+                line(label, rows, key.format(panel), colour, mode="lines+markers", marker={"size": 5})
                 for (key, label), colour in zip(lines.items(), COLOURS, strict=False)
             ]
-            layouts[option] = {"shapes": thresholds, "yaxis": parts.axis(unit)}
-        for one, colour in (("first", "@muted"), ("second", "@faint")):
-            options[option].append(
-                line(f"only the {one}", of_pair, f"speed_of_{one}", colour, dash="dot", width=1.4)
-            )
-    layout = {"xaxis": parts.axis("severity of the second injury", dtick=1), "yaxis": parts.axis("cm")}
-    return parts.chart(
-        "second-sweep", layout=layout, choose="Injuries", options=options, option_layouts=layouts
-    )
-
-
-def sweep_charts(
-    rows: parts.Records, falling: parts.Records = (), untrained: Collection[str] = ()
-) -> parts.ChartGroup:
-    """A small chart of each measure over severity, for a chosen gait and link.
-
-    rows, falling: the rows of injury.json with rising and with falling severity. Lines of falling severity
-    are dotted. untrained: links that were never hurt in training. They come last in the menu, with a remark.
-    """
-    rising = grouped(sorted(rows, key=lambda row: row["link"] in untrained), "link", "gait")
-    healing, charts = grouped(falling, "link", "gait"), []
-    for name, (title, unit, lines) in PANELS.items():
-        options: dict[str, list[parts.Trace]] = {}
-        for (link, gait), of_link in rising.items():
-            remark = f" ({UNTRAINED})" if link in untrained else ""
-            traces = options.setdefault(f"{link}, {gait}{remark}", [])
-            for (key, label), colour in zip(lines.items(), COLOURS, strict=False):
-                key = key.format(name)
-                traces.append(line(label, of_link, key, colour, mode="lines+markers", marker={"size": 5}))
-                if back := healing.get((link, gait)):
-                    dotted: dict[str, Any] = {"width": 1.3, "dash": "dot", "showlegend": False}
-                    traces.append(line(f"{label}, healing", back, key, colour, **dotted))
+            for option, (rows, _) in options.items()
+        }
+        shapes = {
+            option: {"shapes": [s for at in limits for s in parts.reference_line(at, "")["shapes"]]}
+            for option, (_, limits) in options.items()
+            if panel in ("pose", "speed")
+        }
         layout = {
             "xaxis": parts.axis("severity", dtick=2, range=[-0.3, 10.3]),
-            "yaxis": parts.axis(unit, rangemode="normal" if name == "lean" else "tozero"),
+            "yaxis": parts.axis(unit, rangemode="normal" if panel == "lean" else "tozero"),
             "showlegend": len(lines) > 1,
-            "shapes": _thresholds((3.5, 6.5)) if name in ("pose", "speed") else [],
         }
-        charts.append(parts.Chart(f"sweep-{name}", title, "", layout=layout, height=230, options=options))
-    caption = parts.words("sweeps.caption", "sweeps.falling", *(["sweeps.untrained"] if untrained else []))
-    return parts.ChartGroup(charts, "sweeps", parts.words("sweeps.title"), caption, "Link and gait")
-
-
-def effect_chart(
-    responses: parts.Records, name: str, key: str, label: str, least_range: float
-) -> parts.Chart:
-    """A chart of each link at severity 10, with a dot for each gait: one of EFFECTS.
-
-    Links that were hurt in training are at the top.
-    """
-    from_top = sorted(responses, key=lambda r: not r["trained"])
-    links = list(dict.fromkeys(r["link"] for r in from_top))[::-1]  # plotly counts from below
-    known = [r for r in responses[::-1] if r[key] is not None]
-    dots, traces = grouped(known, "gait", "trained"), []
-    for (gait, colour), hurt in product(GAIT_COLOURS.items(), (True, False)):
-        if rows := dots.get((gait, hurt)):
-            marker = {**({"size": 9} if hurt else HOLLOW), "color": colour}
-            hover = {"hovertemplate": "%{y}: %{x:.2f}<extra>%{fullData.name}</extra>"}
-            title = gait if hurt else f"{gait}, {UNTRAINED}"
-            x, y = [r[key] for r in rows], [r["link"] for r in rows]
-            traces.append(parts.marker_trace(title, x, y, marker, **hover))
-    furthest = max((r[key] for r in known), default=0.0)
-    layout = {
-        "xaxis": parts.axis(label, range=[0, 1.08 * max(least_range, furthest)]),
-        "yaxis": parts.ordered_axis(links, type="category"),
-    }
-    more = ["hollow"] if any(not r["trained"] for r in responses) else []
-    return parts.chart(name, traces, layout, 150 + 21 * len(links), more=more)
+        chart = parts.Chart(f"{name}-{panel}", title, "", (), layout, 230, None, traces, shapes)
+        drawn.append(chart)
+    caption = parts.words(*(f"{name}.{key}" for key in ("caption", *more)))
+    return parts.ChartGroup(drawn, name, parts.words(f"{name}.title"), caption, choose)
 
 
 def divided_chart(rows: parts.Records) -> parts.Chart:
@@ -302,34 +243,6 @@ def divided_chart(rows: parts.Records) -> parts.Chart:
     )
 
 
-def jog_chart(rows: parts.Records, untrained: Collection[str] = ()) -> parts.Chart:
-    """A jog after a hurt walk: how much of the injury shows, and the speed, with a line for each link.
-
-    rows: `into_a_jog` of injury.json. untrained: links that were never hurt in training. They share one line.
-    """
-    of_links = grouped([row for row in rows if row["link"]], "link")
-    hurt = [link for link in of_links if link not in untrained]
-    options: dict[str, list[parts.Trace]] = {}
-    for option, key in (("pose, cm per joint", "jog_from_healthy_cm"), ("speed, cm/s", "jog_speed")):
-        traces = []
-        for i, link in enumerate(hurt):
-            dash, colour = "solid" if i < len(COLOURS) else "dash", COLOURS[i % len(COLOURS)]
-            traces.append(line(link, of_links[link], key, colour, dash=dash, mode="lines+markers", width=1.4))
-        without = [row[key] for row in rows if row["link"] in untrained and row.get(key) is not None]
-        if without:
-            mean = [float(np.mean(without))] * 2
-            traces.append(parts.line_trace(UNTRAINED, [1, 10], mean, "@muted", dash="dot", width=1.4))
-        options |= {option: traces} if traces else {}
-    layout = {
-        "xaxis": parts.axis("severity", dtick=1),
-        "yaxis": {"rangemode": "tozero"},
-        "showlegend": True,
-        "shapes": _thresholds((3.5, 7.5)),
-    }
-    more = ["untrained"] if untrained else []
-    return parts.chart("into-a-jog", layout=layout, height=420, choose="Shown", options=options, more=more)
-
-
 def hints(found: Json, material: ReportMaterial) -> Iterator[parts.Hint]:
     """Whether and how much each hurt link changes the walk, and whether the walk recovers.
 
@@ -337,7 +250,7 @@ def hints(found: Json, material: ReportMaterial) -> Iterator[parts.Hint]:
     walk, which is how much a walk changes with the severity of a link that was never hurt in training.
     """
     found = with_spoken_names(found, material.network["skeleton"])
-    responses = [r for r in found.get("responses") or () if r["gait"] == "walk"]
+    responses = found.get("responses") or ()
     trained = [r for r in responses if r["trained"]]
     if not trained:
         return

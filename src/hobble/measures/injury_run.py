@@ -1,17 +1,16 @@
-"""Measures how a walk and a jog change while the severity of one link rises from 0 to 10 and falls again.
+"""Measures how a walk changes while the severity of one link rises from 0 to 10.
 
 A link is the piece of the body between two neighbouring joints. All figures (copies of the character) walk at
 once, each with its own injuries, in stretches in which severities and gaits stay the same. In the sweep there
-is a figure for each gait and link. It walks healthy until it has reached its speed. Then the severity of its
-link is 0, 1, ..., 10, 9, ..., 0. A second crowd shows how fast the walk changes: each severity jumps from 0
-to 10 and later back to 0. The other experiments of Ferre et al. (2019) are made, too: a second injury, a
-change from walking to jogging, and divided severities.
+is a figure for each link. It walks healthy until it has reached its speed. Then the severity of its
+link is 0, 1, ..., 10, and at the end 0 again. The other experiments of Ferre et al. (2019) are made, too: a
+second injury, a change from walking to jogging, and divided severities.
 
 The distance of a walk from a reference walk is the mean distance of its joints, in cm, from the mean cycle of
 the reference walk at the same phase. The spread of a walk is its distance from its own mean cycle.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from itertools import product
 from typing import Any
 
@@ -27,13 +26,9 @@ from hobble.models.network import Network
 from hobble.runtime.options import Runtime
 
 INJURY = "injury"  # the channel
-GAITS = tuple(walks.SPEEDS)  # "walk" and "jog"
 SEVERITIES = np.arange(11.0)
-STEPS = [*SEVERITIES, *SEVERITIES[-2::-1]]  # severity in each stretch of the sweep: 0, 1, ..., 10, 9, ..., 0
-WORST = len(SEVERITIES) - 1  # index in STEPS of the highest severity
 WALK_IN = 0.75  # time at the beginning in which figures reach their speed, as a share of a stretch's time
-# In the second crowd, a link hurts for the time of this many stretches, and then is healthy for as long.
-JUMP_STRETCHES = 2
+HEALED = 2  # stretches of time in which nothing hurts at the end of a sweep
 # The experiment of Ferre et al. with two injuries: a first one at each of FIRST_SEVERITIES, while the second
 # one is swept over SEVERITIES, for the pairs of parts that hurt in their films.
 FIRST_SEVERITIES = (5.0, 10.0)
@@ -49,13 +44,9 @@ LEAST_EFFECT_CM = 0.05  # no share of a smaller effect is computed
 SUMMARISED = (
     "spearman_from_healthy",
     "spearman_speed",
-    "spearman_falling_from_healthy",
     "from_healthy_cm",
     "after_healing_cm",
-    "hysteresis_cm",
     "speed_share",
-    "settle_seconds",
-    "heal_seconds",
     "acceleration_share",
 )
 Rows = list[dict[str, Any]]
@@ -64,21 +55,22 @@ Stretch = tuple[float, Sequence[Injury]]  # length as a share of the time, and t
 
 
 def walk_crowd(
-    network: Network, gaits: Sequence[str], stretches: Iterable[Stretch], seconds: float, runtime: Runtime
+    network: Network, stretches: Sequence[Stretch], seconds: float, runtime: Runtime
 ) -> walks.Walks:
-    """Let a crowd walk. gaits: of each figure. seconds: the time of a stretch of length 1.
+    """Let a crowd walk. seconds: the time of a stretch of length 1.
 
     Before the given stretches, there is one (stretch 0) in which the figures reach their speed, with the
     injuries of the first stretch.
     """
-    stretches = list(stretches)
-    script = [
-        walks.CrowdTarget(
-            max(4, round(share * seconds * walks.FPS)), gaits, walks.channel_values(network, INJURY, injuries)
-        )
-        for share, injuries in [(WALK_IN, stretches[0][1]), *stretches]
-    ]
+    script = []
+    for share, injuries in [(WALK_IN, stretches[0][1]), *stretches]:
+        cases = [{INJURY: injury} for injury in injuries]
+        script.append(walks.CrowdTarget(_frames(share * seconds), ["walk"] * len(cases), cases))
     return walks.generate_walks(network, script, runtime)
+
+
+def _frames(seconds: float) -> int:
+    return max(4, round(seconds * walks.FPS))
 
 
 def injury_response(
@@ -109,7 +101,7 @@ def injury_response(
         "links": links,
         "trained": trained,
         **found,
-        "into_a_jog": into_a_jog(network, links, trained, seconds, runtime),
+        "into_a_jog": into_a_jog(network, trained, seconds, runtime),
         "divided": divided_severities(network, trained, seconds, runtime),
         "strips": strips,
         "summary": summarise([r for r in responses if r["trained"]]),
@@ -119,26 +111,18 @@ def injury_response(
 def sweep(
     network: Network, links: Sequence[str], trained: Sequence[str], seconds: float, runtime: Runtime
 ) -> dict[str, Rows]:
-    """`rows` (rising severity), `falling`, `responses` and the first `strips` of `injury_response`."""
-    figures = [(gait, link) for gait in GAITS for link in links]
-
-    def crowd(*stretches: tuple[float, float]) -> walks.Walks:
-        """The crowd of all figures. stretches: share of the time and severity of each."""
-        hurt = [(share, [{link: severity} for _, link in figures]) for share, severity in stretches]
-        return walk_crowd(network, [gait for gait, _ in figures], hurt, seconds, runtime)
-
-    gradual = crowd(*((1, severity) for severity in STEPS))
-    at_once = crowd((1, 0), (JUMP_STRETCHES, 10), (JUMP_STRETCHES, 0))
-    found: dict[str, Rows] = {"rows": [], "falling": [], "responses": [], "strips": []}
-    for figure, (gait, link) in enumerate(figures):
-        rows = sweep_rows(gradual, figure, gait, link)
-        found["rows"] += rows[: WORST + 1]
-        found["falling"] += rows[WORST + 1 :]
-        labels = {"gait": gait, "link": link, "trained": link in trained}
-        response = respond(rows, gradual.roughness(figure, 1), _settling_times(at_once, figure))
-        found["responses"].append({**labels, **response})
-        if gait == "walk" and link in trained:
-            cycles = [gradual.cycle(1 + severity, figure) for severity in STRIP_SEVERITIES]
+    """`rows`, `responses` and the first `strips` of `injury_response`."""
+    steps = [*((1, severity) for severity in SEVERITIES), (HEALED, 0.0)]
+    stretches = [(share, [{link: severity} for link in links]) for share, severity in steps]
+    crowd = walk_crowd(network, stretches, seconds, runtime)
+    found: dict[str, Rows] = {"rows": [], "responses": [], "strips": []}
+    for figure, link in enumerate(links):
+        rows = sweep_rows(crowd, figure, link)
+        found["rows"] += rows
+        labels = {"link": link, "trained": link in trained}
+        found["responses"].append({**labels, **respond(crowd, figure, rows)})
+        if link in trained:
+            cycles = [crowd.cycle(1 + severity, figure) for severity in STRIP_SEVERITIES]
             strip = {"link": link, "first": None, **strip_of(cycles), "severities": STRIP_SEVERITIES}
             found["strips"].append(strip)
     return found
@@ -150,78 +134,49 @@ def strip_of(cycles: Sequence[Array]) -> dict[str, Any]:
     return {"phase": round(at / len(cycles[0]), 5), "poses": [np.round(c[at], 1).tolist() for c in cycles]}
 
 
-def sweep_rows(crowd: walks.Walks, figure: int, gait: str, link: str) -> Rows:
-    """One row for each of STEPS: labels, `gait_measures` and distances.
+def sweep_rows(crowd: walks.Walks, figure: int, link: str) -> Rows:
+    """One row for each of SEVERITIES: labels, `gait_measures` and distances.
 
-    from_healthy, from_worst, from_rising: distance from the healthy walk, from the walk at severity 10, and
-    from the walk at the same severity while the severity rose.
+    from_healthy, from_worst: distance from the healthy walk, and from the walk at severity 10.
     """
-    cycles = [crowd.cycle(1 + step, figure) for step in range(len(STEPS))]
-    rows = []
-    for step, severity in enumerate(STEPS):
-        references = {"healthy": 0, "worst": WORST, "rising": min(step, 2 * WORST - step)}
-        row = {
-            "gait": gait,
-            "link": link,
-            "direction": "rising" if step <= WORST else "falling",
-            "severity": float(severity),
-            **crowd.measures(1 + step, figure),
-            **{f"from_{n}": crowd.distance(1 + step, figure, cycles[i]) for n, i in references.items()},
-            "largest_acceleration": float(
-                crowd.acceleration[crowd.measured_frames(1 + step, figure), figure].max()
-            ),
-        }
-        rows.append(walks.rounded(row))
-    return rows
+    healthy, worst = (crowd.cycle(stretch, figure) for stretch in (1, len(SEVERITIES)))
+    return [
+        walks.rounded(
+            {
+                "link": link,
+                "severity": float(severity),
+                **crowd.measures(at, figure),
+                "from_healthy": crowd.distance(at, figure, healthy),
+                "from_worst": crowd.distance(at, figure, worst),
+                "largest_acceleration": float(
+                    crowd.acceleration[crowd.measured_frames(at, figure), figure].max()
+                ),
+            }
+        )
+        for at, severity in enumerate(SEVERITIES, 1)
+    ]
 
 
-def respond(rows: Rows, largest: float, times: Mapping[str, float | None]) -> dict[str, Any]:
-    """How a walk responds to severity.
+def respond(crowd: walks.Walks, figure: int, rows: Rows) -> dict[str, Any]:
+    """How a walk responds to severity. rows: from `sweep_rows`.
 
-    rows: from `sweep_rows`. largest: acceleration in the whole sweep. times: settle_seconds, heal_seconds.
-
-    spearman, spearman_falling: measure of the walk -> its rank correlation with rising and with falling
-    severity, None if the measure is constant. from_healthy_cm: distance from the healthy walk at severity 10.
-    after_healing_cm: the same distance at the end, when severity is 0 again. hysteresis_cm: largest distance
-    between two walks at the same severity, one while severity rises and one while it falls. From each of
-    these three distances, the spread of the healthy walk is subtracted. speed_share: speed at severity 10,
-    divided by the healthy speed; None if the healthy figure stands still.
+    spearman: measure of the walk -> its rank correlation with severity, None if the measure is constant.
+    from_healthy_cm: distance from the healthy walk at severity 10. after_healing_cm: the same distance at the
+    end, when severity is 0 again. From both, the spread of the healthy walk is subtracted. speed_share: speed
+    at severity 10, divided by the healthy speed; None if the healthy figure stands still.
     """
-    healthy, worst, healed = rows[0], rows[WORST], rows[-1]
-    labels = ("gait", "link", "direction", "severity", "from_rising")
-    measures = {name: [row[name] for row in rows] for name in healthy if name not in labels}
-    spread = healthy["from_healthy"]
+    healthy, worst, end = rows[0], rows[-1], len(SEVERITIES) + 1
+    largest = crowd.roughness(figure, 1, end)
+    measures = [name for name in healthy if name not in ("link", "severity")]
     found = {
-        "spearman": {n: walks.spearman(SEVERITIES, values[: WORST + 1]) for n, values in measures.items()},
-        "spearman_falling": {
-            n: walks.spearman(SEVERITIES[::-1], values[WORST:]) for n, values in measures.items()
-        },
-        "from_healthy_cm": worst["from_healthy"] - spread,
-        "after_healing_cm": healed["from_healthy"] - spread,
-        "hysteresis_cm": max(row["from_rising"] for row in rows[WORST + 1 :]) - spread,
+        "spearman": {n: walks.spearman(SEVERITIES, [row[n] for row in rows]) for n in measures},
+        "from_healthy_cm": worst["from_healthy"] - healthy["from_healthy"],
+        "after_healing_cm": crowd.change(end, figure, 1),
         "speed_share": worst["speed"] / healthy["speed"] if healthy["speed"] > 0 else None,
-        **times,
         "largest_acceleration": largest,
         "acceleration_share": largest / max(healthy["largest_acceleration"], 1e-9),
     }
     return walks.rounded(found)
-
-
-def _settling_times(crowd: walks.Walks, figure: int) -> dict[str, float | None]:
-    """Time until the walk no longer changes, after the severity has jumped to 10 and back to 0.
-
-    None if the walk does not change.
-    """
-    phase = crowd.phase[:, figure]
-    distance = walks.distance_to_cycle(crowd.local[:, figure], phase, crowd.cycle(1, figure))
-    before, times = float(np.mean(distance[crowd.measured_frames(1, figure)])), {}
-    # Stretch 2 is hurt, stretch 3 is healthy again. The second half of each shows the settled walk.
-    for name, stretch in (("settle_seconds", 2), ("heal_seconds", 3)):
-        start, end = crowd.starts[stretch : stretch + 2]
-        late = slice((start + end) // 2, end)
-        times[name] = walks.settling_seconds(distance[start:end], before, walks.cycle_frames(phase[late]))
-        before = float(np.mean(distance[late]))
-    return times
 
 
 def second_sweep(network: Network, links: Sequence[str], seconds: float, runtime: Runtime) -> dict[str, Rows]:
@@ -246,8 +201,7 @@ def second_sweep(network: Network, links: Sequence[str], seconds: float, runtime
         return [*({link: second} for link in single), *({a: first, b: second} for a, first, b in cases)]
 
     stretches = [(1, injuries(severity)) for severity in SEVERITIES]
-    gaits = ["walk"] * (len(single) + len(cases))
-    crowd = walk_crowd(network, gaits, stretches, seconds, runtime)
+    crowd = walk_crowd(network, stretches, seconds, runtime)
     for i, (first, first_severity, second) in enumerate(cases, len(single)):
         labels = {"first": first, "second": second, "first_severity": first_severity}
         alone = single.index(second)
@@ -296,12 +250,8 @@ def thresholds_of(rows: Rows, equal: int) -> dict[str, float | None]:
     } | walks.rounded({"equal_speed_share": share})
 
 
-def into_a_jog(
-    network: Network, links: Sequence[str], trained: Sequence[str], seconds: float, runtime: Runtime
-) -> Rows:
+def into_a_jog(network: Network, links: Sequence[str], seconds: float, runtime: Runtime) -> Rows:
     """Figures that change from walking to jogging: one without injury, then each link at severities 1 to 10.
-
-    A link that is not in `trained` is only hurt at severity 10.
 
     link: None for the healthy figure. walk_speed, jog_speed: cm/s. reach_seconds: time from the change until
     the figure has nine tenths of `jog_speed`; None if it never has. walk_from_healthy_cm,
@@ -309,13 +259,14 @@ def into_a_jog(
     kept: the latter divided by the former. It is 0 if the injury does not show in the jog.
     largest_acceleration: of any joint in the first `seconds` of the jog, cm per frame squared.
     """
-    figures: list[tuple[str | None, float]] = [(None, 0.0)]
-    figures += [(link, s) for link in links for s in (SEVERITIES[1:].tolist() if link in trained else [10.0])]
-    hurt = walks.channel_values(network, INJURY, [{link: s} if link else {} for link, s in figures])
-    frames = max(4, round(seconds * walks.FPS))
+    figures: list[tuple[str | None, float]] = [(None, 0.0), *product(links, SEVERITIES[1:].tolist())]
+    hurt, gaits = [{INJURY: {link: s} if link else {}} for link, s in figures], ("walk", "walk", "jog")
+    frames = _frames(seconds)
     # In stretch 0 the figures reach their speed.
-    lengths = ((frames, "walk"), (frames, "walk"), (2 * frames, "jog"))
-    script = [walks.CrowdTarget(length, [gait] * len(figures), hurt) for length, gait in lengths]
+    script = [
+        walks.CrowdTarget(length, [gait] * len(figures), hurt)
+        for length, gait in zip((frames, frames, 2 * frames), gaits, strict=True)
+    ]
     crowd, out = walks.generate_walks(network, script, runtime), []
     start = int(crowd.starts[2])  # the first frame of the jog
     for i, (link, severity) in enumerate(figures):
@@ -348,7 +299,7 @@ def divided_severities(network: Network, links: Sequence[str], seconds: float, r
     out = []
     for divisor in DIVISORS:
         divided = runtime.model_copy(update={"scales": {**runtime.scales, INJURY: divisor}})
-        crowd = walk_crowd(network, ["walk"] * len(links), stretches, seconds, divided)
+        crowd = walk_crowd(network, stretches, seconds, divided)
         for (i, link), (at, severity) in product(enumerate(links), enumerate(SEVERITIES_TO_DIVIDE, 1)):
             row = {
                 "scale": divisor,
@@ -362,13 +313,12 @@ def divided_severities(network: Network, links: Sequence[str], seconds: float, r
     return out
 
 
-def summarise(responses: Rows) -> dict[str, dict[str, float | None]]:
-    """Gait -> means over `responses`, which are of several links. Empty if there are no responses."""
+def summarise(responses: Rows) -> dict[str, float | None]:
+    """Means over `responses`, which are of several links. Empty if there are no responses."""
     if not responses:
         return {}
-    frame = pandas.json_normalize(responses, sep="_").set_index("gait")[list(SUMMARISED)].astype(float)
-    means = frame.groupby("gait", sort=False).mean().to_dict("index")
-    return {str(gait): walks.rounded(row) for gait, row in means.items()}
+    means = pandas.json_normalize(responses, sep="_")[list(SUMMARISED)].astype(float).mean()
+    return walks.rounded(means.to_dict())
 
 
 def run(inputs: MeasureInputs, options: Any) -> Outcome:
@@ -380,6 +330,5 @@ def run(inputs: MeasureInputs, options: Any) -> Outcome:
         seconds=options.seconds,
     )
     names = ("second_sweep", "second_thresholds", "into_a_jog", "divided")
-    tables = {name: result[name] for name in names}
-    tables["sweep"] = [*result["rows"], *result["falling"]]
+    tables = {"sweep": result["rows"], **{name: result[name] for name in names}}
     return Outcome(result, tables, str(result["summary"]))

@@ -40,7 +40,6 @@ MEASURE = Measure(
 )
 # The effects in the chart.
 SHOWN_EFFECTS = ("speed", "stance", "step_hurt", "knee_hurt", "hip_hurt", "lean", "pelvis_drop", "arm_hurt")
-MOST_NAMED = 8  # a sentence lists the hurt links if there are at most this many
 # Part of the body -> colour of its lines in the chart. All other parts, such as arms, have the colour @g0.
 COLOURS = {"hip": "@g1", "pelvis": "@g1", "thigh": "@g2", "shank": "@g3", "foot": "@g4", "back": "@g5"}
 
@@ -48,7 +47,7 @@ COLOURS = {"hip": "@g1", "pelvis": "@g1", "thigh": "@g2", "shank": "@g3", "foot"
 def section(found: Json, material: ReportMaterial) -> parts.PageSection:
     """The part of the section on injuries that shows limp.json.
 
-    It says where the limps of the training data come from. It has the chart of sizes, and all tables.
+    It has the chart of sizes, the gallery, and all tables.
     """
     if not found.get("applies"):
         return parts.PageSection("injury", [])
@@ -59,18 +58,12 @@ def section(found: Json, material: ReportMaterial) -> parts.PageSection:
         return parts.told_table(f"{material.name}-limp-{key}", records, f"limp.{key}")
 
     exam = [{**row, "injury": _injury(row["hurt_links"])} for row in found["held_out_limps"]]
-    captured = [{**row, "injury": _injury(row["hurt"])} for row in found["captured"]]
-    sources = hurt_motion_in_words(found["hurt_seconds"]) + sample_sentence(found)
     content = [
-        parts.SectionPart(1, parts.Paragraph(sources)),
         parts.SectionPart(2, size_chart(found)),
         parts.SectionPart(2, gallery_chart(found, skeleton)),
-        parts.SectionPart(3, parts.Paragraph(parts.words("limp.recognisers"))),
+        parts.SectionPart(3, parts.Paragraph(parts.words("limp.recognisers") + sample_sentence(found))),
         parts.SectionPart(3, say("named", found["named"])),
         parts.SectionPart(4, say("exam", exam)),
-        parts.SectionPart(5, say("together", found["named_together"])),
-        parts.SectionPart(80, say("sizes", found["sizes"])),
-        parts.SectionPart(81, say("captured", captured)),
     ]
     return parts.PageSection("injury", content)
 
@@ -78,23 +71,6 @@ def section(found: Json, material: ReportMaterial) -> parts.PageSection:
 def _injury(hurt: Mapping[str, float]) -> str:
     """The hurt links (link -> severity) in words."""
     return ", ".join(f"{link} {severity:g}" for link, severity in hurt.items())
-
-
-def hurt_motion_in_words(hurt_seconds: Mapping[str, Mapping[str, float]]) -> str:
-    """Sentences that say how much captured and how much generated hurt motion the training data have.
-
-    hurt_seconds: "captured" or "made" -> link -> seconds.
-    """
-    sentences = []
-    for key, origin in (("captured", "captured"), ("made", "generated from healthy clips")):
-        if by_link := hurt_seconds[key]:
-            names = f" ({', '.join(by_link)})" if len(by_link) <= MOST_NAMED else ""
-            links = f"summed over {len(by_link)} links" if len(by_link) != 1 else "of one link"
-            seconds = parts.format_number(sum(by_link.values()), 3)
-            sentences.append(f"Hurt motion in training, {origin}: {seconds} s, {links}{names}.")
-    if any(len(by_link) > 1 for by_link in hurt_seconds.values()):
-        sentences.append("A second in which two links hurt counts twice.")
-    return " ".join(sentences) or "No link was hurt in training."
 
 
 def gallery_chart(found: Json, skeleton: Json) -> parts.Chart | parts.Paragraph:
@@ -133,36 +109,20 @@ def size_chart(found: Json) -> parts.Chart:
 
     The effect is chosen in a menu.
     """
-    of_links = grouped(
-        [
-            row
-            for row in found["sizes"]
-            if row["gait"] == "walk" and (row["part"] in COLOURS or "arm" in row["part"])
-        ],
-        *("link", "part", "side"),
-    )
-
-    def people(i: int, gait: str, mean: float, spread: float) -> parts.Trace:
-        x = [10.3 + 0.1 * i]  # side by side, to the right of severity 10
-        bars = {"type": "data", "array": [spread], "visible": True}
-        name = f"people, {gait.replace('_', ' ')}"
-        return parts.marker_trace(name, x, [mean], {"color": "@muted", "size": 8}, error_y=bars)
-
-    options = {
-        found["effects"][effect]: [
-            *(
-                line(
-                    link,
-                    rows,
-                    effect,
-                    COLOURS.get(part, "@g0"),
-                    dash="dot" if side == "right" else "solid",
-                )
-                for (link, part, side), rows in of_links.items()
-            ),
-            *(people(i, gait, *sizes[effect]) for i, (gait, sizes) in enumerate(found["people"].items())),
-        ]
-        for effect in SHOWN_EFFECTS
-    }
+    walks = [row for row in found["sizes"] if row["gait"] == "walk"]
+    shown = [row for row in walks if row["part"] in COLOURS or "arm" in row["part"]]
+    of_links = grouped(shown, "link", "part", "side")
+    options: dict[str, list[parts.Trace]] = {}
+    for effect in SHOWN_EFFECTS:
+        traces = options.setdefault(found["effects"][effect], [])
+        for (link, part, side), rows in of_links.items():
+            dash, colour = "dot" if side == "right" else "solid", COLOURS.get(part, "@g0")
+            traces.append(line(link, rows, effect, colour, dash=dash))
+        for i, (gait, sizes) in enumerate(found["people"].items()):
+            mean, spread = sizes[effect]
+            x = [10.3 + 0.1 * i]  # side by side, to the right of severity 10
+            bars = {"type": "data", "array": [spread], "visible": True}
+            name, marker = f"people, {gait.replace('_', ' ')}", {"color": "@muted", "size": 8}
+            traces.append(parts.marker_trace(name, x, [mean], marker, error_y=bars))
     layout = {"xaxis": parts.axis("severity", range=[2.5, 11]), "yaxis": parts.axis("size")}
     return parts.chart("limp-sizes", layout=layout, height=560, choose="Effect", options=options)

@@ -16,26 +16,16 @@ from typing import Any
 
 import numpy as np
 
-from hobble.channels import channel
-from hobble.core.errors import HobbleError
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 from hobble.gait import profile
 from hobble.gait.cycles import WalkCycles, join_walks, measure_cycles
 from hobble.gait.recognise import SIDES, compare_walk, examples_of_people
 from hobble.hurt.effects import part_of_link
+from hobble.measures import walks
 from hobble.measures.measure import MeasureInputs, Outcome
 from hobble.measures.sample import HURT_VERSION, ClipPart, clip_parts, sample_to_measure, with_sample
-from hobble.measures.walks import (
-    FPS,
-    PHASES,
-    in_world,
-    mean_cycle,
-    mean_of_known,
-    rounded,
-    share_of_true,
-    walk_straight,
-)
+from hobble.measures.walks import FPS, PHASES, Case, mean_of_known, rounded, share_of_true
 from hobble.models.load import load_network
 from hobble.models.network import Network
 from hobble.rows.clip_rows import ClipRows, captured_stretches, headings
@@ -48,12 +38,11 @@ SEVERITIES = (3.0, 5.0, 7.0, 10.0)  # of the link that hurts; only one link hurt
 SPEEDS = {"walk": 2.0, "jog": 7.0}  # target speeds, cm a frame; 2 is 1.2 m/s, a usual walking speed
 LEG = ("hip", "thigh", "shank", "foot")  # parts of the body that belong to a leg
 WARM_UP_FRAMES = 5 * FPS  # frames that are not measured, while figures reach their speed and begin to limp
-RECOGNISED = ("impaired", "named", "wrong_side")  # keys of a row: shares of its windows
+RECOGNISED = ("named", "wrong_side")  # keys of a row: shares of its windows
 IN_GALLERY = 6  # captured limps that the report shows beside the character
 MIRROR = "_mirror"  # end of the name of a mirrored clip
 Rows = list[dict[str, Any]]
 Injury = Mapping[str, float]  # link -> severity, only of links that hurt
-Case = Mapping[str, Mapping[str, float]]  # channel -> column -> value of a figure
 
 
 @dataclass(frozen=True)
@@ -91,47 +80,29 @@ def walk_figures(
     """Let a figure for each of `cases` walk straight ahead for `seconds` at the speed of the gait."""
     assert network.skeleton is not None
     frames = max(FPS, round(seconds * FPS))
-    walks = walk_straight(
-        network, cases, gait, [SPEEDS[gait]] * len(cases), (WARM_UP_FRAMES, frames), runtime
-    )
+    gaits, speeds = [gait] * len(cases), [SPEEDS[gait]] * len(cases)
+    script = [walks.CrowdTarget(length, gaits, cases, speeds) for length in (WARM_UP_FRAMES, frames)]
+    crowd = walks.generate_walks(network, script, runtime)
     hips, out = network.skeleton.role("hips"), []
     for i, case in enumerate(cases):
         span = slice(WARM_UP_FRAMES, None)
-        world = in_world(*(values[span, i] for values in (walks.local, walks.root, walks.yaw)))
+        world = walks.in_world(*(values[span, i] for values in (crowd.local, crowd.root, crowd.yaw)))
         # Distance on the ground between the first and the last position, divided by the frames between them.
         speed = float(np.linalg.norm((world[-1, hips] - world[0, hips])[::2])) / (frames - 1)
         cycles = measure_cycles(network.skeleton, world, FPS)
-        out.append(Walk(case.get(INJURY, {}), cycles, walks.cycle(1, i), "", speed, frames))
+        out.append(Walk(case.get(INJURY, {}), cycles, crowd.cycle(1, i), "", speed, frames))
     return out
 
 
-def captured_walks(
-    parts: Iterable[ClipPart], splits: Mapping[str, str], links: Sequence[str], skeleton: Skeleton
-) -> tuple[list[Walk], dict[str, dict[str, float]]]:
-    """The walks of all captured clips, and for how many seconds each link hurts in the training clips.
-
-    The seconds are "captured" or "made" (in hurt versions) -> link -> seconds. If the parts are only a sample
-    of the clips, they are estimates. parts: the parts of the clips to read, sorted by clip. splits: clip ->
-    "train" or "held_out".
-    """
-    walks: list[Walk] = []
-    seconds = {origin: np.zeros(len(links)) for origin in ("captured", "made")}
+def captured_walks(parts: Iterable[ClipPart], links: Sequence[str], skeleton: Skeleton) -> list[Walk]:
+    """The walks of all captured clips. parts: the parts of the clips to read, sorted by clip."""
+    found = []
     for clip, parts_of_clip in groupby(parts, key=lambda part: part.clip):
-        made = HURT_VERSION.search(clip) is not None
-        rows_of_clip: list[ClipRows] = []
-        for part in parts_of_clip:
-            rows = part.load().rows
-            if splits.get(clip) == "train":
-                hurts = np.sum(rows.channels[INJURY] > 0, axis=0)
-                seconds["made" if made else "captured"] += hurts * part.weight / FPS
-            if not made and len(rows):
-                rows_of_clip.append(rows)
-        if rows_of_clip and (found := _walk_of_clip(clip, rows_of_clip, links, skeleton)):
-            walks.append(found)
-    return walks, {
-        origin: {link: round(float(s), 2) for link, s in zip(links, of_links, strict=True) if s}
-        for origin, of_links in seconds.items()
-    }
+        if HURT_VERSION.search(clip) is None:
+            rows_of_clip = [rows for part in parts_of_clip if len(rows := part.load().rows)]
+            if rows_of_clip and (walk := _walk_of_clip(clip, rows_of_clip, links, skeleton)):
+                found.append(walk)
+    return found
 
 
 def _walk_of_clip(
@@ -144,29 +115,29 @@ def _walk_of_clip(
     severity = np.concatenate([rows.channels[INJURY] for rows in rows_of_clip])
     if np.ptp(severity, axis=0).any():
         return None
-    walks, stretches = [], []
+    parts, stretches = [], []
     for rows in rows_of_clip:
         turn = rows.y[:, rows.layout.y_turn][:, 0].astype(float)
         for stretch in captured_stretches(rows):
             if stretch.gait.mean(axis=0).argmax() == GAITS.index("walk"):
-                world = in_world(stretch.local, stretch.root, headings(turn[stretch.rows]))
-                walks.append(measure_cycles(skeleton, world, FPS))
+                world = walks.in_world(stretch.local, stretch.root, headings(turn[stretch.rows]))
+                parts.append(measure_cycles(skeleton, world, FPS))
                 stretches.append(stretch)
-    if not walks or not len(cycles := join_walks(walks)):
+    if not parts or not len(cycles := join_walks(parts)):
         return None
     hurt = {link: float(value) for link, value in zip(links, severity[0], strict=True) if value > 0}
     local, phase = (np.concatenate([getattr(s, name) for s in stretches]) for name in ("local", "phase"))
-    return Walk(hurt, cycles, mean_cycle(local, phase), clip)
+    return Walk(hurt, cycles, walks.mean_cycle(local, phase), clip)
 
 
-def healthy_reference(walk: Walk, walks: Sequence[Walk]) -> tuple[profile.Profile, str]:
+def healthy_reference(walk: Walk, captured: Sequence[Walk]) -> tuple[profile.Profile, str]:
     """The healthy walk to compare a captured walk with, and whose walk it is.
 
     "performer": it is measured over the performer's healthy clips. "data set": if the performer has no
     healthy clip, it is measured over all healthy clips. "people": if there is no healthy clip at all, it is
-    the mean normal walk of people in `hobble.gait.profile`. walks: all captured walks.
+    the mean normal walk of people in `hobble.gait.profile`. captured: all captured walks.
     """
-    healthy = [other for other in walks if not other.injury]
+    healthy = [other for other in captured if not other.injury]
     of_performer = [other for other in healthy if other.performer == walk.performer]
     for chosen, whose in ((of_performer, "performer"), (healthy, "data set")):
         if chosen:
@@ -177,7 +148,6 @@ def healthy_reference(walk: Walk, walks: Sequence[Walk]) -> tuple[profile.Profil
 def measure_limps(
     network: Network,
     captured: Sequence[Walk],
-    hurt_seconds: Mapping[str, Mapping[str, float]],
     splits: Mapping[str, str],
     *,
     configuration: str,
@@ -187,7 +157,7 @@ def measure_limps(
 ) -> dict[str, Any]:
     """The content of limp.json; docs/artefacts.md explains its keys.
 
-    If the healthy character does not walk, `applies` is false and `reason` says so. captured, hurt_seconds:
+    If the healthy character does not walk, `applies` is false and `reason` says so. captured:
     from `captured_walks`. seconds: length of each generated walk. links: names of the links to hurt, by
     default all.
     """
@@ -210,7 +180,6 @@ def measure_limps(
         for figure in crowd[1:]
     ]
     legs = [row for row in sizes if row["gait"] == "walk" and row["part"] in LEG]
-    together = limps_together(network, links, seconds, runtime)
     return {
         "configuration": configuration,
         "applies": True,
@@ -218,14 +187,12 @@ def measure_limps(
         "seconds": seconds,
         "effects": profile.EFFECTS,
         "trained": [link for link in links if link in network.trained_labels(INJURY)],
-        "hurt_seconds": hurt_seconds,
         "sizes": sizes,
-        "named": _recognition(legs, "severity"),
+        "named": _recognition(legs),
         "people": {
             gait: {name: [round(v, 5) for v in mean_and_sd] for name, mean_and_sd in of_gait.items()}
             for gait, of_gait in profile.effects_of_people().items()
         },
-        "captured": [_row_of_clip(skeleton, walk, captured) for walk in limps],
         "held_out_limps": [
             compare_held_out(walk, next(figures), healthy, healthy_reference(walk, captured))
             for walk in held_out
@@ -242,8 +209,6 @@ def measure_limps(
             }
             for walk in shown
         ],
-        "together": together,
-        "named_together": _recognition(together, "channel", "column"),
     }
 
 
@@ -253,23 +218,14 @@ def _part_and_side(skeleton: Skeleton, link: str) -> tuple[str, str | None]:
     return part.name, None if part.side is None else ("left", "right")[part.side]
 
 
-def hurt_side(skeleton: Skeleton, injury: Injury) -> str:
-    """The side of the link that hurts most.
-
-    Links on the midline count as right, because the effects need a hurt side.
-    """
-    return _part_and_side(skeleton, max(injury, key=lambda link: injury[link]))[1] or profile.RIGHT
-
-
 def row_of_walk(skeleton: Skeleton, figure: Walk, healthy: Walk) -> dict[str, Any]:
     """The row of a walk in which one link hurts: its severity, the effects, and how the walk is recognised.
 
-    called: label and side that the linear recogniser gives to the whole walk. graded: label and side that the
-    graded recogniser gives to it. impaired: share of windows in which the linear recogniser finds a limp. The
-    wrong side is the side opposite to `hurt_side`. named: share of windows in which the graded recogniser
-    finds a limp, and not on the wrong side. wrong_side: share of windows in which it finds one on the wrong
-    side; None for a link on the midline. speed_share: speed, divided by the speed of the healthy walk.
-    If the figure does not walk a whole cycle, all but `speed_share` is None.
+    graded: label and side that the graded recogniser gives to the whole walk. named: share of windows in
+    which it finds a limp, and not on the side opposite to the link's. wrong_side: share of windows in which
+    it finds one there; None for a link on the midline, which counts as right for the effects. speed_share:
+    speed, divided by the speed of the healthy walk. If the figure does not walk a whole cycle, all but
+    `speed_share` is None.
     """
     assert healthy.profile is not None
     ((link, severity),) = figure.injury.items()
@@ -277,75 +233,31 @@ def row_of_walk(skeleton: Skeleton, figure: Walk, healthy: Walk) -> dict[str, An
     row: dict[str, Any] = {"link": link, "part": part, "severity": severity, "side": side}
     row["speed_share"] = round(figure.speed / max(healthy.speed, 1e-9), 5)
     if figure.profile is None:
-        return row | dict.fromkeys((*profile.EFFECTS, "called", "graded", *RECOGNISED))
+        return row | dict.fromkeys((*profile.EFFECTS, "graded", *RECOGNISED))
     found = compare_walk(figure.cycles, figure.frames, healthy.profile)
     wrong_side = SIDES[1 - SIDES.index(side or profile.RIGHT)]
     answers = [(grade.is_impaired, grade.side == wrong_side) for grade in found.window_grades]
     return {
         **row,
         **rounded(found.effects[side or profile.RIGHT]),
-        "called": found.answer.name,
         "graded": found.grade.name,
-        "impaired": share_of_true([answer.is_impaired for answer in found.window_answers]),
         "named": share_of_true([limps and not wrong for limps, wrong in answers]),
         "wrong_side": share_of_true([limps and wrong for limps, wrong in answers]) if side else None,
     }
 
 
-def _recognition(rows: Iterable[Mapping[str, Any]], *by: str) -> Rows:
-    """A row for each group of walks that have the same values of the keys `by`, with means over the walks.
+def _recognition(rows: Sequence[Mapping[str, Any]]) -> Rows:
+    """For each severity, means over the walks of `rows`.
 
     walks: number of walks that are judged. A very slow walk is not judged if no window has enough cycles.
     """
-    groups: dict[tuple[Any, ...], Rows] = {}
-    for row in rows:
-        groups.setdefault(tuple(row[key] for key in by), []).append(dict(row))
-    return [
-        {
-            **dict(zip(by, labels, strict=True)),
-            "walks": sum(row["named"] is not None for row in group),
-            **{key: mean_of_known(row[key] for row in group) for key in (*RECOGNISED, "speed_share")},
-        }
-        for labels, group in groups.items()
-    ]
-
-
-def limps_together(network: Network, links: Sequence[str], seconds: float, runtime: Runtime) -> Rows:
-    """The rows of walks with one hurt link and one column of another channel at its highest value.
-
-    There is a row for each pair of a column, such as "sad", and a link of a leg, which hurts at severity 10.
-    Only columns that were above 0 in training are used (all columns if none was). The row's effects are
-    relative to the walk with the same value of the column and no injury. A column is left out if this walk
-    has no whole cycle.
-    """
-    assert network.skeleton is not None
-    legs = [link for link in links if _part_and_side(network.skeleton, link)[0] in LEG]
-    columns = [(n, column) for n in network.channels if n != INJURY for column in network.trained_labels(n)]
-    injuries: list[Injury] = [{}, *({link: SEVERITIES[-1]} for link in legs)]
-    cases = [
-        {name: {column: channel(name).highest}, INJURY: injury}
-        for name, column in columns
-        for injury in injuries
-    ]
-    figures = iter(walk_figures(network, cases, "walk", seconds, runtime) if cases else ())
-    rows: Rows = []
-    for name, column in columns:
-        healthy, *hurt = (next(figures) for _ in injuries)
-        if healthy.profile is not None:
-            labels = {"channel": name, "column": column, "gait": "walk"}
-            rows += [{**labels, **row_of_walk(network.skeleton, figure, healthy)} for figure in hurt]
-    return rows
-
-
-def _row_of_clip(skeleton: Skeleton, walk: Walk, captured: Sequence[Walk]) -> dict[str, Any]:
-    """The effects of the injury in a captured clip, relative to a healthy walk.
-
-    Its key `healthy` says whose healthy walk this is (see `healthy_reference`).
-    """
-    healthy, whose = healthy_reference(walk, captured)
-    side = hurt_side(skeleton, walk.injury)
-    sizes = rounded(profile.measure_effects(profile.profile_of_walk(walk.cycles), healthy, side))
-    return {"clip": walk.clip, "hurt": dict(walk.injury), "side": side, "healthy": whose, **sizes}
+    out: Rows = []
+    for severity in SEVERITIES:
+        group = [row for row in rows if row["severity"] == severity]
+        walks = sum(row["named"] is not None for row in group)
+        means = {key: mean_of_known(row[key] for row in group) for key in (*RECOGNISED, "speed_share")}
+        out.append({"severity": severity, "walks": walks, **means})
+    return out
 
 
 def limp_distance(
@@ -401,21 +313,20 @@ def in_gallery(limps: Iterable[Walk], splits: Mapping[str, str]) -> list[Walk]:
 def run(inputs: MeasureInputs, options: Any) -> Outcome:
     """Measure the limps. The outcome has the content of limp.json and its tables."""
     network = load_network(inputs.weights)
-    if network.skeleton is None:
-        raise HobbleError(f"{inputs.weights}: this network file has no skeleton, so limps cannot be measured")
+    assert network.skeleton is not None
     sample = sample_to_measure(inputs, options)
     parts = clip_parts(inputs.clips, sample)
     result = measure_limps(
         network,
-        *captured_walks(parts, inputs.splits, network.channels[INJURY], network.skeleton),
+        captured_walks(parts, network.channels[INJURY], network.skeleton),
         inputs.splits,
         configuration=inputs.configuration,
         runtime=inputs.runtime,
         seconds=options.limp_seconds,
     )
-    tables = {name: result.get(name, []) for name in ("sizes", "named", "together")}
+    tables = {name: result.get(name, []) for name in ("sizes", "named")}
     log_line = str(result.get("reason", ""))
     if result["applies"]:
-        share = result["named"][-1]["impaired"]
-        log_line = f"a limp is found in {share} of the windows with a leg at severity 10"
+        share = result["named"][-1]["named"]
+        log_line = f"a limp is named in {share} of the windows with a leg at severity 10"
     return Outcome(with_sample(result, sample), tables, log_line)

@@ -25,12 +25,12 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import ModuleType
-from typing import Any, Literal
+from typing import Any
 
+import numpy as np
 import yaml
 from pydantic import Field, create_model
 
-from hobble.core.errors import HobbleError
 from hobble.core.files import Json, read_json, read_yaml
 from hobble.core.section import Section
 from hobble.runtime.options import Runtime
@@ -51,15 +51,6 @@ class SampleOptions(Section):
         gt=0,
         description="about how many frames are measured at most; if the clips have more, a random sample of "
         "excerpts is drawn, half of it from held-out clips",
-    )
-
-
-class JointOptions(Section):
-    """The option `joints`, which all measurements of joint positions have."""
-
-    joints: Literal["all", "equivalent"] = Field(
-        "all",
-        description="`equivalent`: only the joints that have a counterpart on the skeleton holden31",
     )
 
 
@@ -176,33 +167,24 @@ class MeasureInputs:
     summaries: Sequence[Path] = field(default=(), repr=False)
     runtime: Runtime = field(default_factory=Runtime)
 
-    def file(self, name: str) -> Path:
-        """The file of the input `name`. Raises HobbleError if the measurement's `inputs` do not list it."""
-        if name not in self.files:
-            raise HobbleError(
-                f"A measurement reads the input {name!r}, which its `Measure` does not list. "
-                "Add it to `inputs`."
-            )
-        return self.files[name]
-
     @property
     def weights(self) -> Path:
         """The network's file."""
-        return self.file("weights")
+        return self.files["weights"]
 
     @property
     def skeleton(self) -> Json:
         """The data set's skeleton: the content of config/skeletons/<name>.yaml."""
-        return read_yaml(self.file("skeleton")) or {}
+        return read_yaml(self.files["skeleton"]) or {}
 
     @property
     def published(self) -> Json:
         """The content of published.yaml: published results with which ours are compared."""
-        return yaml.safe_load(self.file("published").read_text(encoding="utf-8"))
+        return yaml.safe_load(self.files["published"].read_text(encoding="utf-8"))
 
     def results_of(self, name: str) -> Json:
         """The content of the JSON file of another measurement."""
-        return read_json(self.file(name))
+        return read_json(self.files[name])
 
 
 @dataclass(frozen=True)
@@ -242,24 +224,20 @@ def flat_rows(entries: Iterable[Json], items: str, *labels: str) -> list[Row]:
     ]
 
 
+def mean_and_sd(values: Sequence[float]) -> tuple[float | None, float | None]:
+    """Mean and standard deviation (n - 1) of a sample; None for those that need more values."""
+    mean = float(np.mean(values)) if len(values) else None
+    return mean, float(np.std(values, ddof=1)) if len(values) > 1 else None
+
+
 def sample_sentence(found: Json) -> str:
     """A sentence that says which part of the clips was read; empty if all clips were read.
 
     found: a measurement's JSON.
     """
-    words = sample_in_words(found)
-    return f" Only a part of the clips was read: {words}." if words else ""
-
-
-def sample_in_words(found: Json) -> str:
-    """The size of the sample in words, as a part of a sentence; empty if all clips were measured.
-
-    found: a measurement's JSON.
-    """
-    sample = found.get("sample")
-    if not sample:
+    if not (sample := found.get("sample")):
         return ""
     return (
-        f"{sample['excerpts']:,} of {sample['of_excerpts']:,} excerpts of at most 20 s, from "
-        f"{sample['clips']:,} of {sample['of']:,} clips, drawn by gait, speed, channel and split"
+        f" Only a part of the clips was read: {sample['excerpts']:,} of {sample['of_excerpts']:,} excerpts "
+        f"of at most 20 s, from {sample['clips']:,} of {sample['of']:,} clips, drawn at random."
     )

@@ -10,7 +10,6 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Annotated, Any
 
-import numpy as np
 from pydantic import Field
 
 from hobble.core.files import Json
@@ -29,11 +28,8 @@ if TYPE_CHECKING:
 class Options(Section):
     """The keys of this measurement in a configuration's section `evaluation`."""
 
-    laps: Positive = Field(19, description="laps in the phase mode of the section `runtime`")
-    laps_other_modes: Positive = Field(
-        3,
-        description="at most this many laps in each other phase mode, to save time; in the mode constant "
-        "always `laps`, because the published times were measured in it",
+    laps: Positive = Field(
+        19, description="laps in the phase mode of the section `runtime` and in the mode constant"
     )
     lap_seconds: Annotated[float, Field(ge=1, allow_inf_nan=False)] = Field(
         400.0, description="seconds after which a lap is stopped"
@@ -64,24 +60,21 @@ STEPS = {
     "update": "@muted",
 }
 
-OFF_TRACK = 100.0  # cm from the line between two waypoints; places farther away are marked in the chart
 TIME_AXIS = parts.axis("ms per frame", rangemode="tozero")
-FEWEST_STEPS = 10  # if the character takes fewer steps, the mean foot slide is not shown
 FRAME_BUDGET_MS = 1000 / 60  # the time that a frame may take at 60 Hz
 FLIP_DEGREES = 60  # if a joint turns by more than this in one frame, it flips visibly
 
 
 def section(found: Json, material: ReportMaterial) -> PageSection:
-    """The track, the times of the laps, the published times, and a table of the laps."""
+    """The track, the times of the laps, and the published times."""
     if not found.get("laps"):
         return PageSection("speed", [])
     shown = [
         SectionPart(0, parts.Paragraph(parts.words("speed.track"))),
         SectionPart(10, parts.KeyFigures(track_figures(found))),
         SectionPart(15, track_chart(found)),
-        SectionPart(20, lap_chart(found, material)),
+        SectionPart(20, step_chart(found, material)),
         SectionPart(30, speed_table(found, material), open=True),
-        SectionPart(60, lap_table(found, material.name)),
     ]
     title, nav = "Steering and time per frame", "Steering and time"
     return PageSection("speed", shown, title=title, order=30, nav=nav)
@@ -101,45 +94,47 @@ def figures(found: Json, material: ReportMaterial) -> Iterator[KeyFigure]:
 
 def hints(found: Json, material: ReportMaterial) -> Iterator[Hint]:
     """Whether a frame fits into 1/60 s, and whether the character followed the track."""
-    if found.get("laps"):
-        yield _speed_hint(found)
-        yield from _track_hints(found)
+    if not found.get("laps"):
+        return
+    milliseconds, slow = median_time(found), found["milliseconds"]["spread"]["p99"]
+    if milliseconds > FRAME_BUDGET_MS:
+        head = f"A frame takes {milliseconds:.1f} ms, too slow for 60 Hz."
+        yield Hint("warn", head, "Try mode: linear in the section runtime.", 60)
+    elif slow > FRAME_BUDGET_MS:
+        head = f"1 % of the frames take {slow:.1f} ms or more, too slow for 60 Hz."
+        yield Hint("warn", head, parts.words("speed.slow", median=f"{milliseconds:.2f}"), 60)
+    else:
+        share, most = 100 * milliseconds / FRAME_BUDGET_MS, math.ceil(100 * slow / FRAME_BUDGET_MS)
+        head = parts.words("speed.fast", share=f"{share:.1f}", most=most)
+        yield Hint("good", head, "That is fast enough for a game.", 60)
+    reached, total = found["waypoints_reached"], found["waypoints"]
+    if reached < total:
+        head = f"The character reached {reached} of {total} waypoints."
+        yield Hint("warn", head, parts.words("speed.circles"), 40)
+    if found["largest_turn_degrees"] > FLIP_DEGREES:
+        head = f"A joint turned by {found['largest_turn_degrees']:.0f} degrees in one frame."
+        yield Hint("warn", head, parts.words("speed.flipped"), 40)
 
 
-def lap_chart(found: Json, material: ReportMaterial) -> Chart:
-    """Milliseconds per frame of each step, stacked, lap by lap, for each phase mode."""
-    # The configured phase mode comes first, because the chart begins with the first option.
-    entries = sorted(found["modes"], key=lambda entry: entry["mode"] != found["mode"])
-    options = {f"{entry['mode']} phase": _lap_bars(entry["laps"]) for entry in entries}
-    laps, fewest = (pick(len(entry["laps"]) for entry in entries) for pick in (max, min))
-    layout: dict[str, Any] = {
-        "barmode": "stack",
-        "xaxis": parts.axis("lap", dtick=1 if laps < 25 else None),
-        "yaxis": TIME_AXIS,
-    }
+def step_chart(found: Json, material: ReportMaterial) -> Chart:
+    """Milliseconds per frame of each step, stacked, and diamonds at the medians, for each phase mode."""
+    modes, times = zip(*((entry["mode"], entry["milliseconds"]) for entry in found["modes"]), strict=True)
+    hover = "%{x}: %{y:.3f} ms<extra>%{fullData.name}</extra>"
+    traces = [
+        parts.bar_trace(step, modes, [of[step] for of in times], colour, hover)
+        for step, colour in STEPS.items()
+    ]
+    diamond, medians = {"symbol": "diamond", "size": 8, "color": "@ink"}, [*map(median_time, found["modes"])]
+    traces.append(parts.marker_trace("median", modes, medians, diamond, hovertemplate=hover))
+    layout: dict[str, Any] = {"barmode": "stack", "xaxis": parts.axis("phase mode"), "yaxis": TIME_AXIS}
     if published := material.published_entry("responsivity"):
         text = f"{published['label']}: published mean"
         layout |= parts.reference_line(published["milliseconds"], text, vertical=False)
-    more, choose = ["fewer"] if fewest < laps else [], "Phase mode" if len(options) > 1 else None
-    return parts.chart("laps", layout=layout, choose=choose, options=options, more=more, fewest=fewest)
-
-
-def _lap_bars(laps: Sequence[Json]) -> list[Trace]:
-    """Stacked bars of the steps' mean times in each lap of a phase mode, and diamonds at the medians."""
-    numbers, hover = [lap["lap"] for lap in laps], "lap %{x}: %{y:.3f} ms<extra>%{fullData.name}</extra>"
-    bars = [
-        parts.bar_trace(step, numbers, [lap["milliseconds"][step] for lap in laps], colour, hover)
-        for step, colour in STEPS.items()
-    ]
-    diamond = {"symbol": "diamond", "size": 8, "color": "@ink"}
-    return [
-        *bars,
-        parts.marker_trace("median", numbers, list(map(median_time, laps)), diamond, hovertemplate=hover),
-    ]
+    return parts.chart("steps", traces, layout)
 
 
 def track_chart(found: Json) -> Chart:
-    """The track from above, the stored paths of laps, and the places where they are far from the track."""
+    """The track from above, and the stored paths of laps."""
     track, runs = found["track"], found["runs"]
     corners_x, corners_z = ([*track[key], track[key][0]] for key in "xz")
     x, z = ([v for run in runs for v in (*run[key], None)] for key in "xz")  # None: a gap between two laps
@@ -147,16 +142,6 @@ def track_chart(found: Json) -> Chart:
         parts.line_trace("track", corners_x, corners_z, "@faint", dash="dash", width=1.2, hoverinfo="skip"),
         parts.line_trace("laps", x, z, "@accent", width=1.5, hoverinfo="skip"),
     ]
-    places = [
-        (x, z, [cm, run["lap"]])
-        for run in runs
-        for x, z, cm in zip(run["x"], run["z"], run["off_cm"], strict=True)
-    ]
-    if off_track := [place for place in places if place[2][0] > OFF_TRACK]:
-        hover = "lap %{customdata[1]}: %{customdata[0]:.0f} cm off<extra></extra>"
-        red, name = {"size": 6, "color": "@hurt-high"}, f"more than {OFF_TRACK:.0f} cm off"
-        x, z, cm_and_lap = map(list, zip(*off_track, strict=True))
-        traces.append(parts.marker_trace(name, x, z, red, customdata=cm_and_lap, hovertemplate=hover))
     labels = {
         "mode": "markers+text",
         "text": [f"{i}, {gait}" for i, gait in enumerate(track["gaits"])],
@@ -169,46 +154,22 @@ def track_chart(found: Json) -> Chart:
         "xaxis": parts.axis("x, m", constrain="domain", zeroline=False),
         "yaxis": parts.axis("z, m", scaleanchor="x", autorange="reversed", zeroline=False),
     }
-    largest, more = f"{max(place[2][0] for place in places):.0f}", ["off"] if off_track else []
-    return parts.chart(
-        "track", traces, layout, 520, more=[*more, "largest"], limit=f"{OFF_TRACK:.0f}", largest=largest
-    )
-
-
-def lap_table(found: Json, name: str) -> parts.Table:
-    """A row per lap: how it went, and the median time of a frame."""
-    records = [
-        {**lap, "median": median_time(lap)} | ({"foot_slide_cm": None} if lap["steps"] < FEWEST_STEPS else {})
-        for lap in found["laps"]
-    ]
-    return parts.told_table(f"{name}-responsivity", records, "laps.table")
+    return parts.chart("track", traces, layout, 520)
 
 
 def track_figures(found: Json) -> list[KeyFigure]:
-    """Key figures: how well the character followed the track."""
-    from hobble.runtime.network_rows import FASTEST_TURN  # here, because planning need not load numba
-
-    laps = found["laps"]
-    steps = sum(lap["steps"] for lap in laps)
-    slide = None if steps < FEWEST_STEPS else found["foot_slide_cm"]
-    turn = parts.words(
-        "speed.turn",
-        limit=f"{np.degrees(FASTEST_TURN):.0f}",
-        limited=f"{found['turns_held_back']:,} of {sum(lap['frames'] for lap in laps):,} frames",
-        drawn=parts.format_number(found["largest_turn_degrees"]),
-    )
-    reached, of_steps = f"{found['waypoints_reached']} of {found['waypoints']}", f"{steps:,}"
-    overshoot, slow = found["path_overshoot_cm"], found["milliseconds"]["spread"]["p99"]
+    """Key figures: how well the character followed the track, and how much the slowest frames take."""
+    reached = f"{found['waypoints_reached']} of {found['waypoints']}"
+    finished = f"{found['laps_finished']} of {len(found['laps'])} laps finished"
     figures = (
-        ("Waypoints reached", reached, "", f"{found['laps_finished']} of {len(laps)} laps finished"),
-        ("Largest distance from the track", overshoot, "cm", "the largest of all laps"),
-        ("Foot slide", slide, "cm" if slide is not None else "", parts.words("speed.slide", steps=of_steps)),
-        ("Largest predicted turn", found["predicted_turn_degrees"], "°", turn),
-        ("Slow frames", slow, "ms", "1 % of the frames are slower"),
+        ("path_overshoot_cm", "Largest distance from the track", ("cm", "the largest of all laps")),
+        ("largest_turn_degrees", "Largest turn", ("°", "of a joint in one frame")),
     )
+    slow = parts.format_number(found["milliseconds"]["spread"]["p99"])
     return [
-        KeyFigure(label, value if isinstance(value, str) else parts.format_number(value), unit, note)
-        for label, value, unit, note in figures
+        KeyFigure("Waypoints reached", reached, "", finished),
+        *(KeyFigure(name, parts.format_number(found[key]), *more) for key, name, more in figures),
+        KeyFigure("Slow frames", slow, "ms", "1 % of the frames are slower"),
     ]
 
 
@@ -219,7 +180,7 @@ def speed_table(found: Json, material: ReportMaterial) -> parts.Table:
     """
     rows: list[Row] = []
     for entry in found["modes"]:
-        name, (mean, sd) = f"{material.name}, {entry['mode']} phase", compare.mean_and_sd(lap_means(entry))
+        name, (mean, sd) = f"{material.name}, {entry['mode']} phase", measure.mean_and_sd(lap_means(entry))
         times = {"median": median_time(entry), "milliseconds": mean, "sd": sd}
         rows.append({"network": name, **times, "source": "this report"})
     for entry in material.published_records("responsivity"):
@@ -248,49 +209,6 @@ def lap_means(entry: Json) -> list[float]:
     return [lap["milliseconds"]["total"] for lap in entry["laps"]]
 
 
-def _speed_hint(found: Json) -> Hint:
-    milliseconds, slow = median_time(found), found["milliseconds"]["spread"]["p99"]
-    if milliseconds > FRAME_BUDGET_MS:
-        head = f"A frame takes {milliseconds:.1f} ms, too slow for 60 Hz."
-        return Hint("warn", head, "Try mode: linear in the section runtime.", 60)
-    if slow > FRAME_BUDGET_MS:
-        head = f"1 % of the frames take {slow:.1f} ms or more, too slow for 60 Hz."
-        return Hint("warn", head, parts.words("speed.slow", median=f"{milliseconds:.2f}"), 60)
-    share, most = 100 * milliseconds / FRAME_BUDGET_MS, math.ceil(100 * slow / FRAME_BUDGET_MS)
-    head = parts.words("speed.fast", share=f"{share:.1f}", most=most)
-    return Hint("good", head, "That is fast enough for a game.", 60)
-
-
-def _track_hints(found: Json) -> Iterator[Hint]:
-    reached, total = found["waypoints_reached"], found["waypoints"]
-    if reached < total:
-        head = f"The character reached {reached} of {total} waypoints."
-        yield Hint("warn", head, parts.words("speed.circles"), 40)
-    drawn, predicted = found["largest_turn_degrees"], found["predicted_turn_degrees"]
-    if drawn > FLIP_DEGREES:
-        head = f"A joint turned by {drawn:.0f} degrees in one frame."
-        yield Hint("warn", head, parts.words("speed.flipped"), 40)
-    elif predicted > FLIP_DEGREES:
-        head = f"The network predicted a turn of a joint by {predicted:.0f} degrees in one frame."
-        yield Hint("note", head, parts.words("speed.flips", drawn=f"{drawn:.0f}"), 40)
-
-
-# The lines of time over size: whose times, in which phase mode, of what, and over which count of weights and
-# biases (`parameter_counts` in `hobble.measures.responsivity_run`). "median": of whole frames, which other
-# programs on the machine change least. "total": the mean, which is published.
-FITS = (
-    ("hobble", "cubic", "median", "true"),
-    ("hobble", "constant", "total", "table_6_1_as_printed"),
-    ("published", None, "total", "true"),
-    ("published", None, "total", "table_6_1_as_printed"),
-)
-SHOWN_FITS = {"ours (medians, cubic phase)": FITS[0], "published (means)": FITS[2]}
-PUBLISHED_COUNTS = {
-    "true": "parameters",
-    "table_6_1_as_printed": "table_6_1",
-}  # count -> key of published.yaml
-
-
 def compared(
     all_measured: Sequence[compare.ConfigurationResults], published: Json
 ) -> compare.ComparisonAddition:
@@ -306,7 +224,7 @@ def compared(
     }
     modes = {name: {entry["mode"]: entry for entry in of["modes"]} for name, of in found.items()}
     differences = compare.pair_differences(
-        {name: {mode: _series(entry) for mode, entry in of.items()} for name, of in modes.items()}
+        {name: {mode: lap_means(entry) for mode, entry in of.items()} for name, of in modes.items()}
     )
     fits = fit_lines(found, published)
     constant = [row for row in differences if row["over"] == "constant"]
@@ -326,33 +244,30 @@ def compared(
     )
 
 
-def _series(entry: Json) -> Json:
-    """The frame times of a phase mode, for `compare_series`."""
-    times = entry["milliseconds"]
-    return {"mean": times["total"], "sd": times["spread"]["sd"], "means": lap_means(entry)}
-
-
 def fit_lines(found: Mapping[str, Json], published: Json) -> list[dict[str, Any]]:
-    """The straight lines FITS of milliseconds per frame (y) over weights and biases (x).
+    """Straight lines of milliseconds a frame (y) over computations of Table 6.1 (x), ours and published.
 
-    found: configuration -> content of its responsivity.json. Networks without layers are left out.
+    Ours are means in the phase mode constant, as the published ones. found: configuration -> content of its
+    responsivity.json. Networks without layers are left out.
     """
-    published_times = {row["configuration"]: row["milliseconds"] for row in published["responsivity"]}
-    out = []
-    for whose, mode, step, counts in FITS:
-        points = [
-            (row[PUBLISHED_COUNTS[counts]], published_times[row["configuration"]])
-            for row in published["computations"]
-            if whose == "published" and row["configuration"] in published_times
-        ] + [
-            (of["parameters"][counts], (entry["milliseconds"] | entry["milliseconds"]["spread"])[step])
+    times = {row["configuration"]: row["milliseconds"] for row in published["responsivity"]}
+    points = {
+        "hobble": [
+            (of["parameters"]["table_6_1_as_printed"], entry["milliseconds"]["total"])
             for of in found.values()
             for entry in of["modes"]
-            if of["parameters"] and entry["mode"] == mode
-        ]
-        x, y = [size for size, _ in points], [time for _, time in points]
-        labels = {"whose": whose, "mode": mode, "step": step, "computations": counts}
-        out.append({**labels, "x": x, "y": y, **compare.fit_line(x, y)})
+            if of["parameters"] and entry["mode"] == "constant"
+        ],
+        "published": [
+            (row["table_6_1"], times[row["configuration"]])
+            for row in published["computations"]
+            if row["configuration"] in times
+        ],
+    }
+    out = []
+    for whose, pairs in points.items():
+        x, y = [size for size, _ in pairs], [time for _, time in pairs]
+        out.append({"whose": whose, "x": x, "y": y, **compare.fit_line(x, y)})
     return out
 
 
@@ -377,7 +292,7 @@ def _published_sizes(about: Mapping[str, Json], published: Json) -> list[dict[st
 def _published_times(modes: Mapping[str, Mapping[str, Json]], published: Json) -> list[dict[str, Any]]:
     """Published times next to ours: of a frame, from whole laps in the mode constant, and of a prediction."""
     constant = {name: of["constant"] for name, of in modes.items() if "constant" in of}
-    laps = {name: compare.mean_and_sd(lap_means(entry)) for name, entry in constant.items()}
+    laps = {name: measure.mean_and_sd(lap_means(entry)) for name, entry in constant.items()}
     means, sds = ({name: both[at] for name, both in laps.items()} for at in (0, 1))
     rows = published["responsivity"]
     out = compare.beside_ours("a frame", rows, "milliseconds", means, "ms")
@@ -390,8 +305,8 @@ def _published_times(modes: Mapping[str, Mapping[str, Json]], published: Json) -
 
 
 def _published_regression(fits: Sequence[Json], row: Json) -> list[dict[str, Any]]:
-    """The line of Figure 6.1 beside ours in the mode constant, both over the computations of Table 6.1."""
-    ours, row = fits[1], {**row, "configuration": "all"}
+    """The line of Figure 6.1 beside ours."""
+    ours, row = fits[0], {**row, "configuration": "all"}
     return [
         compare.published_row(what, row, row[key], ours[key], unit)
         for key, what, unit in (
@@ -417,7 +332,7 @@ def compared_section(compared: Compared) -> PageSection:
 
 
 def compared_values(compared: Compared) -> Iterator[parts.ComparedValue]:
-    """How closely and smoothly each configuration follows the track, its time per frame, and its size.
+    """How closely each configuration follows the track, its time per frame, and its size.
 
     Times are in the exact phase mode if it was run. Only configurations that reached every waypoint are
     compared on the track.
@@ -426,9 +341,9 @@ def compared_values(compared: Compared) -> Iterator[parts.ComparedValue]:
     arrived = {name: e for name, e in exact.items() if e["waypoints_reached"] == e["waypoints"]}
     astray = [name for name in exact if name not in arrived]
     left_out = f" Did not reach every waypoint: {', '.join(astray)}." if astray else ""
-    off, slides, turns = (
+    off, turns = (
         {name: entry[key] for name, entry in arrived.items()}
-        for key in ("path_overshoot_cm", "foot_slide_cm", "largest_turn_degrees")
+        for key in ("path_overshoot_cm", "largest_turn_degrees")
     )
     frames = {name: median_time(entry) for name, entry in exact.items()}
     about = {entry["configuration"]: entry for entry in compared["configurations"]}
@@ -436,10 +351,8 @@ def compared_values(compared: Compared) -> Iterator[parts.ComparedValue]:
     stored = {name: entry["weights_bytes"][entry["exact"]] for name, entry in about.items()}
     number, value = parts.Column.number, parts.ComparedValue
     of_off = "{name} is never more than {value} cm off the track"
-    of_slide = "the feet of {name} slide {value} cm a step"
     of_time, of_size = "the median frame of {name} takes {value} ms", "{name} needs {value} of memory to run"
     yield value(30, number("off the track, cm"), off, "Closest to the track", of_off, left_out)
-    yield value(31, number("foot slide, cm", 2), slides, "Smoothest", of_slide)
     yield value(32, number("largest turn, °"), turns)
     yield value(40, number("ms per frame, median"), frames, "Fastest", of_time)
     yield value(41, parts.Column.count("parameters of one frame"), counts)
@@ -473,18 +386,15 @@ def lap_boxes(compared: Compared) -> Chart:
 
 
 def fit_chart(compared: Compared) -> Chart:
-    """Frame time over the number of parameters: our times and the published ones, each with a fitted line."""
-    fits = {(f["whose"], f["mode"], f["step"], f["computations"]): f for f in compared["milliseconds"]["fit"]}
+    """Frame time over the computations of Table 6.1: ours and published, each with a fitted line."""
     traces: list[Trace] = []
-    for (label, key), colour in zip(SHOWN_FITS.items(), ("@accent", "@g2"), strict=True):
-        fit = fits[key]
+    for fit, colour in zip(compared["milliseconds"]["fit"], ("@accent", "@g2"), strict=True):
+        label = {"hobble": "ours"}.get(fit["whose"], fit["whose"])
         if fit["x"]:
-            traces.append(
-                parts.dot_trace(label, fit["x"], fit["y"], colour, "%{x:,} parameters: %{y:.3f} ms")
-            )
+            traces.append(parts.dot_trace(label, fit["x"], fit["y"], colour, "%{x:,}: %{y:.3f} ms"))
         if fit["slope"] is not None:
             ends = [min(fit["x"]), max(fit["x"])]
             values = [fit["intercept"] + fit["slope"] * x for x in ends]
             traces.append(parts.line_trace(f"{label}, straight fit", ends, values, colour, width=1.4))
-    x = parts.axis("parameters of one frame", tickformat="~s", rangemode="tozero")
+    x = parts.axis("computations of Table 6.1", tickformat="~s", rangemode="tozero")
     return parts.chart("compare-fit", traces, {"xaxis": x, "yaxis": TIME_AXIS})

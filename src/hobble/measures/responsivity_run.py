@@ -9,9 +9,7 @@ laps are the same.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import pairwise, starmap
-from math import dist
-from time import perf_counter
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,11 +17,10 @@ import numpy as np
 from hobble.core.files import Json
 from hobble.core.quat import Array
 from hobble.measures.measure import MeasureInputs, Outcome, flat_rows
-from hobble.measures.walks import FPS, foot_slide, mean_of_known, turns_between
+from hobble.measures.walks import FPS, largest_turn, mean_of_known
 from hobble.models.load import load_network
 from hobble.models.network import Network
 from hobble.runtime.animation import ProceduralAnimation
-from hobble.runtime.caller_targets import world_rotations
 from hobble.runtime.controller import STEPS
 from hobble.runtime.options import Runtime
 from hobble.runtime.waypoints import TRACK, Waypoint
@@ -34,6 +31,7 @@ if TYPE_CHECKING:
 PATH_STEP = 15  # of a path, the place in every 15th frame is stored
 STORED_PATHS = 5  # the paths of this many laps are stored
 RUN_UP = 1000.0  # cm; a character starts at most this far before the waypoint where its lap begins
+OTHER_LAPS = 3  # laps in other phase modes than that of the section `runtime`, to save time
 WARM_UP = 60  # the first frames are not measured, because compiled code is loaded in them
 
 
@@ -64,8 +62,7 @@ def walk_laps(
 ) -> list[tuple[Json, Json, Array]]:
     """Walk `laps` laps of at most `longest` frames, one after another.
 
-    Returns how each lap went, its path, and (F, steps + 1) the seconds of each step in each of its frames,
-    then of the whole call.
+    Returns how each lap went, its path (x and z, m), and (F, steps) the seconds of each step of its frames.
     """
     animation = ProceduralAnimation(network, waypoints=track, **dict(runtime))
     for _ in range(WARM_UP):
@@ -84,107 +81,45 @@ def _walk_lap(
     within `longest` frames, its lap begins at the character's start, with no waypoint reached.
     """
     animation.reset(place, facing)
-    follower, skeleton = animation.follower, animation.skeleton
+    follower = animation.follower
     assert follower is not None
     follower.reached[:] = waypoint
-    toes = [skeleton.role("left_toe"), skeleton.role("right_toe")]
     first, waypoints = waypoint + 1, len(follower.track)
     recorded: list[tuple[Any, ...]] = []
     begin = None  # number of frames before the lap
-    before: tuple[Array, Array] | None = None  # drawn and predicted rotations in the frame before
     while True:
         reached = int(follower.reached[0])  # index of the next waypoint; after the last it goes on rising
         if begin is None and reached >= first:
             begin = len(recorded) - 1 if recorded else 0
         if reached >= first + waypoints or len(recorded) >= (begin or 0) + longest:
             break
-        began = perf_counter()
         pose = animation.next_pose()
-        seconds = [*animation.seconds, perf_counter() - began]
-        drawn, predicted = pose.rotations, world_rotations(*animation.predicted_turns)[0]
-        before = before or (drawn, predicted)
-        turns = [turns_between(np.stack(pair))[0] for pair in ((before[0], drawn), (before[1], predicted))]
-        limited = turn_was_limited(predicted, animation.state.joint_rotation[0])
         off, now = float(follower.off_path[0]), int(follower.reached[0])
-        recorded.append(
-            (pose.positions[toes], pose.contacts, pose.root[::2], off, now, *turns, limited, seconds)
-        )
-        before = drawn, predicted
-    of_lap = recorded[begin or 0 :]
-    toe, contacts, places, off_track, reached_at, drawn_turn, predicted_turn, limited, times = (
-        np.array(values) for values in zip(*of_lap, strict=True)
-    )
-    slides, passed = foot_slide(toe, contacts), max(0, int(reached_at[-1]) - first)
+        recorded.append((pose.root[::2], pose.rotations, off, now, list(animation.seconds)))
+    places, rotations, off_track, reached_at, times = map(np.array, zip(*recorded[begin or 0 :], strict=True))
+    passed = max(0, int(reached_at[-1]) - first)
     result = {
         "lap": lap,
         "finished": passed == waypoints,
-        "frames": len(of_lap),
-        "seconds": round(len(of_lap) / FPS, 3),
+        "frames": len(places),
+        "seconds": round(len(places) / FPS, 3),
         "waypoints_reached": passed,
         "path_overshoot_cm": round(float(np.max(off_track)), 3),
         "path_distance_cm": round(float(np.mean(off_track)), 3),
-        "foot_slide_cm": round(float(slides.mean()), 4) if len(slides) else None,
-        "steps": len(slides),
-        # Without the lap's first frame, because its turn is since the frame before the lap.
-        "largest_turn_degrees": round(float(drawn_turn[1:].max(initial=0.0)), 3),
-        "predicted_turn_degrees": round(float(predicted_turn[1:].max(initial=0.0)), 3),
-        "turns_held_back": int(limited.sum()),
+        "largest_turn_degrees": round(largest_turn(rotations), 3),
     }
-    return result, _path(lap, places, off_track), times
-
-
-def turn_was_limited(predicted: Array, limited: Array) -> np.ndarray:
-    """(...) whether the runtime limited the turn of any joint.
-
-    predicted, limited: (..., J, 4) quaternions before and after the runtime limits turns.
-    """
-    # The dot product of two unit quaternions is 1 or -1 if they are the same rotation.
-    same = np.abs(np.sum(predicted * limited, axis=-1)) > 1 - 1e-6
-    return np.asarray((~same).any(axis=-1))
-
-
-def _path(lap: int, places: Array, off_track: Array) -> dict[str, Any]:
-    """The path of a lap. The place in every PATH_STEP-th frame is stored.
-
-    lap: its number. places: (F, 2) x and z, cm. off_track: (F,) distance from the track, cm. Each stored
-    place has the largest distance since the stored place before it.
-    """
-    stored = range(0, len(places), PATH_STEP)
-    return {
-        "lap": lap,
-        "seconds_between": PATH_STEP / FPS,
-        "x": np.round(places[stored, 0] / 100, 2).tolist(),
-        "z": np.round(places[stored, 1] / 100, 2).tolist(),
-        "off_cm": [round(float(off_track[max(0, f - PATH_STEP + 1) : f + 1].max()), 1) for f in stored],
-    }
-
-
-def laps_in_mode(options: Options, mode: str, own: str) -> int:
-    """The number of laps in a phase mode. own: that of the section `runtime`.
-
-    There are as many in the mode `constant`, because the published times were measured in it.
-    """
-    return options.laps if mode in (own, "constant") else min(options.laps, options.laps_other_modes)
+    x, z = np.round(places[::PATH_STEP].T / 100, 2).tolist()
+    return result, {"lap": lap, "x": x, "z": z}, times
 
 
 def milliseconds(seconds: Array) -> dict[str, Any]:
-    """Statistics of frame times. seconds: (F, steps + 1), see `walk_laps`."""
-
-    def of_steps(values: Array) -> dict[str, float]:
-        return {step: round(float(v), 6) for step, v in zip(STEPS, values, strict=False)}
-
+    """Statistics of frame times. seconds: (F, steps), see `walk_laps`."""
     ms = 1000 * seconds
-    total = ms[:, : len(STEPS)].sum(axis=1)
+    median, p99 = np.percentile(ms.sum(axis=1), [50, 99])
     return {
-        **of_steps(ms.mean(axis=0)),
-        "total": round(float(total.mean()), 6),
-        "sd": of_steps(ms.std(axis=0)),
-        "spread": {
-            "sd": round(float(total.std()), 6),
-            "median": round(float(np.median(total)), 6),
-            "p99": round(float(np.percentile(total, 99)), 6),
-            "whole_call": round(float(ms[:, -1].mean()), 6),
-        },
+        **{step: round(float(v), 6) for step, v in zip(STEPS, ms.mean(axis=0), strict=True)},
+        "total": round(float(ms.sum(axis=1).mean()), 6),
+        "spread": {"median": round(float(median), 6), "p99": round(float(p99), 6)},
     }
 
 
@@ -201,22 +136,19 @@ def measure_responsivity(
     The result is described in docs/artefacts.md. Its key `modes` has the laps and the summary of each mode.
     The laps and the summary of the mode of `runtime` are also at the top level. Only the values under
     "milliseconds" depend on the clock. `largest_turn_degrees` is the largest turn of a joint from one frame
-    to the next as drawn, and `predicted_turn_degrees` is the largest turn as the network predicts it. In
-    `turns_held_back` frames, the runtime let a joint turn less than predicted. `runs` are the paths of the
-    first STORED_PATHS laps in the mode of `runtime`.
+    to the next. `runs` are the paths of the first STORED_PATHS laps in the mode of `runtime`.
     """
     own = network.resolve_mode(runtime.mode)
     of_mode = {}
     for mode in dict.fromkeys((*map(network.resolve_mode, options.modes), own)):
         in_mode = runtime.model_copy(update={"mode": mode})
-        laps = laps_in_mode(options, mode, own)
+        # As many in the mode `constant`, because the published times were measured in it.
+        laps = options.laps if mode in (own, "constant") else min(options.laps, OTHER_LAPS)
         of_mode[mode] = laps_of_mode(network, in_mode, laps, options.lap_seconds, track)
     places = [waypoint.position for waypoint in track]
     return {
         "configuration": configuration,
         "track": {
-            "waypoints": len(track),
-            "metres": round(sum(starmap(dist, pairwise([*places, places[0]]))) / 100, 3),
             "gaits": [waypoint.gait for waypoint in track],
             "x": [x / 100 for x, _ in places],
             "z": [z / 100 for _, z in places],
@@ -226,7 +158,6 @@ def measure_responsivity(
         "stored": {mode: network.stored_numbers(mode) for mode in network.modes},
         "bytes_each": np.dtype(network.default_storage).itemsize,
         "exact": network.resolve_mode(None),
-        "laps_other_modes": min(options.laps, options.laps_other_modes),
         **of_mode[own]["laps"],
         "modes": [piece["laps"] for piece in of_mode.values()],
     }
@@ -250,10 +181,7 @@ def laps_of_mode(
         "waypoints": laps * len(track),
         "mean_lap_seconds": mean_of_known([lap["seconds"] for lap in results if lap["finished"]], 4),
         "path_overshoot_cm": max(lap["path_overshoot_cm"] for lap in results),
-        "foot_slide_cm": mean_of_known([lap["foot_slide_cm"] for lap in results], 4),
         "largest_turn_degrees": max(lap["largest_turn_degrees"] for lap in results),
-        "predicted_turn_degrees": max(lap["predicted_turn_degrees"] for lap in results),
-        "turns_held_back": sum(lap["turns_held_back"] for lap in results),
         "milliseconds": milliseconds(np.concatenate([seconds for *_, seconds in walked])),
     }
     return {"laps": entry, "runs": [path for _, path, _ in walked[:STORED_PATHS]]}

@@ -114,11 +114,6 @@ class ClipPart:
     weight: float = 1.0
     excerpt: Excerpt | None = None
 
-    @property
-    def share(self) -> float:
-        """Which share of its clip it is."""
-        return 1.0 if self.excerpt is None else self.excerpt.rows / self.excerpt.clip_rows
-
     def load(self, before: int = 0, after: int = 0) -> LoadedPart:
         """Read the rows, and up to `before` rows before an excerpt and `after` rows after it."""
         if self.excerpt is None:

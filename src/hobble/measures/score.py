@@ -21,17 +21,8 @@ from hobble.core.quat import Array
 from hobble.labels.clip_labels import GAITS
 from hobble.labels.footfall import find_stance_contacts
 from hobble.labels.gait import automatic_gait
-from hobble.measures.motion_quality import (
-    FOOT_POINTS,
-    FPS,
-    cleanness,
-    compare_windows,
-    floating,
-    joints_with,
-    penetration,
-    standing_heights,
-    window_features,
-)
+from hobble.measures import motion_quality as quality
+from hobble.measures.motion_quality import FOOT_POINTS, FPS, joints_with
 from hobble.motion.edit import resample
 from hobble.motion.make import load_source
 from hobble.motion.options import ClipMotion
@@ -72,7 +63,7 @@ class Take:
     @cached_property
     def standing(self) -> Array:
         """(4,) heights at which the points of its feet stand, cm."""
-        return standing_heights(self.feet)
+        return quality.standing_heights(self.feet)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -168,7 +159,7 @@ def score(takes: Sequence[Take], reference: Sequence[Take] | None = None) -> dic
         features = _features(reference)
         # Two halves: blocks of ten windows in turn, so that both halves have all clips of the reference.
         half = np.arange(len(features)) // 10 % 2 == 0
-        mine, theirs = compare_windows(_features(takes), features, half)
+        mine, theirs = quality.compare_windows(_features(takes), features, half)
         result["mean"] |= mine
         result["reference"] |= theirs
     return result
@@ -184,12 +175,12 @@ def _standing(takes: Sequence[Take]) -> dict[tuple[Any, ...], Array]:
 
 def _of_clip(take: Take, ground: Array) -> dict[str, float]:
     """The measures OF_CLIP of one clip, and its seconds. ground: (4,) heights of standing feet of its rig."""
-    depth, deep_share = penetration(take.feet, take.standing)
-    found = cleanness(take.clip.skeleton, take.clip.positions, take.clip.rotations)
+    depth, deep_share = quality.penetration(take.feet, take.standing)
+    found = quality.cleanness(take.clip.skeleton, take.clip.positions, take.clip.rotations)
     found |= {
         "seconds": len(take.clip) / FPS,
         "floor": float((take.standing - ground).mean()),
-        "floating": floating(take.feet, take.standing),
+        "floating": quality.floating(take.feet, take.standing),
         "depth": depth,
         "deep_share": deep_share,
     }
@@ -209,7 +200,7 @@ def _mean(clips: Any) -> dict[str, float]:
 
 def _features(takes: Sequence[Take]) -> Array:
     """(N, D) windows of all takes."""
-    return np.concatenate([window_features(take.clip.skeleton, take.clip.positions) for take in takes])
+    return np.concatenate([quality.window_features(t.clip.skeleton, t.clip.positions) for t in takes])
 
 
 def _gaits(takes: Sequence[Take]) -> dict[str, float]:

@@ -16,17 +16,6 @@ from hobble.report.parts import Chart, Records, Trace, chart, line_trace, marker
 STRIP_WIDTH, STRIP_HEIGHT = 110.0, 205.0  # cm between the figures of a strip
 
 
-def boxes(name: str, colour: str, **values: Any) -> Trace:
-    """The trace of boxes over values `y`, or with their edges given. values: as plotly takes them."""
-    return {
-        "type": "box",
-        "name": name,
-        "line": {"width": 1.6, "color": colour},
-        "boxpoints": False,
-        **values,
-    }
-
-
 def ours_and_published(
     names: Sequence[str],
     ours: Mapping[str, Sequence[float]],
@@ -35,7 +24,15 @@ def ours_and_published(
 ) -> list[Trace]:
     """The traces of a box over our values of each configuration, and beside it of one over published ones."""
     return [
-        boxes(f"{name}, {whose}", colour, y=list(values[name]), boxmean=True, **more)
+        {
+            "type": "box",
+            "name": f"{name}, {whose}",
+            "line": {"width": 1.6, "color": colour},
+            "boxpoints": False,
+            "boxmean": True,
+            "y": list(values[name]),
+            **more,
+        }
         for name in names
         for whose, values, colour in (("ours", ours, "@accent"), ("published", published, "@muted"))
         if len(values.get(name, ()))

@@ -56,17 +56,9 @@ def largest_turn(rotations: Array) -> float:
 
     rotations: (F, J, 4) quaternions of the joints in the world.
     """
-    return float(turns_between(rotations).max(initial=0.0))
-
-
-def turns_between(rotations: Array) -> Array:
-    """(F - 1, ...) largest rotation of any joint since the frame before, degrees.
-
-    rotations: (F, ..., J, 4) quaternions of the joints in the world.
-    """
     # Two rotations whose quaternions have the dot product d differ by an angle of 2 arccos |d|.
     dot = np.abs(np.sum(rotations[1:] * rotations[:-1], axis=-1, dtype=float))
-    return np.asarray(np.degrees(2 * np.arccos(np.minimum(1.0, dot.min(axis=-1)))))
+    return float(np.degrees(2 * np.arccos(dot.min(initial=1.0))))
 
 
 def acceleration(positions: Array) -> Array:
@@ -146,8 +138,9 @@ def gait_measures(
     for name in ("left", "right"):
         hip, knee, heel = (local[:, role(f"{name}_{part}")] for part in ("hip", "knee", "heel"))
         arm = local[:, role(f"{name}_wrist")] - local[:, role(f"{name}_shoulder")]
-        out[f"knee_{name}"] = _percentile_range(bend(hip, knee, heel))
-        out[f"arm_{name}"] = _percentile_range(np.degrees(np.arctan2(arm[:, 2], -arm[:, 1])))
+        out[f"knee_{name}"] = float(np.ptp(np.percentile(bend(hip, knee, heel), [5, 95])))
+        swing = np.degrees(np.arctan2(arm[:, 2], -arm[:, 1]))
+        out[f"arm_{name}"] = float(np.ptp(np.percentile(swing, [5, 95])))
     trunk = (local[:, role("neck")] - local[:, role("hips")]).mean(axis=0)
     out["lean_forward"] = float(np.degrees(np.arctan2(trunk[2], trunk[1])))
     out["lean_left"] = float(np.degrees(np.arctan2(trunk[0], trunk[1])))
@@ -155,30 +148,60 @@ def gait_measures(
     return out
 
 
-def _percentile_range(angles: Array) -> float:
-    """Difference between the 95th and the 5th percentile."""
-    low, high = np.percentile(angles, [5, 95])
-    return float(high - low)
-
-
 FPS = 60
 SPEEDS = {"walk": 2.5, "jog": 7.0}  # target speeds, cm a frame
 # This share of a stretch, at its start, is not measured, because the motion still changes to the new target.
 SETTLING_SHARE = 0.25
+PHASES = 24  # phase bins of a cycle
+Case = Mapping[str, Mapping[str, float]]  # channel -> column -> value of a figure; other columns are 0
+
+
+def record(
+    network: Network,
+    runtime: Runtime,
+    targets: Iterable[Mapping[str, Any]],
+    fields: Sequence[str],
+    characters: int = 1,
+) -> list[Array]:
+    """Let C characters, who begin standing, follow targets, and record F frames of their poses.
+
+    targets: the arguments of `next_pose` in each frame. fields: names of arrays of the pose. Returns for each
+    field (F, C, ...).
+    """
+    animation = ProceduralAnimation(network, characters=characters, **dict(runtime))
+    poses = (animation.next_pose(**target) for target in targets)
+    rows = [[getattr(pose, name) for name in fields] for pose in poses]
+    arrays = [np.array(values) for values in zip(*rows, strict=True)]
+    # The pose of a single character has no axis for characters.
+    return [values[:, None] for values in arrays] if characters == 1 else arrays
 
 
 @dataclass(frozen=True)
 class CrowdTarget:
     """The targets of C figures for a stretch of `frames` frames. They are constant in the stretch.
 
-    gait: (C,) names of gaits. channels: name -> values (C, columns). speed: (C,) cm a frame; None: the SPEEDS
-    of the gaits, which then have to be keys of SPEEDS.
+    gait: (C,) names of gaits. cases: (C,) the values of their channels. A channel of which no case says
+    anything has its default. speed: (C,) cm a frame; None: the SPEEDS of the gaits, which then have to be
+    keys of SPEEDS.
     """
 
     frames: int
     gait: Sequence[str]
-    channels: Mapping[str, Array] = field(default_factory=dict, repr=False)
+    cases: Sequence[Case] = field(repr=False)
     speed: Sequence[float] | None = None
+
+    def arguments(self, network: Network) -> dict[str, Array]:
+        """The arguments of `next_pose`. Channels that the network does not have are left out."""
+        speeds = [SPEEDS[name] for name in self.gait] if self.speed is None else self.speed
+        out = {
+            "target_velocity": np.column_stack([np.zeros(len(self.gait)), speeds]),
+            "gait": np.array([[float(name == gait) for name in network.gaits] for gait in self.gait]),
+        }
+        for name, columns in network.channels.items():
+            if any(name in case for case in self.cases):
+                values = [[case.get(name, {}).get(column, 0.0) for column in columns] for case in self.cases]
+                out[name] = np.array(values, float)
+        return out
 
 
 @dataclass(frozen=True)
@@ -259,70 +282,16 @@ def generate_walks(network: Network, script: Sequence[CrowdTarget], runtime: Run
     bit.
     """
     assert network.skeleton is not None
-    count, frames = len(script[0].gait), sum(s.frames for s in script)
-    animation = ProceduralAnimation(network, characters=count, **dict(runtime))
-    local = np.zeros((frames, count, len(network.skeleton.joints), 3), np.float32)
-    contacts, root = np.zeros((frames, count, 4)), np.zeros((frames, count, 3))
-    phase, yaw, largest = (np.zeros((frames, count)) for _ in range(3))
-    recent: list[Array] = []  # joint positions in the world, of the last three frames or fewer
-    frame = 0
-    for stretch in script:
-        velocity = np.zeros((count, 2))
-        velocity[:, 1] = [SPEEDS[name] for name in stretch.gait] if stretch.speed is None else stretch.speed
-        shares = np.array([[float(name == gait) for name in network.gaits] for gait in stretch.gait])
-        for _ in range(stretch.frames):
-            pose = animation.next_pose(velocity, gait=shares, **stretch.channels)
-            positions = pose.positions.reshape(count, -1, 3)  # a single figure has no axis for figures
-            root[frame], phase[frame], contacts[frame] = pose.root, pose.phase, pose.contacts
-            yaw[frame] = pose.yaw
-            local[frame] = in_root_coordinates(positions, root[frame], yaw[frame])
-            recent = [*recent[-2:], positions]
-            if len(recent) == 3:
-                largest[frame - 1] = acceleration(np.array(recent))[0].max(axis=1)
-            frame += 1
-    starts = np.cumsum([0, *(s.frames for s in script)])
-    return Walks(network.skeleton, local, contacts, phase, root, yaw, largest, starts)
-
-
-def walk_straight(
-    network: Network,
-    cases: Sequence[Mapping[str, Mapping[str, float]]],
-    gait: str,
-    speed: Sequence[float],
-    lengths: Sequence[int],
-    runtime: Runtime,
-) -> Walks:
-    """Let a figure for each of `cases` walk ahead, in stretches of `lengths` frames.
-
-    cases: channel -> column -> value, the channel's other columns are 0. A channel of which no case says
-    anything has its default. gait: of all figures. speed: of each, cm a frame.
-    """
-    channels: dict[str, Array] = {}
-    for name in dict.fromkeys(name for case in cases for name in case):
-        channels |= channel_values(network, name, [case.get(name, {}) for case in cases])
-    script = [CrowdTarget(frames, [gait] * len(cases), channels, speed) for frames in lengths]
-    return generate_walks(network, script, runtime)
-
-
-def channel_values(network: Network, name: str, figures: Sequence[Mapping[str, float]]) -> dict[str, Array]:
-    """{name: values (C, columns)} for `CrowdTarget.channels`, or {} if the network lacks the channel `name`.
-
-    figures: for each of C figures, name of a column -> value. Columns that are not named are 0.
-    """
-    columns = network.channels.get(name)
-    if columns is None:
-        return {}
-    out = np.zeros((len(figures), len(columns)))
-    for row, values in zip(out, figures, strict=True):
-        for column, value in values.items():
-            row[columns.index(column)] = value
-    return {name: out}
-
-
-PHASES = 24  # phase bins of a cycle
-# A distance has settled when it differs from its last value by at most this share of its whole change.
-SETTLED_SHARE = 0.1
-SMALLEST_CHANGE_CM = 0.1  # smaller changes get no settling time
+    targets = (told for stretch in script for told in [stretch.arguments(network)] * stretch.frames)
+    fields = ("positions", "contacts", "phase", "root", "yaw")
+    positions, *rest = record(network, runtime, targets, fields, len(script[0].gait))
+    contacts, phase, root, yaw = rest
+    local = [in_root_coordinates(*pose).astype(np.float32) for pose in zip(positions, root, yaw, strict=True)]
+    largest = np.zeros(phase.shape)
+    for frame in range(1, len(positions) - 1):
+        largest[frame] = acceleration(positions[frame - 1 : frame + 2])[0].max(axis=1)
+    starts = np.cumsum([0, *(stretch.frames for stretch in script)])
+    return Walks(network.skeleton, np.array(local), contacts, phase, root, yaw, largest, starts)
 
 
 def phase_bins(phase: Array) -> np.ndarray:
@@ -353,31 +322,6 @@ def distance_to_cycle(local: Array, phase: Array, cycle: Array) -> Array:
     local: (F, J, 3) joint positions, cm. phase: (F,). cycle: result of `mean_cycle`.
     """
     return np.linalg.norm(local - cycle[phase_bins(phase)], axis=-1).mean(axis=-1)
-
-
-def cycle_frames(phase: Array) -> int:
-    """Mean length of a cycle in frames, limited to the range from 10 to 90. phase: (F,)."""
-    rate = np.mod(np.diff(phase), 1.0).mean()
-    return int(np.clip(round(1 / max(rate, 1e-3)), 10, 3 * FPS // 2))
-
-
-def settling_seconds(distance: Array, normal: float, window: int) -> float | None:
-    """Seconds from a change until a motion has settled.
-
-    The motion has settled when `distance` is close to its last value and stays so.
-
-    distance: (F,) distance to a reference motion in each frame after the change, cm. normal: the distance
-    before the change, cm. window: number of frames over which `distance` is averaged, usually a cycle.
-    "Close" means within SETTLED_SHARE of the difference between `normal` and the last value. None if this
-    difference is below SMALLEST_CHANGE_CM.
-    """
-    window = min(window, len(distance))
-    smooth = np.convolve(distance, np.ones(window) / window, mode="valid")
-    change = abs(float(smooth[-1]) - normal)
-    if change < SMALLEST_CHANGE_CM:
-        return None
-    unsettled = np.abs(smooth - smooth[-1]) > SETTLED_SHARE * change
-    return round((int(np.flatnonzero(unsettled)[-1]) + window if np.any(unsettled) else 0) / FPS, 5)
 
 
 SIDES = ("left", "right")
@@ -458,9 +402,9 @@ def spearman(x: Sequence[float] | Array, y: Sequence[float | None]) -> float | N
 
     None if fewer than 3 pairs remain or if all their y are equal.
     """
-    pairs = [(a, b) for a, b in zip(x, y, strict=True) if b is not None]
-    if len(pairs) < 3 or len({b for _, b in pairs}) < 2:
-        return None
-    from scipy.stats import spearmanr  # here, because the import takes a second
+    import pandas  # here, because the import takes half a second
 
-    return round(float(spearmanr(*zip(*pairs, strict=True)).statistic), 5)
+    pairs = pandas.DataFrame({"x": x, "y": y}).dropna().astype(float)
+    if len(pairs) < 3 or pairs.y.nunique() < 2:
+        return None
+    return round(float(pairs.x.corr(pairs.y, method="spearman")), 5)

@@ -1,7 +1,6 @@
 // Draws charts in the page's colours when they scroll into view, and again when the theme changes.
 import library from "plotly"; // as zlib data in base64, see bundle.py
 import { colour, inflate, material, onTheme } from "./base.js";
-import { openClip } from "./recorded.js";
 
 // Unpacking and running plotly.js takes long, so it is done only before the first chart is drawn.
 let loading = null;
@@ -62,11 +61,8 @@ export const startCharts = () => {
       toImageButtonOptions: { format: "svg", filename: spec.name },
     };
     const traces = resolve(chosen.traces), fullLayout = layout(merge(spec, { layout: chosen.layout ?? {} }), narrow);
-    const first = !chosenOptions.has(element);
-    if (first) chosenOptions.set(element, 0);
+    if (!chosenOptions.has(element)) chosenOptions.set(element, 0);
     globalThis.Plotly.react(element, traces, fullLayout, config);
-    // A click on a point that stands for a clip opens the clip. Its name is the point's y, x or text.
-    if (first) element.on("plotly_click", ({ points }) => [points[0].y, points[0].x, points[0].text].some(openClip));
   };
   drawAll = () => Promise.all([...document.querySelectorAll("[data-chart]")].filter((each) => each.offsetParent).map(draw));
   document.querySelectorAll("[data-height]").forEach((each) => { each.style.minHeight = `${each.dataset.height}px`; });

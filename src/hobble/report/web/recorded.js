@@ -87,6 +87,11 @@ export const startCaptured = () => {
     find("compare").scrollIntoView({ block: "center" });
     return true;
   };
+  // A click on a row of a table that stands for a clip opens the clip. Its name is in the first cell.
+  document.addEventListener("click", ({ target }) => {
+    const row = target.closest("tbody tr");
+    if (row) openClip(row.cells[0].textContent);
+  });
   choice.addEventListener("change", choose);
   slider.addEventListener("input", () => seek(Number(slider.value)));
   find("compare-pause").addEventListener("click", () => play(!playing));
