@@ -34,7 +34,7 @@ from hobble.models.network import Network, Predictor
 from hobble.rows.clip_rows import ClipRows, compose_pairs, pair_batches, rotate_by_yaw, unbroken_stretches
 from hobble.rows.layout import GAITS, RowLayout
 from hobble.runtime.error_calculator import relative_and_distance
-from hobble.runtime.rule import joint_place, movement_share, phase_change
+from hobble.runtime.trajectory import joint_place, movement_share, phase_change
 
 if TYPE_CHECKING:
     from hobble.measures.accuracy import Options
@@ -126,7 +126,7 @@ class RollOutInputs:
     to the mean ground height. ground: (F,) this mean height, cm. phase: (F,) in cycles. turn: (F,) negated
     change of the root's yaw until the next frame, radians. velocity: (F, 2) movement of the root until the
     next frame, cm. moving: (F,) the share of the root's predicted movement that is applied, see
-    `hobble.runtime.rule.movement_share`.
+    `hobble.runtime.trajectory.movement_share`.
     """
 
     x: Array

@@ -102,7 +102,14 @@ def _parts(found: Json, material: ReportMaterial) -> list[parts.SectionPart]:
 
     ranges = range_records([row for row in rows if row["link"] not in untrained], published["one_link"])
     return [
-        parts.SectionPart(0, say("injury-responses", [flatten(row) for row in responses]), open=True),
+        parts.SectionPart(
+            0,
+            say(
+                "injury-responses",
+                [flatten(row) for row in sorted(responses, key=lambda r: not r["trained"])],
+            ),
+            open=True,
+        ),
         parts.SectionPart(15, strip_chart(found["strips"], skeleton)),
         parts.SectionPart(20, panels("sweeps", SWEEPS, swept, "Link", more) if swept else None),
         parts.SectionPart(25, say("injury-ranges", ranges), open=True),

@@ -2,9 +2,9 @@
 
 A link is the piece of the body between two neighbouring joints. All figures (copies of the character) walk at
 once, each with its own injuries, in stretches in which severities and gaits stay the same. In the sweep there
-is a figure for each link. It walks healthy until it has reached its speed. Then the severity of its
-link is 0, 1, ..., 10, and at the end 0 again. The other experiments of Ferre et al. (2019) are made, too: a
-second injury, a change from walking to jogging, and divided severities.
+is a figure for each link. It walks healthy until it has reached its speed. Then the severity of its link is
+0, 1, ..., 10, and 0 again for two stretches, of which the second is measured. The other experiments of Ferre
+et al. (2019) are made, too: a second injury, a change from walking to jogging, and divided severities.
 
 The distance of a walk from a reference walk is the mean distance of its joints, in cm, from the mean cycle of
 the reference walk at the same phase. The spread of a walk is its distance from its own mean cycle.
@@ -28,7 +28,6 @@ from hobble.runtime.options import Runtime
 INJURY = "injury"  # the channel
 SEVERITIES = np.arange(11.0)
 WALK_IN = 0.75  # time at the beginning in which figures reach their speed, as a share of a stretch's time
-HEALED = 2  # stretches of time in which nothing hurts at the end of a sweep
 # The experiment of Ferre et al. with two injuries: a first one at each of FIRST_SEVERITIES, while the second
 # one is swept over SEVERITIES, for the pairs of parts that hurt in their films.
 FIRST_SEVERITIES = (5.0, 10.0)
@@ -112,8 +111,7 @@ def sweep(
     network: Network, links: Sequence[str], trained: Sequence[str], seconds: float, runtime: Runtime
 ) -> dict[str, Rows]:
     """`rows`, `responses` and the first `strips` of `injury_response`."""
-    steps = [*((1, severity) for severity in SEVERITIES), (HEALED, 0.0)]
-    stretches = [(share, [{link: severity} for link in links]) for share, severity in steps]
+    stretches = [(1, [{link: severity} for link in links]) for severity in (*SEVERITIES, 0.0, 0.0)]
     crowd = walk_crowd(network, stretches, seconds, runtime)
     found: dict[str, Rows] = {"rows": [], "responses": [], "strips": []}
     for figure, link in enumerate(links):
@@ -171,7 +169,7 @@ def respond(crowd: walks.Walks, figure: int, rows: Rows) -> dict[str, Any]:
     found = {
         "spearman": {n: walks.spearman(SEVERITIES, [row[n] for row in rows]) for n in measures},
         "from_healthy_cm": worst["from_healthy"] - healthy["from_healthy"],
-        "after_healing_cm": crowd.change(end, figure, 1),
+        "after_healing_cm": crowd.change(end + 1, figure, 1),
         "speed_share": worst["speed"] / healthy["speed"] if healthy["speed"] > 0 else None,
         "largest_acceleration": largest,
         "acceleration_share": largest / max(healthy["largest_acceleration"], 1e-9),
