@@ -10,19 +10,7 @@ import pytest
 
 from hobble.core.errors import InputError
 from hobble.measures import accuracy_run as module
-from hobble.measures.accuracy_run import (
-    RollOutInputs,
-    at_stored_phases,
-    inputs_of_clip,
-    joint_errors,
-    joints_to_measure,
-    measure_accuracy,
-    predict_function,
-    roll_out_rows,
-    roll_out_sums,
-    stretches_of,
-    values_of_roll_outs,
-)
+from hobble.measures.accuracy_run import RollOutInputs, joint_errors, joints_to_measure, measure_accuracy
 from hobble.measures.sample import LoadedPart
 from hobble.measures.walks import in_root_coordinates
 from hobble.models.load import load_network
@@ -39,7 +27,7 @@ def test_the_released_network_on_the_original_rows(shared):
     with np.load(shared / "reference" / "original_rows_LocomotionFlat09_000.npz") as file:
         x, y, p, released = (file[name] for name in ("X", "Y", "P", "Y_release"))
     # The exact prediction at the phases that the mode constant stores is that of this mode.
-    predicted = at_stored_phases(network, predict_function(network))(x, p.astype(float))
+    predicted = module.at_stored_phases(network, module.predict_function(network))(x, p.astype(float))
     np.testing.assert_allclose(predicted, released, atol=1e-3)
     errors = joint_errors(RowLayout(31), y, predicted, range(31))
     assert round(float(errors[..., 0].mean()), 4) == 0.0438
@@ -97,7 +85,7 @@ def test_results_of_splits_are_means_of_their_clips_and_reproducible(tmp_path: P
     published = {"mean_of_clips": np.mean(means), "sd_of_clips": np.std(means, ddof=1)}
     assert result["train"]["as_published"] == pytest.approx(published)
     assert result["held_out"]["as_published"]["sd_of_clips"] is None
-    rows = roll_out_rows(result["rollouts"])
+    rows = module.roll_out_rows(result["rollouts"])
     assert (len(rows), rows[0]["clip"]) == (2 * (2 + 4), None)
     json.dumps(result, allow_nan=False)
     # The same bits, however many poses and clips go at once.
@@ -193,9 +181,11 @@ def clip_rows(network: Network, rows: int, seed: int, gap: int | None = None) ->
 
 def clip_roll_outs(network: Network, rows: ClipRows, *lengths: int) -> dict[int, dict[str, Any]]:
     """Length -> errors of all roll-outs of the clip."""
-    stretches = stretches_of(LoadedPart(rows, 0, len(rows)), network.layout)
-    sums = {n: roll_out_sums(network.predictor(), stretches, range(31), n).sum(axis=0) for n in lengths}
-    return {n: values_of_roll_outs(of_length) for n, of_length in sums.items()}
+    stretches, out = module.stretches_of(LoadedPart(rows, 0, len(rows)), network.layout), {}
+    for length in lengths:
+        sums = module.roll_out_sums(network.predictor(), stretches, range(31), length)
+        out[length] = module.values_of_roll_outs(sums.sum(axis=0))
+    return out
 
 
 def test_short_roll_outs_start_twice_and_long_ones_four_times_within_their_length(hurtable: Network) -> None:
@@ -210,7 +200,7 @@ def test_short_roll_outs_start_twice_and_long_ones_four_times_within_their_lengt
 
 def test_errors_of_roll_outs_are_distances_from_the_clip(hurtable: Network) -> None:
     rows = clip_rows(hurtable, 40, 2)
-    inputs, layout = inputs_of_clip(rows, np.arange(40), rows.layout), hurtable.layout
+    inputs, layout = module.inputs_of_clip(rows, np.arange(40), rows.layout), hurtable.layout
     read = channel_inputs("injury", rows.channels["injury"])
     np.testing.assert_array_equal(inputs.x[:, layout.x_channel("injury")], read)
     made, _ = roll_out(hurtable.predictor(), inputs, np.arange(1, 40), 1)

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 import yaml
 
-from hobble.core.errors import InputError
 from hobble.core.files import write_tables
 from hobble.measures import compare
 from hobble.measures.responsivity_run import parameter_counts
@@ -178,12 +177,3 @@ def test_tables_with_different_columns_survive_csv(compared, tmp_path) -> None:
     last = [(r["held_out_turn"], r["held_out_mse"]) for r in rows["training"][-2:]]
     assert last == [("0.25", ""), ("", "")]
     json.dumps(compared, allow_nan=False)
-
-
-def test_a_damaged_history_is_named(tmp_path) -> None:
-    (tmp_path / "configuration.yaml").write_text("configuration: {}")
-    (tmp_path / "pipeline.json").write_text("{}")
-    (tmp_path / "history.csv").write_text("pass,train_mse\n1,half\n")
-    files = [str(tmp_path / name) for name in ("configuration.yaml", "pipeline.json", "history.csv")]
-    with pytest.raises(InputError, match=r"history\.csv"):
-        compare.read_results("holden", *files, [])

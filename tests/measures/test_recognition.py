@@ -15,21 +15,7 @@ from hobble.core.skeleton import Skeleton, forward_kinematics
 from hobble.gait.recognise import learn
 from hobble.measures import recognition as page
 from hobble.measures import recognition_run as module
-from hobble.measures.recognition_run import (
-    HEALTHY,
-    NONE,
-    STEP,
-    USED,
-    WINDOW,
-    Window,
-    confusion_rows,
-    manner_windows,
-    measure_injuries,
-    measure_manners,
-    recognise_left_out,
-    walking_windows,
-)
-from hobble.measures.walks import gait_features
+from hobble.measures.recognition_run import HEALTHY, NONE, STEP, WINDOW, manner_windows, walking_windows
 from hobble.models.network import Network
 from hobble.report.parts import Paragraph
 from hobble.rows.clip_rows import Captured
@@ -38,7 +24,7 @@ from tests.measures.made_up import captured_walk
 
 RUNTIME = Runtime(steering=1.0)
 KNEE, ARM = "LeftUpLeg-LeftLeg", "RightArm-RightForeArm"
-OF_WALK = (USED - WINDOW) // STEP + 1  # windows of a generated walk
+OF_WALK = (module.USED - WINDOW) // STEP + 1  # windows of a generated walk
 
 
 def figure(skeleton: Skeleton, frames: int, knee: float, elbow: float, seed: int) -> np.ndarray:
@@ -57,31 +43,38 @@ def figure(skeleton: Skeleton, frames: int, knee: float, elbow: float, seed: int
     return positions + rng.normal(0, 0.5, positions.shape)
 
 
-def clip(network, name: str, link: str | None, severity: float, seed: int, frames: int = 600) -> Captured:
-    skeleton = network.skeleton
-    hurt = severity / 10
+def clip(
+    network: Network,
+    name: str,
+    seed: int,
+    link: str | None = None,
+    severity: float = 8.0,
+    mood: str | None = None,
+    lean: float = 0.0,
+    frames: int = 600,
+) -> Captured:
+    """A captured walk in which a link hurts, or a mood shows; the trunk leans forward by `lean` cm."""
+    skeleton, hurt = network.skeleton, severity / 10
     local = figure(skeleton, frames, hurt * (link == KNEE), 1.2 * hurt * (link == ARM), seed)
-    severities = np.zeros((frames, len(network.channels["injury"])))
-    if link:
-        severities[:, network.channels["injury"].index(link)] = severity
-    return captured_walk(name, local, {"injury": severities})
+    local[:, [skeleton.role("neck"), skeleton.role("head")], 2] += lean
+    channels = {key: np.zeros((frames, len(columns))) for key, columns in network.channels.items()}
+    for key, column, value in (("injury", link, severity), ("mood", mood, 1.0)):
+        if column:
+            channels[key][:, network.channels[key].index(column)] = value
+    return captured_walk(name, local, channels)
 
 
 @pytest.fixture
 def motion(hurtable) -> list[Captured]:
-    parts = ((None, 0.0), (KNEE, 8.0), (ARM, 8.0))
-    return [
-        clip(hurtable, f"{link}-{n}", link, s, 10 * i + n)
-        for i, (link, s) in enumerate(parts)
-        for n in (1, 2)
-    ]
+    links = enumerate((None, KNEE, ARM))
+    return [clip(hurtable, f"{link}-{n}", 10 * i + n, link) for i, link in links for n in (1, 2)]
 
 
 SPLITS = {f"{link}-{n}": "train" if n == 1 else "held_out" for link in (None, KNEE, ARM) for n in (1, 2)}
 
 
 def judged(network, motion, splits=SPLITS) -> dict[str, Any]:
-    return measure_injuries(network, motion, splits, runtime=RUNTIME, people=0.82)
+    return module.measure_injuries(network, motion, splits, runtime=RUNTIME, people=0.82)
 
 
 def test_two_classes_are_separated_along_fishers_direction() -> None:
@@ -95,20 +88,6 @@ def test_two_classes_are_separated_along_fishers_direction() -> None:
     np.testing.assert_allclose(*unit, atol=0.05)
     assert abs(found.scores(np.array([[0.5, -0.5]])) @ [-1, 1]) < 0.2, "half way between the means"
     assert found.likeliest_classes(np.array([[-1.0, 1.0], [2.0, -2.0]])) == ["a", "b"]
-
-
-def test_features_measure_knee_and_elbow_bend_on_each_side(holden31: Skeleton) -> None:
-    contacts, root = np.ones((120, 4)), np.zeros((120, 3))
-    well = gait_features(holden31, figure(holden31, 120, 0, 0, 1), contacts, root)
-    stiff = gait_features(holden31, figure(holden31, 120, 0.5, 0, 1), contacts, root)
-    bent = gait_features(holden31, figure(holden31, 120, 0, 1.0, 1), contacts, root)
-    assert len(well) == 50
-    assert all(np.isfinite(list(f.values())).all() for f in (well, stiff, bent))
-    assert stiff["knee_bend_left_sd"] == pytest.approx(0.5 * well["knee_bend_left_sd"], rel=0.1)
-    assert stiff["knee_bend_right_sd"] == pytest.approx(well["knee_bend_right_sd"], rel=0.1)
-    assert bent["elbow_right_mean"] - well["elbow_right_mean"] == pytest.approx(np.degrees(1.0), rel=0.15)
-    assert bent["elbow_left_mean"] == pytest.approx(well["elbow_left_mean"], abs=0.5)
-    assert well["thigh_left_sd"] == pytest.approx(np.degrees(0.4 / np.sqrt(2)), rel=0.1)
 
 
 def test_captured_windows_are_named_after_the_link_that_hurts(hurtable, motion) -> None:
@@ -125,7 +104,7 @@ def test_captured_windows_are_named_after_the_link_that_hurts(hurtable, motion) 
     assert found["generated"]["windows"] == (2 * 4 * 3 + 3) * OF_WALK
     assert [s["severity"] for s in found["generated"]["by_severity"]] == [0, 3, 5, 7, 10]
     json.dumps(found, allow_nan=False)
-    table = confusion_rows(found)
+    table = module.confusion_rows(found)
     assert sum(r["windows"] for r in table if r["motion"] == "generated") == found["generated"]["windows"]
     shown = page.recognition_chart(found)
     assert list(shown.options)[1].endswith(
@@ -134,7 +113,7 @@ def test_captured_windows_are_named_after_the_link_that_hurts(hurtable, motion) 
 
 
 def test_windows_hold_straight_walking_with_one_injury(hurtable) -> None:
-    good = clip(hurtable, "a", KNEE, 5.0, 1, frames=400)
+    good = clip(hurtable, "a", 1, KNEE, 5.0, frames=400)
     windows = walking_windows(good, hurtable)
     # Four parts of 100 frames; windows of 60 begin every 15 frames and stay in their part.
     assert [w.part for w in windows] == [quarter for quarter in range(4) for _ in range(3)]
@@ -159,7 +138,7 @@ def test_without_sides_both_legs_are_one_class(holden31: Skeleton) -> None:
     assert parts(HEALTHY) == () != parts("LowerBack-Spine")
     hurt = ["LeftLeg-LeftFoot", "LeftLeg-LeftFoot", "RightUpLeg-RightLeg", HEALTHY]
     named = ["RightLeg-RightFoot", "LeftLeg-LeftFoot", "LeftLeg-LeftFoot", HEALTHY]
-    windows = [Window("a", link, {}, 5.0) for link in hurt]
+    windows = [module.Window("a", link, {}, 5.0) for link in hurt]
     found = module.count_answers(sorted(set(named)), windows, named, parts)
     assert found["right"] == 0.5
     assert found["right_without_side"] == 0.75
@@ -167,7 +146,7 @@ def test_without_sides_both_legs_are_one_class(holden31: Skeleton) -> None:
 
 def test_too_little_data_is_reported_with_its_reason(hurtable, motion) -> None:
     assert judged(hurtable, motion[:2])["reason"] == module.TOO_FEW
-    assert confusion_rows(judged(hurtable, motion[:2])) == []
+    assert module.confusion_rows(judged(hurtable, motion[:2])) == []
     # A part that hurts only in held-out clips is never named right, and is counted.
     found = judged(hurtable, motion, {**SPLITS, f"{ARM}-1": "held_out"})
     assert found["classes"] == sorted([HEALTHY, KNEE])
@@ -187,45 +166,30 @@ def both(hurtable) -> Network:
     return replace(hurtable, layout=layout, channels={"injury": links, "mood": moods})
 
 
-def moody(
-    network: Network, name: str, mood: str | None, *, lean: float, hurt: float = 0.0, value: float = 1.0
-):
-    """A captured clip of a figure that glides straight ahead; its trunk leans forward by `lean` cm."""
-    skeleton, rng = network.skeleton, np.random.default_rng(sum(map(ord, name)))
-    local = np.tile(network.y_mean[network.layout.y_joint_position].reshape(-1, 3), (FRAMES, 1, 1))
-    local = local + rng.normal(0, 0.3, local.shape)
-    local[:, [skeleton.role("neck"), skeleton.role("head")], 2] += lean
-    channels = {key: np.zeros((FRAMES, len(columns))) for key, columns in network.channels.items()}
-    channels["injury"][150:, 0] = hurt
-    if mood:
-        channels["mood"][:, network.channels["mood"].index(mood)] = value
-    return captured_walk(name, local, channels)
+LEANS = {None: 0.0, "sad": 12.0, "old": 30.0}
 
 
-LEANS = ((None, 0.0), ("sad", 12.0), ("old", 30.0))
+def moody(network: Network, mood: str | None, lean: float, seed: int) -> Captured:
+    return clip(network, f"{mood}-{seed}", seed, mood=mood, lean=lean, frames=FRAMES)
 
 
 @pytest.fixture
 def moods(both: Network) -> list[Captured]:
-    return [moody(both, f"{m}-{n}", m, lean=lean + n) for m, lean in LEANS for n in (1, 2, 3)]
+    return [moody(both, m, lean + n, n) for m, lean in LEANS.items() for n in (1, 2, 3)]
 
 
 def measure_moods(network: Network, motion: Sequence[Captured]) -> Any:
     people = {one.clip: one.clip for one in motion}
-    return measure_manners(network, "mood", motion, dict.fromkeys(people, "train"), people, Runtime())
+    return module.measure_manners(network, "mood", motion, dict.fromkeys(people, "train"), people, Runtime())
 
 
 def test_windows_with_an_injury_or_half_a_mood_are_left_out(both: Network) -> None:
-    whole = (FRAMES - WINDOW) // STEP + 1
-    found = manner_windows(moody(both, "a", "sad", lean=0), both, "mood")
-    assert [w.label for w in found] == ["sad"] * whole
-    found = manner_windows(moody(both, "a", "sad", lean=0, hurt=3.0), both, "mood")
-    assert len(found) == (150 - WINDOW) // STEP + 1
-    assert manner_windows(moody(both, "a", "sad", lean=0, value=0.5), both, "mood") == []
-
-
-def window(who: str, manner: str, *values: float) -> Window:
-    return Window(who, manner, dict(enumerate(map(float, values))))
+    sad = moody(both, "sad", 0.0, 1)
+    assert [w.label for w in manner_windows(sad, both, "mood")] == ["sad"] * ((FRAMES - WINDOW) // STEP + 1)
+    sad.channels["injury"][150:, 0] = 3.0
+    assert len(manner_windows(sad, both, "mood")) == (150 - WINDOW) // STEP + 1
+    sad.channels["mood"][:] /= 2
+    assert manner_windows(sad, both, "mood") == []
 
 
 def test_whole_people_are_left_out() -> None:
@@ -237,9 +201,10 @@ def test_whole_people_are_left_out() -> None:
         for take in (1, 2):
             name = f"{person}-{take}"
             people[name] = str(person)
-            windows += [window(name, manner, *(own + rng.normal(0, 0.02, 6))) for _ in range(20)]
-    by_clip = recognise_left_out(windows, {name: name for name in people}, [0.6])
-    by_person = recognise_left_out(windows, people, [0.6])
+            takes = own + rng.normal(0, 0.02, (20, 6))
+            windows += [module.Window(name, manner, dict(enumerate(values))) for values in takes]
+    by_clip = module.recognise_left_out(windows, {name: name for name in people}, [0.6])
+    by_person = module.recognise_left_out(windows, people, [0.6])
     assert by_clip["people"] == 24
     assert by_person["people"] == 12
     assert by_person["people_of"] == {NONE: 6, "sad": 6}
@@ -252,8 +217,8 @@ def test_manners_are_named_and_their_effects_measured(
 ) -> None:
     """Captured windows stand for the generated figures."""
     real = {
-        m: [w.values for w in manner_windows(moody(both, f"{m}-9", m, lean=lean + 1), both, "mood")]
-        for m, lean in LEANS
+        m: [w.values for w in manner_windows(moody(both, m, lean + 1, 9), both, "mood")]
+        for m, lean in LEANS.items()
     }
 
     def generated_values(network: Network, walks: Sequence[Any], runtime: Runtime, features: Any):
@@ -262,16 +227,15 @@ def test_manners_are_named_and_their_effects_measured(
     monkeypatch.setattr(module, "generated_values", generated_values)
     found = measure_moods(both, moods)
     assert found["manners"] == ["old", "sad"]
-    assert found["captured"]["right"] == 1.0
+    assert (found["captured"]["right"], found["right_at_1"]) == (1.0, 1.0)
     assert found["captured"]["shrinkage"] == 0.6, "of equals the largest"
-    assert found["right_at_1"] == 1.0
     effect = found["effects"][2]
     assert (effect["manner"], effect["effect"]) == ("old", "trunk")
-    rest = both.y_mean[both.layout.y_joint_position].reshape(-1, 3)
-    neck, hips = (rest[both.skeleton.role(part)] for part in ("neck", "hips"))
+    rest = figure(both.skeleton, 60, 0, 0, 1).mean(axis=0)
+    trunk = rest[both.skeleton.role("neck")] - rest[both.skeleton.role("hips")]
 
     def lean(cm: float) -> float:
-        return float(np.degrees(np.arctan2(neck[2] + cm - hips[2], neck[1] - hips[1])))
+        return float(np.degrees(np.arctan2(trunk[2] + cm, trunk[1])))
 
     assert effect["captured"] == pytest.approx(lean(32) - lean(2), abs=0.2)
     assert effect["generated"] == effect["generated_at_half"] == pytest.approx(lean(31) - lean(1), abs=0.2)

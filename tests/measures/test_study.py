@@ -12,18 +12,9 @@ import pytest
 from hobble.cli.__main__ import main
 from hobble.core.errors import InputError
 from hobble.core.files import read_yaml
+from hobble.measures import study as module
 from hobble.measures.films import CHANGE_OF_GAIT, FILMS, FPS, ONE_PART, SEVERAL_PARTS, put_side_by_side
-from hobble.measures.study import (
-    ASKED,
-    MARKS,
-    NUMERALS,
-    PARTS,
-    QUESTIONS,
-    published_part,
-    read_answers,
-    read_study,
-    study_tables,
-)
+from hobble.measures.study import MARKS, NUMERALS, PARTS, QUESTIONS
 from hobble.report.gather import PUBLISHED
 
 PRINTED = read_yaml(PUBLISHED)
@@ -63,9 +54,9 @@ def printed_answer(person: int) -> Callable[[Any], dict[str, Any]]:
 
 
 def tables_of(folder: Path, people: list[Callable[[Any], dict[str, Any]]]) -> dict[str, list[dict[str, Any]]]:
-    study = read_study(folder / "films.json")
-    answers = [read_answers(write(folder, f"p{i}", says), study) for i, says in enumerate(people)]
-    return study_tables(study, answers, PRINTED)
+    study = module.read_study(folder / "films.json")
+    answers = [module.read_answers(write(folder, f"p{i}", says), study) for i, says in enumerate(people)]
+    return module.study_tables(study, answers, PRINTED)
 
 
 def test_the_films_hurt_what_the_captions_of_the_published_tables_name() -> None:
@@ -145,7 +136,7 @@ def test_sides_count_only_where_people_were_asked_for_them(tmp_path: Path) -> No
     assert rows["1"]["wrong"] == round(1 / 3, 5)
     head = [row for row in made["III"] if row["choice"] == "head"]
     assert [row["people"] for row in head] == [1]
-    assert {published_part(part) for part in PARTS["sided"]} == set(PARTS["published"])
+    assert {module.published_part(part) for part in PARTS["sided"]} == set(PARTS["published"])
 
 
 def test_the_command_writes_fourteen_tables_with_the_published_beside_ours(
@@ -161,7 +152,7 @@ def test_the_command_writes_fourteen_tables_with_the_published_beside_ours(
     assert {path.name for path in (tmp_path / "out").iterdir()} == names
     with open(tmp_path / "out" / "table-IX.csv") as file:
         rows = list(csv.DictReader(file))
-    assert [row["choice"] for row in rows] == [c for _, choices in ASKED.values() for c in choices]
+    assert [row["choice"] for row in rows] == [c for _, choices in module.ASKED.values() for c in choices]
     assert rows[-1]["people"] == rows[-1]["published_people"] == "8"
     text = (tmp_path / "out" / "tables.md").read_text()
     assert "## Table VIII: film 6, several parts: left shank 10, right thigh 10" in text
@@ -184,9 +175,9 @@ def test_the_command_writes_fourteen_tables_with_the_published_beside_ours(
 def test_a_malformed_file_of_answers_is_refused_with_its_place(
     tmp_path: Path, change: Callable[[Any], Any], message: str
 ) -> None:
-    study = read_study(write_study(tmp_path))
+    study = module.read_study(write_study(tmp_path))
     path = write(tmp_path, "someone", printed_answer(0))
     path.write_text(json.dumps(change(json.loads(path.read_text()))))
     with pytest.raises(InputError, match=message) as error:
-        read_answers(path, study)
+        module.read_answers(path, study)
     assert "someone.json" in str(error.value)
