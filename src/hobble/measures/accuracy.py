@@ -202,10 +202,8 @@ def tables(compared: Json) -> dict[str, list[Row]]:
         for of in entry["rollouts"]
         for split in SPLITS
     ]
-    return {
-        "accuracy": measure.flat_rows(compared["accuracy"], "clips", "configuration"),
-        "rollouts": rolled,
-    }
+    clips = measure.flat_rows(compared["accuracy"], "clips", "configuration")
+    return {"accuracy": clips, "rollouts": rolled}
 
 
 def clip_means(found: Json, split: str) -> list[float]:

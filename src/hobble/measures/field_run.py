@@ -19,7 +19,7 @@ from hobble.models.load import load_network
 from hobble.models.network import Network
 from hobble.rows.clip_rows import captured_stretches, headings, rotate_by_yaw
 from hobble.runtime.animation import ProceduralAnimation
-from hobble.runtime.caller_targets import world_rotations
+from hobble.runtime.caller_targets import Pose, world_rotations
 from hobble.runtime.options import Runtime
 
 if TYPE_CHECKING:
@@ -122,7 +122,9 @@ def straight_walk(network: Network, runtime: Runtime, seconds: float) -> Motion:
     """A straight walk at WALK speed, after SETTLING."""
     gait = [float(name == "walk") for name in network.gaits]
     target = {"target_velocity": [0.0, WALK], "gait": gait}
-    return after_settling(walk(network, runtime, [target] * (SETTLING + round(seconds * FPS)), 1)[0])
+    frames = SETTLING + round(seconds * FPS)
+    positions, rotations = walk(network, runtime, [target] * frames, 1)[0]
+    return positions[SETTLING:], rotations[SETTLING:]
 
 
 def walk_commands(network: Network, runtime: Runtime, commands: Sequence[Command]) -> list[Motion]:
@@ -145,15 +147,15 @@ def walk(
 ) -> list[Motion]:
     """The motion of `count` characters, who start standing. targets: see `walks.record`."""
     assert network.skeleton is not None
-    recorded = record(network, runtime, targets, ("positions", "rotations"), count)
-    positions, rotations = (values.astype(np.float32) for values in recorded)
+    joints = len(network.skeleton.joints)
+
+    def kept(pose: Pose) -> tuple[Array, ...]:
+        shaped = pose.positions.reshape(count, joints, 3), pose.rotations.reshape(count, joints, 4)
+        return tuple(values.astype(np.float32) for values in shaped)
+
+    positions, rotations = record(network, runtime, targets, kept, count)
     local = local_rotations(network.skeleton, rotations)
     return [(positions[:, i], local[:, i]) for i in range(count)]
-
-
-def after_settling(motion: Motion) -> Motion:
-    """The motion without its first SETTLING frames, in which a character who starts standing speeds up."""
-    return motion[0][SETTLING:], motion[1][SETTLING:]
 
 
 def commands_of_clips(inputs: MeasureInputs, skeleton: Skeleton, split: str) -> list[Command]:
@@ -209,8 +211,10 @@ def compare_with_captured(
     """
     skeleton = network.skeleton
     assert skeleton is not None
-    captured = [after_settling(command.motion) for command in commands]
-    walked = [after_settling(motion) for motion in walk_commands(network, runtime, commands)]
+    captured, walked = (
+        [(positions[SETTLING:], rotations[SETTLING:]) for positions, rotations in motions]
+        for motions in ([c.motion for c in commands], walk_commands(network, runtime, commands))
+    )
     mine, theirs = (
         [window_features(skeleton, positions) for positions, _ in motions] for motions in (walked, captured)
     )

@@ -146,8 +146,8 @@ def film_motion(
         severities, gait = film.at(frame)
         injury = {links[part]: severity for part, severity in severities.items() if part in links}
         targets.append({"target_velocity": [0.0, SPEEDS[gait]], "gait": gait, INJURY: injury})
-    positions, rotations = record(network, runtime, targets, ("positions", "rotations"))
-    return positions[warm_up:, 0], rotations[warm_up:, 0]
+    positions, rotations = record(network, runtime, targets, lambda pose: (pose.positions, pose.rotations))
+    return positions[warm_up:], rotations[warm_up:]
 
 
 def distance_from_healthy(positions: Array, healthy: Array) -> float:

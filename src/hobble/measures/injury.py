@@ -87,11 +87,10 @@ def _parts(found: Json, material: ReportMaterial) -> list[parts.SectionPart]:
         link + (f" ({UNTRAINED})" if link in untrained else ""): (of_link, (3.5, 6.5))
         for link, of_link in of_links.items()
     }
+    of_pairs = grouped(found["second_sweep"], "first", "second", "first_severity")
     pairs = {
         f"{second} over {first} at {at:g}": (of_pair, published[f"second_over_{at:g}"].values())
-        for (first, second, at), of_pair in grouped(
-            found["second_sweep"], "first", "second", "first_severity"
-        ).items()
+        for (first, second, at), of_pair in of_pairs.items()
     }
     of_jogs = grouped([row for row in found["into_a_jog"] if row["link"]], "link")
     jogs = {link: (of_link, (3.5, 7.5)) for link, of_link in of_jogs.items()}

@@ -109,9 +109,8 @@ def size_chart(found: Json) -> parts.Chart:
 
     The effect is chosen in a menu.
     """
-    walks = [row for row in found["sizes"] if row["gait"] == "walk"]
-    shown = [row for row in walks if row["part"] in COLOURS or "arm" in row["part"]]
-    of_links = grouped(shown, "link", "part", "side")
+    shown = (row for row in found["sizes"] if row["part"] in COLOURS or "arm" in row["part"])
+    of_links = grouped([row for row in shown if row["gait"] == "walk"], "link", "part", "side")
     options: dict[str, list[parts.Trace]] = {}
     for effect in SHOWN_EFFECTS:
         traces = options.setdefault(found["effects"][effect], [])

@@ -28,7 +28,7 @@ MEASURE = Measure(
     options=SampleOptions,
     runtime=tuple(Runtime.model_fields),
     people=True,
-    cost=Cost(mb_per_1000_frames=36, seconds_per_1000_frames=0.6, least_minutes=30),
+    cost=Cost(memory_mb=200, mb_per_1000_frames=36, seconds_per_1000_frames=0.6, least_minutes=30),
 )
 # The bars of each manner: key of an effect -> label, colour. Walks are generated with the values 1 and .5.
 BARS = {

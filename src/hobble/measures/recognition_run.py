@@ -54,7 +54,7 @@ TOO_FEW = "the captured training clips have no walks, or only one kind (all heal
 Values = Mapping[str, float]  # feature -> value
 # A function of the type of `gait_features`.
 Features = Callable[..., dict[str, float]]
-# What a generated walk is asked for: channel -> column -> value (others are 0), and speed, cm a frame.
+# What a generated walk is asked for: the values of its channels, and speed, cm a frame.
 Asked = tuple[Case, float]
 # A function that maps a class to the parts of the body that hurt, without left and right.
 PartsOfClass = Callable[[str], tuple[str, ...]]

@@ -226,7 +226,7 @@ def compared(
     differences = compare.pair_differences(
         {name: {mode: lap_means(entry) for mode, entry in of.items()} for name, of in modes.items()}
     )
-    fits = fit_lines(found, published)
+    fits, line = fit_lines(found, published), {**published["regression"], "configuration": "all"}
     constant = [row for row in differences if row["over"] == "constant"]
     return compare.ComparisonAddition(
         entries=[{**entry, "configuration": name} for name, of in modes.items() for entry in of.values()],
@@ -238,7 +238,13 @@ def compared(
             "against_published": [
                 *_published_times(modes, published),
                 *compare.published_differences("milliseconds", constant, published),
-                *_published_regression(fits, published["regression"]),
+                *(
+                    compare.published_row(what, line, line[key], fits[0][key], unit)
+                    for key, what, unit in (
+                        ("slope", "milliseconds for each computation of Table 6.1", ""),
+                        ("intercept", "milliseconds at no computation", "ms"),
+                    )
+                ),
             ],
         },
     )
@@ -302,18 +308,6 @@ def _published_times(modes: Mapping[str, Mapping[str, Json]], published: Json) -
         ours = {name: of[mode]["milliseconds"]["predict"] for name, of in modes.items() if mode in of}
         out += compare.beside_ours(f"a prediction, {mode}", of_mode, "milliseconds", ours, "ms")
     return out
-
-
-def _published_regression(fits: Sequence[Json], row: Json) -> list[dict[str, Any]]:
-    """The line of Figure 6.1 beside ours."""
-    ours, row = fits[0], {**row, "configuration": "all"}
-    return [
-        compare.published_row(what, row, row[key], ours[key], unit)
-        for key, what, unit in (
-            ("slope", "milliseconds for each computation of Table 6.1", ""),
-            ("intercept", "milliseconds at no computation", "ms"),
-        )
-    ]
 
 
 def tables(compared: Json) -> dict[str, Sequence[Row]]:

@@ -4,7 +4,8 @@ Centimetres, degrees, 60 frames a second. F is the number of frames, J that of j
 predicted contacts with the ground, from 0 to 1, of left heel, left toe, right heel, right toe.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections import deque
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -15,6 +16,7 @@ from hobble.core.skeleton import Skeleton
 from hobble.models.network import Network
 from hobble.rows.clip_rows import rotate_by_yaw
 from hobble.runtime.animation import ProceduralAnimation
+from hobble.runtime.caller_targets import Pose
 from hobble.runtime.options import Runtime
 
 STANCE = 0.5  # a foot counts as standing if its predicted contact is at least this
@@ -160,20 +162,17 @@ def record(
     network: Network,
     runtime: Runtime,
     targets: Iterable[Mapping[str, Any]],
-    fields: Sequence[str],
+    kept: Callable[[Pose], tuple[Array, ...]],
     characters: int = 1,
 ) -> list[Array]:
-    """Let C characters, who begin standing, follow targets, and record F frames of their poses.
+    """Let characters, who begin standing, follow targets, and keep arrays of their poses.
 
-    targets: the arguments of `next_pose` in each frame. fields: names of arrays of the pose. Returns for each
-    field (F, C, ...).
+    targets: the arguments of `next_pose` in each of F frames. kept: pose -> arrays to keep. Returns each of
+    them with a leading axis F.
     """
     animation = ProceduralAnimation(network, characters=characters, **dict(runtime))
-    poses = (animation.next_pose(**target) for target in targets)
-    rows = [[getattr(pose, name) for name in fields] for pose in poses]
-    arrays = [np.array(values) for values in zip(*rows, strict=True)]
-    # The pose of a single character has no axis for characters.
-    return [values[:, None] for values in arrays] if characters == 1 else arrays
+    rows = [kept(animation.next_pose(**target)) for target in targets]
+    return [np.array(values) for values in zip(*rows, strict=True)]
 
 
 @dataclass(frozen=True)
@@ -199,8 +198,8 @@ class CrowdTarget:
         }
         for name, columns in network.channels.items():
             if any(name in case for case in self.cases):
-                values = [[case.get(name, {}).get(column, 0.0) for column in columns] for case in self.cases]
-                out[name] = np.array(values, float)
+                told = [case.get(name, {}) for case in self.cases]
+                out[name] = np.array([[of.get(column, 0.0) for column in columns] for of in told])
         return out
 
 
@@ -283,15 +282,20 @@ def generate_walks(network: Network, script: Sequence[CrowdTarget], runtime: Run
     """
     assert network.skeleton is not None
     targets = (told for stretch in script for told in [stretch.arguments(network)] * stretch.frames)
-    fields = ("positions", "contacts", "phase", "root", "yaw")
-    positions, *rest = record(network, runtime, targets, fields, len(script[0].gait))
-    contacts, phase, root, yaw = rest
-    local = [in_root_coordinates(*pose).astype(np.float32) for pose in zip(positions, root, yaw, strict=True)]
-    largest = np.zeros(phase.shape)
-    for frame in range(1, len(positions) - 1):
-        largest[frame] = acceleration(positions[frame - 1 : frame + 2])[0].max(axis=1)
+    count, recent = len(script[0].gait), deque[Array](maxlen=3)  # positions in the last three frames or fewer
+
+    def kept(pose: Pose) -> tuple[Array, ...]:
+        recent.append(pose.positions.reshape(count, -1, 3))
+        root, yaw = pose.root.reshape(count, 3), np.reshape(pose.yaw, count)
+        local = in_root_coordinates(recent[-1], root, yaw).astype(np.float32)
+        # That of the frame before.
+        largest = acceleration(np.array(recent))[0].max(axis=1) if len(recent) == 3 else np.zeros(count)
+        return local, pose.contacts.reshape(count, 4), np.reshape(pose.phase, count), root, yaw, largest
+
+    local, contacts, phase, root, yaw, largest = record(network, runtime, targets, kept, count)
     starts = np.cumsum([0, *(stretch.frames for stretch in script)])
-    return Walks(network.skeleton, np.array(local), contacts, phase, root, yaw, largest, starts)
+    largest = np.roll(largest, -1, axis=0)
+    return Walks(network.skeleton, local, contacts, phase, root, yaw, largest, starts)
 
 
 def phase_bins(phase: Array) -> np.ndarray:
