@@ -14,6 +14,7 @@ from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton, two_bone_knee
 
 CYCLE = 60  # frames
+FRAMES = 6 * CYCLE + 1
 THIGH, SHANK = 41.0, 40.0
 LEG = THIGH + SHANK
 FOOT = np.array([0.0, -4.0, 13.0])
@@ -22,24 +23,21 @@ SIDES = {"left": 1.0, "right": -1.0}  # +X is the left
 
 def place(skeleton: Skeleton, at: Mapping[str, Array]) -> Array:
     """(F, J, 3) with the joints of these roles at these places, and all others at the hips."""
-    positions = np.repeat(at["hips"][:, None], len(skeleton.joints), axis=1)
-    for role, points in at.items():
-        positions[:, skeleton.role(role)] = points
-    return positions
+    joints = {skeleton.role(role): points for role, points in at.items()}
+    return np.stack([joints.get(i, at["hips"]) for i in range(len(skeleton.joints))], axis=1)
 
 
-def body(frames: int, speed: float, height: float = 72.0) -> dict[str, Array]:
+def body(speed: float) -> dict[str, Array]:
     """An upright figure that moves ahead at `speed` cm a frame with hanging arms, without knees."""
 
     def up(height: float, left: float = 0.0) -> Array:
         return np.array([left, height, 0.0])
 
-    hips = np.stack([np.zeros(frames), np.full(frames, height), speed * np.arange(frames)], axis=1)
-    at = {"hips": hips, "spine": hips, "chest": hips + up(40), "neck": hips + up(50)}
-    at["head"] = hips + up(60)
+    frame = np.arange(FRAMES)
+    hips = np.stack([0.0 * frame, 0 * frame + 72.0, speed * frame], axis=1)
+    at = {"hips": hips, "spine": hips, "chest": hips + up(40), "neck": hips + up(50), "head": hips + up(60)}
     for side, sign in SIDES.items():
-        at[f"{side}_hip"] = hips + up(0, 9 * sign)
-        at[f"{side}_shoulder"] = hips + up(45, 18 * sign)
+        at[f"{side}_hip"], at[f"{side}_shoulder"] = hips + up(0, 9 * sign), hips + up(45, 18 * sign)
         at[f"{side}_elbow"] = at[f"{side}_shoulder"] - up(29)
         at[f"{side}_wrist"] = at[f"{side}_elbow"] - up(23)
     return at
@@ -70,12 +68,11 @@ class Stepper:
     speed: float = 1.5
     width: float = 18.0
 
-    def positions(self, skeleton: Skeleton, cycles: int = 6) -> Array:
+    def positions(self, skeleton: Skeleton) -> Array:
         """(F, J, 3); the right foot lands at frame 0, CYCLE, 2 CYCLE and so on."""
-        frames = cycles * CYCLE + 1
-        at = body(frames, self.speed)
+        at, frames = body(self.speed), np.arange(FRAMES)
         for side, sign in SIDES.items():
-            ahead = self.relative(side, np.arange(frames))
+            ahead = self.relative(side, frames)
             ankle = at["hips"] * [1, 0, 1] + np.stack([0 * ahead, 0 * ahead + 8, ahead], axis=1)
             ankle[:, 0] += sign * self.width / 2
             hip = at[f"{side}_hip"]
@@ -98,8 +95,7 @@ class Stepper:
 class Swinger:
     """A figure whose joints swing by known angles, degrees; each is (middle, half of the range).
 
-    The right leg is furthest ahead at frame 0 of each cycle, the left one half a cycle later. Knees bend
-    from 0.
+    The right leg is furthest ahead at frame 0 of each cycle, the left one half a cycle later.
     """
 
     hip: Mapping[str, tuple[float, float]]
@@ -110,10 +106,9 @@ class Swinger:
     trunk_left: tuple[float, float] = (3.0, 4.0)
     pelvis_left_up: float = 6.0
 
-    def positions(self, skeleton: Skeleton, cycles: int = 6) -> Array:
+    def positions(self, skeleton: Skeleton) -> Array:
         """(F, J, 3)."""
-        frames = cycles * CYCLE + 1
-        at, wave = body(frames, 1.2), np.cos(2 * np.pi * np.arange(frames) / CYCLE)
+        at, wave = body(1.2), np.cos(2 * np.pi * np.arange(FRAMES) / CYCLE)
         up = np.radians(self.pelvis_left_up)
         for side, sign in SIDES.items():
             beat = wave * -sign
@@ -127,7 +122,7 @@ class Swinger:
             at[f"{side}_wrist"] = at[f"{side}_elbow"] + 23 * down(arm + self.elbow)
         leans = self.trunk_forward, self.trunk_left
         forward, left = (np.tan(np.radians(swing(lean, wave))) for lean in leans)
-        at["neck"] = at["hips"] + 50 * np.stack([left, np.ones(frames), forward], axis=1)
+        at["neck"] = at["hips"] + 50 * np.stack([left, np.ones(FRAMES), forward], axis=1)
         return place(skeleton, at)
 
 

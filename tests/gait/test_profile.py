@@ -73,5 +73,3 @@ def test_windows_begin_every_second_and_hold_three_cycles(holden31):
     right, left = ([[c.start for c in getattr(part, s)] for _, part in found] for s in ("right", "left"))
     assert right == [[60], [60, 120], [120, 180], [180, 240]]
     assert left == [[30, 90], [90, 150], [150, 210], [210, 270]]
-    short = windows_with_cycles(walk, len(positions), seconds=2.0)
-    assert short[0][0] == 60  # the first two seconds hold one cycle of each leg

@@ -22,21 +22,17 @@ def slowing(hurtable, links: tuple[str, ...] = (KNEE,)):
     One unit of each hidden layer carries 1 + severity / 10 through the ELU, where it is linear.
     """
     layout = hurtable.layout
-    weights = [np.zeros_like(w) for w in hurtable.weights]
-    biases = [np.zeros_like(b) for b in hurtable.biases]
+    weights, biases = ([np.zeros_like(w) for w in each] for each in (hurtable.weights, hurtable.biases))
     for link in links:
-        weights[0][:, 0, layout.x_channel("injury").start + hurtable.channels["injury"].index(link)] = (
-            2.0  # the inputs are over 20
-        )
-    biases[0][:, 0] = 1.0
-    weights[1][:, 0, 0] = 1.0
+        column = layout.x_channel("injury").start + hurtable.channels["injury"].index(link)
+        weights[0][:, 0, column] = 2.0  # the inputs are over 20
+    biases[0][:, 0] = weights[1][:, 0, 0] = 1.0
     head = layout.y_joint_position.start + 3 * hurtable.skeleton.role("head") + 1
     for column, effect in ((layout.y_root_velocity.start + 1, -0.5), (head, -4.0)):
         weights[2][:, column, 0] = effect / hurtable.y_std[column]
         biases[2][:, column] = -effect / hurtable.y_std[column]
-    return replace(
-        hurtable, weights=tuple(weights), biases=tuple(biases), x_mean=np.zeros_like(hurtable.x_mean)
-    )
+    changed = {"weights": tuple(weights), "biases": tuple(biases), "x_mean": np.zeros_like(hurtable.x_mean)}
+    return replace(hurtable, **changed)
 
 
 def response(network, **options: Any) -> dict[str, Any]:

@@ -21,10 +21,8 @@ def track(*places: tuple[float, float]) -> tuple[Waypoint, ...]:
 
 
 def run(network, track, laps=2, seconds=10.0, mode="cubic", modes=("constant", "linear")) -> dict[str, Any]:
-    options, runtime = (
-        Options(laps=laps, lap_seconds=seconds, modes=modes),
-        RUNTIME.model_copy(update={"mode": mode}),
-    )
+    options = Options(laps=laps, lap_seconds=seconds, modes=modes)
+    runtime = Runtime(steering=1.0, mode=mode)
     return measure_responsivity(network, options, configuration="x", runtime=runtime, track=track)
 
 
