@@ -14,7 +14,7 @@ import pytest
 from hobble.core.skeleton import Skeleton
 from hobble.engine.compile import compile_library
 from hobble.engine.export import write_blender_addon
-from hobble.engine.hob import write_character
+from hobble.engine.hob import character_bytes
 from hobble.figure.gltf import write_glb
 from hobble.runtime.animation import ProceduralAnimation
 from hobble.runtime.options import Runtime
@@ -31,7 +31,7 @@ def test_the_baked_walk_is_that_of_the_runtime(root: Path, tmp_path: Path, holde
     network = network_of("pfnn", holden31, tmp_path)
     (tmp_path / "libraries").mkdir()
     compile_library(tmp_path / "libraries" / "linux-x64.so")
-    write_character(tmp_path / "character.hob", network, Runtime())
+    (tmp_path / "character.hob").write_bytes(character_bytes(network, Runtime()))
     write_glb(tmp_path / "character.glb", holden31)
     addon = root / "workflow/blender/hobble_blender"
     made = (tmp_path / "libraries", tmp_path / "character.hob", tmp_path / "character.glb")

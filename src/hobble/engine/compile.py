@@ -45,7 +45,6 @@ def compile_wasm(target: str | Path) -> None:
 
 def compile_libraries(folder: str | Path) -> None:
     """Compile the runtime to a shared library for each of LIBRARIES."""
-    Path(folder).mkdir(parents=True, exist_ok=True)
     for name in LIBRARIES:
         compile_library(Path(folder) / name)
 

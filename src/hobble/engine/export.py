@@ -1,12 +1,11 @@
 """Writes results/<configuration>/export/engine/: what a game needs to run the character in its own engine."""
 
-import shutil
 import zipfile
 from pathlib import Path
 
-from hobble.core.files import atomic_path
-from hobble.engine.hob import write_character
-from hobble.engine.traces import write_traces
+from hobble.core.files import atomic_path, write_bytes
+from hobble.engine.hob import character_bytes
+from hobble.engine.traces import FRAMES, SITUATIONS, trace
 from hobble.models.network import Network
 from hobble.runtime.options import Runtime
 
@@ -21,19 +20,13 @@ def export_engine(folder: str | Path, network: Network, runtime: Runtime, wasm: 
     HobbleError for a network without a skeleton.
     """
     folder = Path(folder)
-    folder.mkdir(parents=True, exist_ok=True)
-    write_character(folder / "character.hob", network, runtime)
-    write_traces(folder / "traces", network, runtime)
+    write_bytes(folder / "character.hob", character_bytes(network, runtime))
+    for name, situation in SITUATIONS.items():
+        write_bytes(folder / f"traces/{name}.trace", trace(network, runtime, situation, FRAMES))
     copies = {source: folder / source.name for source in SOURCES.iterdir()}
-    copies[Path(wasm)] = folder / "engine.wasm"
-    for source in filter(Path.is_file, EXAMPLES.rglob("*")):
-        copies[source] = folder / "examples" / source.relative_to(EXAMPLES)
-    for source, target in copies.items():
-        if "__pycache__" in source.parts:
-            continue
-        target.parent.mkdir(parents=True, exist_ok=True)
-        with atomic_path(target) as temporary:
-            shutil.copyfile(source, temporary)
+    copies |= {source: folder / "examples" / source.name for source in EXAMPLES.iterdir() if source.is_file()}
+    for source, target in {**copies, Path(wasm): folder / "engine.wasm"}.items():
+        write_bytes(target, source.read_bytes())
 
 
 def write_blender_addon(

@@ -11,14 +11,12 @@ there.
 import struct
 import zlib
 from collections.abc import Mapping
-from pathlib import Path
 
 import numpy as np
 
 from hobble.channels import channel
 from hobble.channels.shown import channel_display
 from hobble.core.errors import HobbleError
-from hobble.core.files import atomic_path
 from hobble.core.quat import Array
 from hobble.models.network import STORAGES, Network, inverse_or_0
 from hobble.rows.layout import BODY
@@ -87,13 +85,6 @@ SIZES = (
 )
 
 
-def write_character(path: str | Path, network: Network, runtime: Runtime, storage: str | None = None) -> None:
-    """Write the character file; the arguments are those of `character_bytes`."""
-    data = character_bytes(network, runtime, storage)
-    with atomic_path(path) as temporary:
-        temporary.write_bytes(data)
-
-
 def _packed(sections: Mapping[str, np.ndarray]) -> bytes:
     table, body = b"", b""
     start = HEADER + ENTRY * len(sections)
@@ -139,28 +130,28 @@ def _channel_sections(network: Network, runtime: Runtime) -> Sections:
     assert skeleton is not None
     parts: list[str] = []
     limits: list[Array] = [np.zeros(0)]
-    of_column: dict[str, list[Array]] = {
-        name: [] for name in ("channel_of", "rates", "scales", "highest", "defaults")
-    }
+    of_columns: list[tuple[float, ...]] = []  # of each column: the numbers that the sections below name
     levels = np.zeros(len(network.channels), np.int32)
     for number, (name, labels) in enumerate(network.channels.items()):
         parts += list(channel_display(name, skeleton, labels, network.trained_labels(name)).spoken_names)
         definition, scale = channel(name), runtime.scales.get(name, 1.0)
         rate = runtime.rates.get(name, definition.rate) / FPS
         entries = number, rate, scale, definition.highest, definition.default / scale
-        for values, entry in zip(of_column.values(), entries, strict=True):
-            values.append(np.full(len(labels), entry))
+        of_columns += [entries] * len(labels)
         limit = network.limits.get(name) if runtime.limits else None
         if limit is not None:
             levels[number] = len(limit.levels)
             limits += [limit.levels, limit.usual, limit.speeds.ravel()]
     columns = [label for of_channel in network.channels.values() for label in of_channel]
     names = [*skeleton.joints, *network.gaits, *network.channels, *columns, *parts]
-    joined = {key: np.concatenate([np.zeros(0), *values]).astype(float) for key, values in of_column.items()}
+    numbers, rates, scales, highest, defaults = np.array(of_columns, float).reshape(-1, 5).T
     return {
-        **joined,
+        "channel_of": numbers.astype(np.int32),
+        "rates": rates,
+        "scales": scales,
+        "highest": highest,
+        "defaults": defaults,
         "exponents": network.channel_curves[1],
-        "channel_of": joined["channel_of"].astype(np.int32),
         "slows": np.array([channel(name).slows for name in network.channels], np.uint8),
         "limit_levels": levels,
         "limits": np.concatenate(limits).astype(float),

@@ -13,13 +13,11 @@ character starts at the origin, facing +Z.
 import struct
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
 from hobble.channels import channel
 from hobble.channels.shown import channel_display
-from hobble.core.files import atomic_path
 from hobble.core.quat import Array
 from hobble.models.network import Network
 from hobble.runtime.animation import ProceduralAnimation
@@ -82,12 +80,13 @@ def channel_values(network: Network) -> dict[str, dict[str, float]]:
     for name, labels in network.channels.items():
         trained = network.trained_labels(name)
         shown = channel_display(name, network.skeleton, labels, trained).sliders.values() or trained
-        values[name] = {label: 0.7 * channel(name).highest for label in list(shown)[:2]}
+        # As float32, because a port reads these numbers from the file.
+        values[name] = dict.fromkeys(list(shown)[:2], float(np.float32(0.7 * channel(name).highest)))
     return values
 
 
 def trace(
-    network: Network, runtime: Runtime, situation: Situation, frames: int, storage: str | None
+    network: Network, runtime: Runtime, situation: Situation, frames: int, storage: str | None = None
 ) -> bytes:
     """The trace file of one situation.
 
@@ -103,12 +102,7 @@ def trace(
     for frame in range(frames):
         velocity = np.asarray(situation.velocity(frame), np.float32)
         facing = np.asarray(situation.facing(frame), np.float32)
-        # As float32, because a port reads these numbers from the file.
-        values = {
-            name: {label: float(np.float32(value)) for label, value in of_channel.items()}
-            for name, of_channel in hurt.items()
-            if situation.hurt and frame >= 120
-        }
+        values = hurt if situation.hurt and frame >= 120 else {}
         pose = animation.next_pose(velocity, facing, situation.gait, terrain=terrain, **values)
         given = [
             values.get(name, {}).get(label, channel(name).default)
@@ -127,12 +121,3 @@ def trace(
     columns = sum(map(len, network.channels.values()))
     header = VERSION, frames, len(pose.positions), columns, *grid.shape, SEED, situation.variation, CELL
     return struct.pack("<8s7I2d", MAGIC, *header) + grid.astype("<f4").tobytes() + np.array(records).tobytes()
-
-
-def write_traces(folder: Path, network: Network, runtime: Runtime) -> None:
-    """Write <situation>.trace for each of SITUATIONS into the folder."""
-    folder.mkdir(parents=True, exist_ok=True)
-    for name, situation in SITUATIONS.items():
-        data = trace(network, runtime, situation, FRAMES, None)
-        with atomic_path(folder / f"{name}.trace") as temporary:
-            temporary.write_bytes(data)

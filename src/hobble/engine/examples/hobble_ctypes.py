@@ -106,11 +106,8 @@ class Characters:
 
     def frame(self, ground: Ground | None = None) -> None:
         """Run one frame of all characters."""
-        self.check(
-            self.library.hobble_frame(
-                self.handle, self.targets, None if ground is None else ctypes.byref(ground)
-            )
-        )
+        pointer = None if ground is None else ctypes.byref(ground)
+        self.check(self.library.hobble_frame(self.handle, self.targets, pointer))
 
 
 def ground_from(height: Callable[[float, float], float]) -> Ground:
