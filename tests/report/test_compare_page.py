@@ -13,9 +13,8 @@ from hobble.measures import responsivity as of_laps
 from hobble.measures.compare import ConfigurationResults, compare_configurations
 from hobble.measures.measure import all_measures
 from hobble.models.network import Network
-from hobble.report import compare_page
+from hobble.report import page as pages
 from hobble.report.character import playable_data
-from hobble.report.compare_page import render_comparison
 from hobble.report.gather import PUBLISHED, ReportMaterial
 from hobble.report.templates import compressed
 from hobble.runtime.options import Runtime
@@ -54,7 +53,7 @@ def pair(character: dict[str, Any], network: Network, runtime: Runtime) -> dict[
 def tab(
     compared: dict[str, Any], pair: dict[str, Any], script: str, tmp_path_factory: pytest.TempPathFactory
 ) -> Iterator[Browser]:
-    page = render_comparison(compared, pair, script, measures=all_measures())
+    page = pages.render_comparison(compared, pair, script, measures=all_measures())
     yield from opened(page, tmp_path_factory.mktemp("compared"))
 
 
@@ -74,14 +73,14 @@ def test_published_errors_laps_and_curves_are_drawn_beside_ours(compared: dict[s
     assert "ava, published" not in {trace["name"] for trace in lines.options["standard deviation"]}
     laps = {trace["name"]: trace for trace in of_laps.lap_boxes(compared).options["constant phase"]}
     assert (len(laps["ava, published"]["y"]), laps["ava, published"]["y"][-1]) == (19, 1.397291)
-    chart = compare_page.training_curves(compared)
+    chart = pages.training_curves(compared)
     assert chart is not None
     (curve,) = [t for t in chart.options["passes"] if t["name"] == "holden, published"]
     assert (curve["x"][-1], curve["y"][0], curve["y"][-1]) == (20, 0.442, 0.254)
 
 
 def test_published_figures_are_shown_with_ours(compared: dict[str, Any]) -> None:
-    rows = {(row[0], row[1]): row[2:] for row in compare_page.published_table(compared).rows}
+    rows = {(row[0], row[1]): row[2:] for row in pages.published_table(compared).rows}
     assert rows["a frame, mean", "holden"][0] == "0.376 ms"
     assert rows["a frame, mean", "holden"][1].endswith(" ms")
     assert rows["relative error, held-out clips", "holden-xl"][:2] == ["0.0448", ""]
@@ -94,8 +93,8 @@ def test_published_figures_are_shown_with_ours(compared: dict[str, Any]) -> None
 def test_networks_too_large_for_one_page_are_left_out(
     compared: dict[str, Any], pair: dict[str, Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(compare_page, "LARGEST_CHARACTERS", 1.5 * len(compressed(pair["holden"])))
-    page = render_comparison(compared, pair)
+    monkeypatch.setattr(pages, "LARGEST_CHARACTERS", 1.5 * len(compressed(pair["holden"])))
+    page = pages.render_comparison(compared, pair)
     assert "to keep the file small: ava" in page
     assert 'id="play-second"' not in page
 

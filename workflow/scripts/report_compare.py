@@ -8,7 +8,7 @@ from hobble.core.files import read_json, write_text
 from hobble.measures.measure import all_measures
 from hobble.models.load import load_network
 from hobble.report.character import playable_with_recogniser
-from hobble.report.compare_page import render_comparison
+from hobble.report.page import render_comparison
 from hobble.runtime.options import Runtime
 from hobble.workflow.job import job
 

@@ -1,4 +1,4 @@
-"""Packs what a page plays: a network with a recogniser of limps, captured beside predicted clips, grounds."""
+"""Packs what a page plays: a network, a recogniser of limps, and captured beside predicted clips."""
 
 import base64
 from collections.abc import Iterable, Mapping, Sequence
@@ -9,14 +9,14 @@ import numpy as np
 
 from hobble.channels import channel
 from hobble.channels.shown import channel_display
-from hobble.core.files import load_npz, map_npz, to_base64
+from hobble.core.files import load_npz, to_base64
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 from hobble.engine.hob import character_bytes
 from hobble.figure.mesh import body_mesh, mesh_key
 from hobble.gait.cycles import SCALARS, measure_cycles
 from hobble.gait.profile import Profile, profile_of_walk
-from hobble.gait.recognise import LEANING, PARTS, SIDES, STRENGTHS, Grader, grader_of_all_people
+from hobble.gait.recognise import LEANING, PARTS, SIDES, STRENGTHS, grader_of_all_people
 from hobble.models.network import Network
 from hobble.rows.clip_rows import ClipRows, load_clip_rows, unbroken_stretches
 from hobble.runtime.animation import ProceduralAnimation
@@ -116,29 +116,20 @@ def opening_slider(playable: Mapping[str, Any], measurements: Iterable[Mapping[s
     results of each measurement.
 
     In the result, `part` is the label of a slider, or None if no channel has sliders. It is the slider that
-    makes the walk limp most; the first one if no limps were measured. `value` is its value, in tenths of the
-    highest.
+    makes the walk limp most, by how much longer the sound leg stands than the hurt one; the first one if no
+    limps were measured. `value` is its value, in tenths of the highest.
     """
     channel = opening_channel(playable)
     if channel is None:
         return {"part": None, "value": 0}
     # Column -> label of its slider. A row of the limps that were measured names its column under "link".
     labels = {channel["columns"][i]: label for label, i in channel["sliders"].items()}
-    rows = [row for results in measurements for row in results.get("sizes") or ()]
-    limps = [row for row in rows if row.get("gait") == "walk" and row["link"] in labels]
-    part = labels[max(limps, key=_limp_size)["link"]] if limps else next(iter(labels.values()))
-    return {"part": part, "value": OPENING_VALUE}
-
-
-def _limp_size(row: Mapping[str, Any]) -> float:
-    """How much a limp changes the walk: the changes of stance, step and knee, added up.
-
-    `stance`: how much longer the sound leg stands than the hurt one, as a share of the cycle; the healthy
-    walk has 0. `step_hurt`, `knee_hurt`: length of the step and range of the knee of the hurt leg, divided
-    by those of the healthy walk.
-    """
-    ratios = [row.get(name) for name in ("step_hurt", "knee_hurt")]
-    return abs(row.get("stance") or 0.0) + sum(abs(1 - ratio) for ratio in ratios if ratio is not None)
+    sizes = dict.fromkeys(labels.values(), 0.0)
+    for row in (row for results in measurements for row in results.get("sizes") or ()):
+        if row.get("gait") == "walk" and row["link"] in labels:
+            label = labels[row["link"]]
+            sizes[label] = max(sizes[label], abs(row.get("stance") or 0.0))
+    return {"part": max(sizes, key=lambda label: sizes[label]), "value": OPENING_VALUE}
 
 
 def body_channel(playable: Mapping[str, Any]) -> Mapping[str, Any] | None:
@@ -190,17 +181,9 @@ def healthy_walk(network: Network, skeleton: Skeleton, runtime: Runtime) -> Prof
 
 
 # The numbers of a profile in `c/hobble_gait.h`, in their order.
-CURVES_IN_C = (
-    *(
-        f"{limb}_{side}"
-        for side in "LR"
-        for limb in (
-            *("hip_flexion", "hip_abduction", "knee_flexion"),
-            *("ankle_height", "ankle_forward", "arm_forward"),
-        )
-    ),
-    *("trunk_forward", "trunk_left", "pelvis_left_up"),
-)
+LIMBS = ("hip_flexion", "hip_abduction", "knee_flexion", "ankle_height", "ankle_forward", "arm_forward")
+TRUNK = ("trunk_forward", "trunk_left", "pelvis_left_up")
+CURVES_IN_C = (*(f"{limb}_{side}" for side in "LR" for limb in LIMBS), *TRUNK)
 PROFILE_IN_C = (*SCALARS, *(f"{kind} {curve}" for kind in ("range", "mean") for curve in CURVES_IN_C))
 
 
@@ -215,13 +198,13 @@ def measured_joints(skeleton: Skeleton) -> list[int]:
     return found
 
 
-def packed_statistics(statistics: Grader | None = None) -> dict[str, Any]:
+def packed_statistics() -> dict[str, Any]:
     """What the graded recogniser of `hobble.gait.recognise` learnt from people's walks.
 
-    statistics: by default those learnt from all people. In the result, `words`: for each kind of limp what
+    In the result, `words`: for each kind of limp what
     may hurt. `learnt`: the numbers that `c/hobble_gait.h` describes, float64 in base64.
     """
-    statistics = statistics or grader_of_all_people()
+    statistics = grader_of_all_people()
     labels = list(dict.fromkeys(label for label, _ in statistics.kinds))
     numbers: list[Any] = [[len(statistics.kinds), len(STRENGTHS)], STRENGTHS, statistics.healthy]
     for (label, _), (mean, spread) in statistics.kinds.items():
@@ -335,59 +318,3 @@ def _compared_clip(network: Network, rows: ClipRows, split: str, drawn_joints: l
         "predicted": packed_motion(predicted[1], predicted[0], drawn_joints),
         "error": np.round(error, 2).tolist(),
     }
-
-
-STEPS_PER_CM = 10  # lengths are stored as 16-bit integers, in steps of a millimetre
-MOST_VIEWS = 8  # the page has at most this many views
-# The arrays of a view: fields of `hobble.terrain.clip_fits.FitPicture`. In the file they are called
-# picture<number>_<field>.
-ARRAYS = ("cycle", "x", "z", "ground", "soles", "contacts", "pose", "turns")
-
-
-def ground_pictures(paths: Iterable[str | Path], skeleton: Mapping[str, Any]) -> dict[str, Any]:
-    """Views of the fits in the files `terrain/clips/<clip>.npz`, packed for the page.
-
-    Cycles on flat ground have no views. skeleton: the network's, as a dict; empty if it has none. Keys of the
-    result: `joints`, the number of joints that are drawn; `body`, the key of the body's mesh; `pictures`, the
-    views.
-    """
-    pictures: list[dict[str, Any]] = []
-    if not skeleton:
-        return {"joints": 0, "body": "", "pictures": pictures}
-    figure = Skeleton.from_dict({"name": "", **skeleton})
-    drawn_joints = body_mesh(figure).bones.tolist()
-    for path in paths:
-        if len(pictures) == MOST_VIEWS:
-            break
-        file = map_npz(path)
-        count = int(file["pictures"]) if "pictures" in file else 0
-        for i in range(min(count, MOST_VIEWS - len(pictures))):
-            view = {array: np.array(file[f"picture{i}_{array}"]) for array in ARRAYS}
-            if view["pose"].shape[1] == len(figure.joints):
-                name = f"{Path(path).stem}, cycle {int(view['cycle']) + 1}"
-                pictures.append({"name": name, **_packed_view(view, drawn_joints)})
-    return {"joints": len(drawn_joints), "body": mesh_key(figure), "pictures": pictures}
-
-
-def _packed_view(view: Mapping[str, Array], keep: Sequence[int]) -> dict[str, Any]:
-    """Packs the arrays of a view.
-
-    x and z are measured from the first joint at the second of the three moments, so that 16 bits are enough.
-    In the result, `x` and `z` are the first and the last coordinate of the ground's grid, cm. `n` is the
-    number of its points along each of them. The figure at the three moments is a `packed_motion`.
-    """
-    middle = view["pose"][1, 0] * np.array([1.0, 0.0, 1.0])
-    return {
-        "n": len(view["x"]),
-        "x": [float(view["x"][0] - middle[0]), float(view["x"][-1] - middle[0])],
-        "z": [float(view["z"][0] - middle[2]), float(view["z"][-1] - middle[2])],
-        "ground": _packed_steps(view["ground"]),
-        "soles": _packed_steps(view["soles"] - middle),
-        "contacts": to_base64(np.asarray(view["contacts"], np.uint8)),
-        **packed_motion(view["pose"] - middle, view["turns"], keep),
-    }
-
-
-def _packed_steps(values: Array) -> str:
-    """Lengths in cm as 16-bit integers, packed. Lengths beyond their range, about 33 m, are cut."""
-    return to_base64(np.clip(np.round(values * STEPS_PER_CM), -32767, 32767).astype(np.int16))

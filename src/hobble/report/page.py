@@ -1,20 +1,17 @@
-"""Renders the report of a configuration into one self-contained HTML file."""
+"""Renders the report of a configuration, or the comparison of several, into one self-contained HTML file."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 import yaml
 
 from hobble.core.quat import Array
-from hobble.core.skeleton import Skeleton
-from hobble.figure.mesh import mesh_key
-from hobble.figure.pack import packed_body
 from hobble.report import parts
 from hobble.report import sections as own
-from hobble.report.character import body_channel, ground_pictures, opening_channel, opening_slider
+from hobble.report.character import body_channel, opening_channel, opening_slider
 from hobble.report.gather import ReportMaterial
-from hobble.report.templates import measured_by, render_page
+from hobble.report.templates import compressed, measured_by, render_page
 
 # Degrees a second: slower turning is not counted, because the body sways that much in a straight walk.
 TURNING = 40.0
@@ -35,23 +32,17 @@ def render_report(
     from `character.packed_comparisons`. bundle: the page's scripts, from `bundle.bundle_page_scripts`.
     A section without data is left out.
     """
-    terrain = own.some_files(material.terrain_files, own.MOST_SHOWN)
     # Seconds of data at each speed, turning speed and channel value.
     counted = own.seconds_of_data(material.row_files, material.splits)
     playable, compared = playable or {}, captured_and_predicted or {}
-    grounds = ground_pictures(terrain, material.network["skeleton"])
     opening = opening_slider(playable, material.measurements.values())
     on_page = {material.name: playable} if playable else {}
     return render_page(
         material.name,
         [parts.SectionPart(0, parts.KeyFigures(key_figures(material)))],
-        parts.join_sections(
-            [*measured_by(material, "section"), *own.own_sections(material, counted, terrain)]
-        ),
+        parts.join_sections([*measured_by(material, "section"), *own.own_sections(material, counted)]),
         {
-            "bodies": _bodies(material),
             "hero": opening,
-            "grounds": grounds,
             "playable": on_page,
             "compare": compared,
         },
@@ -67,17 +58,8 @@ def render_report(
         hints=hints(material, counted["both"]),
         playable=list(on_page),
         captured_and_predicted=[clip["name"] for clip in compared.get("clips", ())],
-        grounds=[picture["name"] for picture in grounds["pictures"]],
         configuration=yaml.safe_dump(dict(material.resolved), sort_keys=False, allow_unicode=True),
     )
-
-
-def _bodies(material: ReportMaterial) -> dict[str, Any]:
-    """The body to draw, under its key (`mesh_key`); {} if the network has no skeleton."""
-    if not material.network["skeleton"]:
-        return {}
-    figure = Skeleton.from_dict({"name": "", **material.network["skeleton"]})
-    return {mesh_key(figure): packed_body(figure)}
 
 
 def _training_options(material: ReportMaterial) -> Mapping[str, Any]:
@@ -206,3 +188,153 @@ def _repair_hints(material: ReportMaterial) -> Iterator[parts.Hint]:
     warned = {report["clip"] for report in reports if report.get("warnings")}
     if repaired or warned:
         yield parts.hint("hints.repaired", repaired=len(repaired), warned=len(warned))
+
+
+# The page that compares configurations.
+
+# Bytes of the characters in a page together, at most; with scripts and charts it stays under 20 MB.
+LARGEST_CHARACTERS = 14_000_000
+
+
+def render_comparison(
+    compared: Mapping[str, Any],
+    playables: Mapping[str, Mapping[str, Any]] | None = None,
+    bundle: str = "",
+    measures: Sequence[Any] = (),
+) -> str:
+    """The comparison as one HTML document.
+
+    compared: the content of compare.json. playables: configuration -> data of a character that its network
+    moves in the page, from `playable_data` in `hobble.report.character`. Characters that do not fit into
+    the page are left out. bundle: all scripts of the page as one script. measures: all measurements, for what
+    they show.
+    """
+    shown = {
+        name: [show(compared) for measure in measures if (show := measure.function(name)) is not None]
+        for name in ("compared_values", "compared_section")
+    }
+    values = sorted((v for each in shown["compared_values"] for v in each), key=lambda value: value.order)
+    names, on_page, left_out, used = parts.configuration_names(compared), {}, [], 0
+    for name, spec in (playables or {}).items():
+        size = len(compressed(spec))
+        if spec and used + size <= LARGEST_CHARACTERS:
+            used, on_page[name] = used + size, spec
+        elif spec:
+            left_out.append(name)
+    return render_page(
+        "compare",
+        [parts.SectionPart(0, configuration_table(compared, values), open=True)],
+        parts.join_sections([*shown["compared_section"], *compared_sections(compared)]),
+        {"playable": on_page},
+        bundle,
+        title=" and ".join(names) if len(names) < 3 else f"{len(names)} configurations",
+        eyebrow="Hobble report · comparison of configurations",
+        lead="The same measurements of " + ", ".join(names) + ", compared with published results.",
+        opening=None,
+        hints=[value.verdict for value in values if value.verdict],
+        playable=list(on_page),
+        left_out=left_out,
+        hurts=any(body_channel(spec) for spec in on_page.values()),
+    )
+
+
+def compared_sections(compared: parts.Compared) -> Iterator[parts.PageSection]:
+    """The sections of a comparison that no measurement has."""
+    colours = parts.configuration_colours(compared)
+    stages = {
+        name: [stage for stage in compared["stages"] if stage["configuration"] == name] for name in colours
+    }
+    costs = own.stage_charts(stages, "compare", parts.words("stages.once"), colours)
+    read = parts.Paragraph(parts.words("published.read"))
+    yield own.own_section("training", training_curves(compared))
+    yield own.own_section("costs", parts.ChartGroup(costs))
+    yield own.own_section("published", read, published_table(compared), long=True)
+    yield own.own_section("origin", parts.TemplatePart("origin.html.j2"))
+
+
+# Column of a configuration's training history -> title of the horizontal axis.
+X_AXES = {"pass": "passes", "seconds": "seconds of training", "samples": "samples seen"}
+
+
+def training_curves(compared: parts.Compared) -> parts.Chart | None:
+    """Training and held-out error of all configurations. A menu selects the horizontal axis, see X_AXES."""
+    options: dict[str, list[parts.Trace]] = {}
+    values: list[float | None] = []
+    colours = parts.configuration_colours(compared)
+    for key, label in X_AXES.items():
+        for entry in compared["training"]:
+            name, traces = entry["configuration"], options.setdefault(label, [])
+            x = own.passes_axis(entry) if key == "pass" else entry.get(key, [])
+            train, held_out = entry.get("train_mse", []), entry.get("held_out_mse", [])
+            if any(v is not None for v in held_out):
+                traces.append(parts.line_trace(f"{name}, held out", x, held_out, colours[name]))
+                values += held_out
+            traces.append(
+                parts.line_trace(f"{name}, training", x, train, colours[name], width=1.2, dash="dot")
+            )
+            values += train
+            passes, published = own.published_curve(compared["published"], name)
+            if key == "pass" and passes:
+                whose = f"{name}, published"
+                traces.append(
+                    parts.line_trace(whose, passes, published, colours[name], width=1.2, dash="dashdot")
+                )
+                values += published
+    if not options:
+        return None
+    return parts.chart(
+        "compare-training",
+        layout={"yaxis": parts.log_axis("mean squared error", values)},
+        height=420,
+        choose="Horizontal axis",
+        options=options,
+        option_layouts={label: {"xaxis": {**parts.axis(label), "rangemode": "tozero"}} for label in options},
+    )
+
+
+def configuration_table(compared: parts.Compared, measured: Sequence[parts.ComparedValue]) -> parts.Table:
+    """A column for each configuration, with its settings and the values `measured`."""
+    entries = {entry["configuration"]: entry for entry in compared["configurations"]}
+
+    def by_name(key: str) -> dict[str, Any]:
+        """Configuration -> its entry `key` in compare.json."""
+        return {name: entry[key] for name, entry in entries.items()}
+
+    channel_names = {name: ", ".join(channels) or "none" for name, channels in by_name("channels").items()}
+    values = [
+        *measured,
+        parts.ComparedValue(50, parts.Column("channels"), channel_names),
+        parts.ComparedValue(60, parts.Column("data set"), by_name("dataset")),
+        parts.ComparedValue(80, parts.Column.count("layers"), by_name("hidden_layers")),
+        parts.ComparedValue(90, parts.Column.count("units"), by_name("units")),
+        parts.ComparedValue(100, parts.Column.number("passes"), by_name("passes")),
+    ]
+    rows = [
+        [value.column.label, *(value.shown(name) for name in entries)]
+        for value in sorted(values, key=lambda value: value.order)
+    ]
+    heads = [parts.Column("value"), *(parts.Column(name, kind="n") for name in entries)]
+    return parts.Table("compare-configurations", heads, rows, "The configurations", first=len(rows))
+
+
+def published_table(compared: parts.Compared) -> parts.Table:
+    """The published results next to ours. Results that we did not measure come last."""
+    sources, longer = compared["published"]["sources"], parts.told("published.longer")
+    formats = {"bytes": parts.format_bytes, "s": parts.format_duration}
+
+    def as_text(value: float | None, unit: str) -> str:
+        if value is None or unit in formats:
+            return "" if value is None else formats[unit](float(value))
+        return f"{parts.format_number(float(value), 3)} {unit}".strip()
+
+    published = (*compared["against_published"], *compared["milliseconds"]["against_published"])
+    records = [
+        {
+            "measure": longer.get(row["measure"], row["measure"]),
+            "configuration": row["configuration"],
+            **{key: as_text(row[key], row["unit"]) for key in ("published", "ours")},
+            "source": parts.citation(row, sources),
+        }
+        for row in sorted(published, key=lambda row: row["ours"] is None)
+    ]
+    return parts.table("compare-published", records, title=parts.words("sections.published.title"))

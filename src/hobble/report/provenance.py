@@ -29,13 +29,8 @@ PACKAGES = ("hobble", "torch", "numpy", "scipy", "numba", "snakemake", "pydantic
 
 def versions() -> dict[str, str]:
     """Name -> version, for Python, the main Python packages and the page's npm packages."""
-    found = {"python": platform.python_version()}
-    for name in PACKAGES:
-        try:
-            found[name] = metadata.version(name)
-        except metadata.PackageNotFoundError:
-            found[name] = "not installed"
-    return found | json.loads((WEB / "package.json").read_text(encoding="utf-8"))["dependencies"]
+    npm = json.loads((WEB / "package.json").read_text(encoding="utf-8"))["dependencies"]
+    return {"python": platform.python_version()} | {name: metadata.version(name) for name in PACKAGES} | npm
 
 
 def machine() -> dict[str, Any]:

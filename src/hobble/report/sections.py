@@ -49,18 +49,15 @@ SHOW: Mapping[str, Callable[[Any], str]] = {
 }
 
 
-def own_sections(
-    material: ReportMaterial, counted: Mapping[str, Any], terrain: Sequence[str]
-) -> Iterator[parts.PageSection]:
+def own_sections(material: ReportMaterial, counted: Mapping[str, Any]) -> Iterator[parts.PageSection]:
     """The sections of a report that no measurement has.
 
-    counted: from `seconds_of_data`. terrain: files of the terrain fits that are shown.
+    counted: from `seconds_of_data`.
     """
     stages = {material.name: material.pipeline.get("stages") or ()}
     costs = stage_charts(stages, "stage", parts.words("stages.sum"), {material.name: "@accent"})
     missing = ", ".join(material.pipeline.get("missing") or ())
-    fits = fit_table(terrain)
-    on_hills = [parts.TemplatePart("terrain.html.j2"), parts.Paragraph(parts.words("terrain.table")), fits]
+    fits = fit_table(some_files(material.terrain_files, MOST_SHOWN))
     yield own_section("training", learning_curve(material))
     yield own_section(
         "data",
@@ -70,7 +67,8 @@ def own_sections(
         clip_table(material),
         long=True,
     )
-    yield own_section("terrain", *(on_hills if fits.rows else [parts.Paragraph(parts.words("terrain.flat"))]))
+    about = parts.words("terrain.table" if fits.rows else "terrain.flat")
+    yield own_section("terrain", parts.Paragraph(about), fits)
     yield own_section(
         "costs",
         parts.ChartGroup(costs),

@@ -11,6 +11,8 @@ from typing import Any
 from jinja2 import Environment, FileSystemLoader, StrictUndefined, Template, select_autoescape
 from markupsafe import Markup, escape
 
+from hobble.figure.pack import packed_body
+from hobble.report.character import skeleton_of
 from hobble.report.gather import ReportMaterial
 from hobble.report.parts import Chart, PageSection, SectionPart, Table, embedded
 from hobble.report.provenance import git_commit, machine, versions
@@ -56,7 +58,9 @@ def render_page(
     """
     summary, sections = list(summary), list(sections)
     parts = [*summary, *(part for section in sections for part in section.parts)]
-    given = {"name": name, **for_scripts, **drawn_by_script(parts)}
+    # Characters with the same skeleton share a body. Its key is in the entry `body`.
+    bodies = {spec["body"]: packed_body(skeleton_of(spec)) for spec in for_scripts["playable"].values()}
+    given = {"name": name, "bodies": bodies, **for_scripts, **drawn_by_script(parts)}
     at_once = AT_ONCE if "hero" in given else ()
     return load_template("page.html.j2").render(
         name=name,

@@ -32,28 +32,6 @@ from hobble.terrain.options import FitOptions, HeightSampling
 from hobble.terrain.patches import Patches
 
 log = logging.getLogger("hobble.terrain")
-GRID_POINTS = 24  # points of the ground's grid along x and along z
-MARGIN_CM = 60.0  # the grid reaches this far beyond the feet
-
-
-@dataclass(frozen=True)
-class FitPicture:
-    """The best fit of one cycle, in centimetres in the clip's world.
-
-    cycle: number of the cycle in the clip. x, z: (G,) coordinates of the grid. ground: (G, G) height at each
-    x[i], z[j]. soles, contacts: (T, 4, 3) and (T, 4), in the T frames that the ground is fitted to. pose,
-    turns: (3, J, 3) and (3, J, 4) positions and world rotations of the joints after a quarter, half and three
-    quarters of these frames.
-    """
-
-    cycle: int
-    x: Array = field(repr=False)
-    z: Array = field(repr=False)
-    ground: Array = field(repr=False)
-    soles: Array = field(repr=False)
-    contacts: Mask = field(repr=False)
-    pose: Array = field(repr=False)
-    turns: Array = field(repr=False)
 
 
 @dataclass(frozen=True)
@@ -69,7 +47,6 @@ class ClipFits:
     foot_error: (C, K, 2) mean and largest distance of a foot in contact from the ground, cm.
     foot_below: (C, K) how far the lowest foot, in contact or not, is below the ground, cm; at least 0.
     heel_height, toe_height: height of these joints above their soles, cm.
-    pictures: data for pictures of some fits, for the report.
     """
 
     frame: np.ndarray = field(repr=False)
@@ -82,7 +59,6 @@ class ClipFits:
     foot_below: Array = field(repr=False)
     heel_height: float
     toe_height: float
-    pictures: tuple[FitPicture, ...] = field(default=(), repr=False)
 
 
 def clip_fits(
@@ -107,10 +83,8 @@ def clip_fits(
     feet = _standing_feet(clip, contacts, spans, ground == "flat", options)
     offsets = np.arange(-window, window, sampling.step)
     heights: list[Array] = [np.zeros((0, 3 * len(offsets)))]
-    fitted, pictures = [], []
-    # One cycle in each half of the clip gets a picture.
-    shown = {len(cycles) // 4, (3 * len(cycles)) // 4}
-    for c, ((start, end), around) in enumerate(zip(cycles, spans, strict=True)):
+    fitted = []
+    for (start, end), around in zip(cycles, spans, strict=True):
         soles, standing = feet.soles[around], feet.contacts[around]
         if ground == "flat":
             fit = flat_ground(soles, standing, options)
@@ -119,8 +93,6 @@ def clip_fits(
             fit = fit_cycle(patches, soles, standing, beside, ground, options)
         heights.append(heights_under(fit, samples, start + window, end + window, offsets))
         fitted.append((fit, soles, standing))
-        if c in shown and np.any(heights[-1]):
-            pictures.append(make_picture(clip, c, fit, feet, around))
     frame, cycle = cycle_frames(cycles)
     return ClipFits(
         frame=frame,
@@ -130,7 +102,6 @@ def clip_fits(
         **_fit_statistics(fitted, options.fits),
         heel_height=feet.heel_height,
         toe_height=feet.toe_height,
-        pictures=tuple(pictures),
     )
 
 
@@ -214,14 +185,11 @@ def cycle_frames(cycles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def save_fits(path: str | Path, fits: ClipFits) -> None:
-    """Write the fits as one npz file. Pictures are arrays picture0_x, picture0_z, ..., picture1_x, ..."""
-    arrays = {f.name: np.asarray(getattr(fits, f.name)) for f in fields(fits) if f.name != "pictures"}
-    for k, picture in enumerate(fits.pictures):
-        arrays |= {f"picture{k}_{f.name}": np.asarray(getattr(picture, f.name)) for f in fields(picture)}
-    save_npz(path, **arrays, pictures=np.array(len(fits.pictures)))
+    """Write the fits as one npz file."""
+    save_npz(path, **{f.name: np.asarray(getattr(fits, f.name)) for f in fields(fits)})
 
 
-# What a file of fits holds for C cycles with K fits and R rows, apart from its pictures.
+# What a file of fits holds for C cycles with K fits and R rows.
 DECLARED = {
     **{name: ArrayOf(("R",), "iu", 0) for name in ("frame", "cycle")},
     "fits": ArrayOf(("R",), "iu", 1),
@@ -231,7 +199,6 @@ DECLARED = {
     "foot_error": ArrayOf(("C", "K", 2), low=0),
     "foot_below": ArrayOf(("C", "K"), low=0),
     **{name: ArrayOf((), "f") for name in ("heel_height", "toe_height")},
-    "pictures": ArrayOf((), "iu", 0, 2),
 }
 
 
@@ -242,16 +209,3 @@ def load_fits(path: str | Path) -> Arrays:
     if data["fits"].sum() != len(data["heights"]) or data["cycle"].max(initial=-1) >= cycles or not fits:
         raise InputError(path, "its heights are not those of its cycles", fix=DELETE_IT)
     return data
-
-
-def make_picture(clip: Clip, cycle: int, ground: CycleGround, feet: Feet, around: slice) -> FitPicture:
-    """The picture of the best fit of a cycle. around: the frames that the ground was fitted to."""
-    soles = feet.soles[around]
-    low, high = (edge(soles[..., [0, 2]], axis=(0, 1)) for edge in (np.min, np.max))
-    x, z = np.linspace(low - MARGIN_CM, high + MARGIN_CM, GRID_POINTS).T
-    points = np.stack(np.meshgrid(x, z, indexing="ij"), axis=-1).reshape(-1, 2)
-    heights = ground.heights_at(points)[0].reshape(GRID_POINTS, GRID_POINTS)
-    frames = np.linspace(around.start, around.stop - 1, 5).astype(int)[1:4]
-    x, z, heights, soles = (values.astype(np.float32) for values in (x, z, heights, soles))
-    pose, turns = (values[frames].astype(np.float32) for values in (clip.positions, clip.global_rotations))
-    return FitPicture(cycle, x, z, heights, soles, feet.contacts[around], pose, turns)

@@ -10,7 +10,7 @@ export const inflate = async (packed) => {
 
 // The data of the page, by part. Each part is JSON in an element script#data-<part>. It is parsed when it is first used, so that the page
 // opens fast. Parts that are not needed at once are compressed; `unpackParts` has to run before they are used.
-const PARTS = ["name", "hero", "bodies", "playable", "charts", "tables", "grounds", "compare"], texts = new Map();
+const PARTS = ["name", "hero", "bodies", "playable", "charts", "tables", "compare"], texts = new Map();
 const elementOf = (part) => document.querySelector(`script#data-${part}`);
 export const material = Object.defineProperties({}, Object.fromEntries(PARTS.map((part) => {
   let parsed;

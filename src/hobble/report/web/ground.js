@@ -140,12 +140,6 @@ export const createLand = (scene, simple) => {
       const n = name === "flat" ? 2 : 2 * Math.round(far / STEP) + 1;
       fill(n, [cx - far, cx + far], [cz - far, cz + far], (i, k, u, w) => height(u, w));
     },
-    // Draws a whole piece of ground. heights: n by n, flat, row i at the i-th x. x, z: the ranges [from, to], cm.
-    drawPiece(n, x, z, heights) {
-      focus.value = [(x[0] + x[1]) / 2, (z[0] + z[1]) / 2];
-      reach.value = 4 * Math.max(x[1] - x[0], z[1] - z[0]);
-      fill(n, x, z, (i, k) => heights[i * n + k]);
-    },
   };
 };
 

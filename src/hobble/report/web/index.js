@@ -6,7 +6,7 @@ import { createCharacter, createWatch } from "./character.js";
 import { hero, startHero } from "./hero.js";
 import { csv, startPage, startTables } from "./page.js";
 import { player, startPlay } from "./play.js";
-import { openClip, startCaptured, startFits } from "./recorded.js";
+import { openClip, startCaptured } from "./recorded.js";
 import { createChase } from "./view.js";
 
 globalThis.Hobble = {
@@ -18,7 +18,7 @@ globalThis.Hobble = {
   get player() { return player; },
 };
 
-const atOnce = [startPage, startTables, startCharts, startPlay], later = [startCaptured, startFits];
+const atOnce = [startPage, startTables, startCharts, startPlay], later = [startCaptured];
 const startNext = () => {
   const start = later.shift();
   if (start) { setTimeout(startNext); start(); } else Hobble.ready = true;

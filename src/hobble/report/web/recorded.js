@@ -1,12 +1,11 @@
-// Motion that is stored in the page: captured beside predicted clips, and figures on the ground that was fitted to a clip.
+// Motion that is stored in the page: captured beside predicted clips.
 import { find, material } from "./base.js";
 import { createFigure } from "./figure.js";
-import { bytes, mix, mixTurn } from "./math.js";
+import { bytes, mixTurn } from "./math.js";
 import { createView } from "./view.js";
 
 const TURN = 32767; // a component of a rotation that is 1 is stored as this integer
 const UNIT = .01; // cm; positions are stored in steps of this length
-const STEPS_PER_CM = 10; // of lengths on a fitted ground
 
 // root, pose, turn: from `hobble.report.character.packed_motion`. In the result, frames: their number. roots: positions of the root,
 // three numbers a frame, cm.
@@ -104,32 +103,4 @@ export const startCaptured = () => {
   view.orbit.listen(find("compare-stage"));
   view.onHidden = () => { last = null; };
   choose();
-};
-
-// Shows terrain fits. A picture has the ground of one gait cycle, dots for the soles to which it was fitted, and the figure at three moments.
-
-const DOT = [[-1, 0], [0, -1], [1, 0], [0, 1]]; // corners of a dot, in the plane of the ground
-
-export const startFits = () => {
-  const { pictures, joints, body } = material.grounds ?? {}, canvas = find("ground");
-  if (!canvas || !pictures?.length) return;
-  const choice = find("ground-choice"), lengths = (text) => Array.from(new Int16Array(bytes(text)), (v) => v / STEPS_PER_CM);
-  const view = createView(canvas, { yaw: .9, pitch: .5, distance: 560 }, () => {
-    const picture = pictures[choice.selectedIndex], { paint } = view, motion = createMotion(picture, joints);
-    const soles = lengths(picture.soles), down = new Uint8Array(bytes(picture.contacts)), [x, y, z] = motion.roots.subarray(3);
-    view.aim([x, y - 35, z]);
-    view.land.drawPiece(picture.n, picture.x, picture.z, lengths(picture.ground));
-    down.forEach((stands, i) => {
-      if (stands) view.marks.addQuad(DOT.map(([a, b]) => [soles[3 * i] + 1.6 * a, soles[3 * i + 1] + .4, soles[3 * i + 2] + 1.6 * b]), paint.accent, .85);
-    });
-    const pale = mix(paint.body, paint.dark ? [40, 46, 52] : [244, 243, 239], .6);
-    figures.forEach((figure, k) => {
-      motion.show(figure, k);
-      figure.pose(() => (k === 1 ? paint.body : pale));
-    });
-    view.land.darkenUnder(figures.flatMap((figure) => figure.balls(8)));
-  });
-  const figures = [0, 1, 2].map(() => createFigure(view, body));
-  choice.addEventListener("change", view.requestDraw);
-  view.orbit.listen(find("ground-stage"));
 };
