@@ -29,6 +29,7 @@ from hobble.terrain.clip_fits import clip_fits
 from hobble.terrain.heightmaps import heightmaps
 from hobble.terrain.options import HeightSampling
 from hobble.terrain.patches import Patches, draw_patches
+from hobble.workflow.datasets import plain
 from hobble.workflow.project import Project
 
 BASE = Path(__file__).resolve().parents[1]
@@ -105,7 +106,9 @@ def found(job: Job) -> list[Found]:
     """The fits of one clip and its mirror."""
     project = Project(BASE, {"mocap": str(job.mocap)})
     options = project.catalogue.dataset(job.dataset).terrain
-    sampling = HeightSampling(**project.dataset(job.dataset).options_of("database", HeightSampling))
+    sampling = HeightSampling(
+        **plain(project.dataset(job.dataset).settings, "database", HeightSampling.model_fields)
+    )
     out = []
     with tempfile.TemporaryDirectory() as folder:
         try:

@@ -28,8 +28,8 @@ import numpy as np
 import yaml
 
 from hobble.measures.measure import SampleOptions, all_measures
-from hobble.workflow.configurations import BATCH_RULES
 from hobble.workflow.datasets import batch_count
+from hobble.workflow.project import BATCH_RULES
 
 ROOT = Path(__file__).resolve().parents[1]
 OF_BATCHES = {"synthetic_clips"} | {rule for rules in BATCH_RULES.values() for rule in rules}

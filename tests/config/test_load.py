@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from hobble.config.load_configuration import Catalogue, merge, read_layers, read_yaml, validate
-from hobble.config.models import ClipEntry, Configuration, Dataset, SkeletonFile
+from hobble.config.models import Configuration, Dataset, SkeletonFile
 from hobble.core.errors import HobbleError
 
 
@@ -114,23 +114,6 @@ def test_all_problems_are_reported_at_once() -> None:
 def test_an_impossible_data_set_is_refused(values: dict, message: str) -> None:
     with pytest.raises(HobbleError, match=message):
         validate(Dataset, values, "d.yaml")
-
-
-@pytest.mark.parametrize(
-    ("entry", "message"),
-    [
-        (
-            {"recipe": "walk"},
-            r"^d\.yaml: clips\.a\.recipe: only clips of a `synthetic` data set have this key\.$",
-        ),
-        ({"share": 4}, r"clips\.a\.share: only clips of a `synthetic` data set"),
-    ],
-)
-def test_keys_of_the_synthetic_walker_are_refused_for_other_clips(entry: dict, message: str) -> None:
-    values = {"skeleton": "s", "clips": {"a": entry, "b": None}}
-    assert validate(Dataset, {**values, "synthetic": {}}, "d.yaml").clips["a"] == ClipEntry(**entry)
-    with pytest.raises(HobbleError, match=message):
-        validate(Dataset, {**values, "folder": "f"}, "d.yaml")
 
 
 def test_a_key_given_twice_and_broken_yaml_are_refused_with_their_lines(tmp_path: Path) -> None:

@@ -2,8 +2,10 @@
 
 import json
 import os
+import subprocess
+import sys
 from collections import Counter
-from itertools import pairwise
+from itertools import chain, pairwise
 from pathlib import Path
 
 import numpy as np
@@ -14,12 +16,14 @@ from hypothesis import strategies as st
 from hobble.core.errors import HobbleError, InputError
 from hobble.core.files import read_json
 from hobble.database.chunks import database_sizes, to_stored_type
+from hobble.database.order import own_part, stretches_of_section
 from hobble.database.reader import Block, Database
 from hobble.database.write import write_database
 from hobble.rows.clip_rows import pair_batches
 
 MEMORY = 4096  # MB: everything at once
 DISK = 0  # MB: one chunk at a time
+OPTIONS = {"channels": ["injury"], "joint_weight": 0.1, "chunk_bytes": 40_000}
 
 
 @pytest.fixture(scope="module")
@@ -36,7 +40,7 @@ def sources(rows_of):
 def path(sources, tmp_path_factory) -> Path:
     path = tmp_path_factory.mktemp("database") / "all"
     splits = {name: "held_out" if name == "kept" else "train" for name in sources}
-    write_database(path, sources, splits, channels=["injury"], joint_weight=0.1, seed=3, chunk_bytes=40_000)
+    write_database(path, sources, splits, seed=3, **OPTIONS)
     return path
 
 
@@ -138,16 +142,7 @@ def test_half_precision_halves_the_size_and_hardly_changes_values(path, sources,
         to_stored_type(np.array([1.0, -7e4]), "float16")
     relative = 2.0**-11
     splits = {name: "held_out" if name == "kept" else "train" for name in sources}
-    half = write_database(
-        tmp_path / "db",
-        sources,
-        splits,
-        channels=["injury"],
-        joint_weight=0.1,
-        seed=3,
-        dtype="float16",
-        chunk_bytes=40_000,
-    )
+    half = write_database(tmp_path / "db", sources, splits, seed=3, dtype="float16", **OPTIONS)
     full = Database.open(path, MEMORY)
     assert half.bytes < 0.56 * full.manifest.bytes  # phase, clip and frame stay whole numbers of four bytes
     for memory in (MEMORY, DISK):
@@ -157,23 +152,13 @@ def test_half_precision_halves_the_size_and_hardly_changes_values(path, sources,
         assert a.x.dtype == np.float32
         near = {"rtol": 1.01 * relative, "atol": 2e-7}
         np.testing.assert_allclose(a.x[order_a][:, :20], b.x[order_b][:, :20], **near)
-        twice = {
-            "rtol": 4 * relative,
-            "atol": 10 * relative,
-        }  # a row's height and a fit's lift are rounded each
+        twice = {"rtol": 4 * relative, "atol": 10 * relative}  # a row's height and a fit's lift are rounded
         np.testing.assert_allclose(np.sort(a.y, axis=0), np.sort(b.y, axis=0), **twice)
 
 
 @pytest.mark.parametrize("harm", ["flip", "cut", "gone", "longer"])
 def test_a_damaged_chunk_is_named(sources, tmp_path, harm):
-    manifest = write_database(
-        tmp_path / "db",
-        sources,
-        dict.fromkeys(sources, "train"),
-        channels=["injury"],
-        joint_weight=0.1,
-        chunk_bytes=40_000,
-    )
+    manifest = write_database(tmp_path / "db", sources, dict.fromkeys(sources, "train"), **OPTIONS)
     file = manifest.chunks["train"][3].file
     chunk = tmp_path / "db" / manifest.folder / file
     data = bytearray(chunk.read_bytes())
@@ -188,7 +173,7 @@ def test_a_damaged_chunk_is_named(sources, tmp_path, harm):
 
 
 def test_a_manifest_that_differs_from_its_chunks_is_refused(sources, tmp_path):
-    write_database(tmp_path, {"a": sources["rocky"]}, {"a": "train"}, channels=["injury"], joint_weight=0.1)
+    write_database(tmp_path, {"a": sources["rocky"]}, {"a": "train"}, **{**OPTIONS, "chunk_bytes": 10**6})
     manifest = read_json(tmp_path / "manifest.json")
     chunk = manifest["chunks"]["train"][0]
     for field, change in (("rows", -1), ("rows", 1), ("rows", 900), ("fits", -3), ("fits", 7)):
@@ -236,3 +221,79 @@ def test_a_chunk_can_be_opened_with_numpy(path):
     assert all(a[1] == b[0] for a, b in pairwise(ends))
     assert ends[-1][1] == len(data) - 8 - length
     assert os.path.getsize(path / db.manifest.folder / chunk.file) == chunk.bytes
+
+
+# How processes share a section.
+
+
+def batches(total: int, batch: int, count: int, own: range) -> list[list[int]]:
+    """The samples that the stretches `own` have of each batch."""
+    parts = [stretches_of_section(total, batch, count)[number] for number in own]
+    return [
+        list(chain(*(samples[turn * places : (turn + 1) * places] for samples, places in parts)))
+        for turn in range(-(-total // batch))
+    ]
+
+
+@given(st.integers(1, 300), st.integers(1, 40), st.integers(1, 5), st.integers(1, 4))
+@settings(max_examples=100, deadline=None)
+def test_processes_read_the_parts_of_the_batches_of_one(
+    total: int, batch: int, each: int, processes: int
+) -> None:
+    count = each * processes
+    batch = max(batch, count)
+    whole = batches(total, batch, count, range(count))
+    assert sorted(chain(*whole)) == list(range(total))
+    assert {len(found) for found in whole[:-1]} <= {batch}
+    shared = [batches(total, batch, count, own_part(count, rank, processes)) for rank in range(processes)]
+    assert [list(chain(*parts)) for parts in zip(*shared, strict=True)] == whole
+    for rank, own in enumerate(shared):
+        places = own_part(batch, rank, processes)
+        assert all(
+            found == of_all[places.start : places.stop]
+            for found, of_all in zip(own[:-1], whole, strict=False)
+        )
+
+
+# A reader stays within the configured memory.
+
+
+STATED = 8  # MB
+CHILD = """
+import os, resource, sys, threading
+from pathlib import Path
+from hobble.database.reader import Database
+
+path, stated, allowed = sys.argv[1], int(sys.argv[2]), int(sys.argv[3])
+threading.stack_size(1 << 20)
+next(Database.open(path, 0).blocks("train", 0, 0, 10, 1, 32))  # what the program needs for itself
+size = next(int(line.split()[1]) << 10 for line in open("/proc/self/status") if line.startswith("VmSize"))
+most = size + ((allowed + 2) << 20)  # and two threads' stacks
+resource.setrlimit(resource.RLIMIT_AS, (most, most))
+db = Database.open(path, stated)
+for file in Path(path).rglob("*.safetensors"):
+    with open(file, "rb") as opened:
+        os.posix_fadvise(opened.fileno(), 0, 0, os.POSIX_FADV_DONTNEED)
+print(sum(len(block.p) for block in db.blocks("train", 0, 1, 10, 1, db.block_rows(32))))
+"""
+
+
+def read_within(path: Path, stated: int, allowed: int) -> subprocess.CompletedProcess[str]:
+    """A section read from a cold cache by a process that gets no more address space than `allowed` MB."""
+    one_arena = {**os.environ, "MALLOC_ARENA_MAX": "1"}  # else each thread reserves 64 MB
+    arguments = [sys.executable, "-c", CHILD, str(path), str(stated), str(allowed)]
+    return subprocess.run(arguments, env=one_arena, capture_output=True, text=True, check=False)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="limits and /proc of Linux")
+def test_a_section_is_read_under_a_hard_limit_on_address_space(rows_of, tmp_path) -> None:
+    """Of a database ten times as large."""
+    clips = {f"c{i:02d}": rows_of(f"c{i:02d}", 2500, 10, seed=i) for i in range(16)}
+    write_database(tmp_path, clips, dict.fromkeys(clips, "train"), **{**OPTIONS, "chunk_bytes": 300_000})
+    assert sum(f.stat().st_size for f in tmp_path.rglob("*") if f.is_file()) > 10 * (STATED << 20)
+    done = read_within(tmp_path, STATED, STATED)
+    assert done.returncode == 0, done.stderr
+    assert int(done.stdout) == 16 * 2500
+    done = read_within(tmp_path, 4 * STATED, STATED)  # one that took more would not get through
+    assert done.returncode != 0
+    assert "MemoryError" in done.stderr

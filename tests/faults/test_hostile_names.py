@@ -89,7 +89,7 @@ def test_a_skeleton_with_an_offset_that_is_no_number_is_refused(tmp_path: Path, 
     data = yaml.safe_load(SKELETON.read_text())
     data["joints"]["LHipJoint"]["offset"][1] = value
     path = write(tmp_path / "mine.yaml", yaml.safe_dump(data, sort_keys=False))
-    says = r"mine\.yaml, line \d+: (joint LHipJoint: its offset|an integer of 401 characters)"
+    says = r"mine\.yaml, line \d+: (joints LHipJoint offset 1|an integer of 401 characters)"
     with pytest.raises(InputError, match=says) as refusal:
         load_skeleton(path)
     assert len(str(refusal.value)) < 400

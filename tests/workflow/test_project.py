@@ -1,7 +1,6 @@
 """Which clips a configuration gets, in which part of the split, and what is compared."""
 
 import json
-import re
 from pathlib import Path
 
 import pytest
@@ -100,29 +99,13 @@ def test_a_comparison_has_its_configurations(complete: Path) -> None:
     assert project.configuration("one").resolved() == Project(complete, {}).configuration("one").resolved()
 
 
-@pytest.mark.parametrize(
-    ("names", "message"),
-    [
-        (["one", "two"], "two.yaml: no such file. There are: hurt, one"),
-        (["one", "one"], "each once, not one, one"),
-        ([], "at least one configuration, each once, not none"),
-        ([1], "must be a list of names"),
-        ({"a": "one"}, "must be a list of names"),
-    ],
-)
-def test_configurations_that_cannot_be_compared_are_refused(
-    complete: Path, names: object, message: str
-) -> None:
+@pytest.mark.parametrize("names", [["one", "two"], ["one", "one"], [], [1], {"a": "one"}], ids=str)
+def test_configurations_that_cannot_be_compared_are_refused(complete: Path, names: object) -> None:
     project = Project(complete, {"compare": names})
     check_targets(project, ["results/one/report.html"])
+    message = "two.yaml: no such file" if names == ["one", "two"] else "must be a list of names, each once, "
     with pytest.raises(HobbleError, match=message):
         check_targets(project, ["results/compare/report.html"])
-
-
-def test_the_folders_that_rules_name_are_reserved(root: Path) -> None:
-    rules = "".join(path.read_text() for path in (root / "workflow/rules").glob("*.smk"))
-    named = set(re.findall(r"\bresults/(\w+)/", rules))
-    assert {"compare", "datasets", "page"} <= named <= set(RESERVED)
 
 
 @pytest.mark.parametrize("name", RESERVED)
@@ -130,15 +113,3 @@ def test_names_of_results_folders_are_reserved(base: Path, name: str) -> None:
     (base / f"config/{name}.yaml").write_text("extends: one\n")
     with pytest.raises(HobbleError, match=f"no configuration can be called {name}"):
         Project(base, {})
-
-
-def test_motion_options_include_the_ground_of_the_clip(root: Path) -> None:
-    data = Project(root, {}).dataset("cmu")
-    assert data.motion_options("03_01")["ground"] == "rocky"
-    assert data.motion_options("02_01") == {**data.options("motion"), "ground": "flat"}
-
-
-@pytest.mark.parametrize("asked", [5, "", " ", ["a"], {"a": 1}, None, True])
-def test_a_mocap_that_is_not_a_folder_is_reported(base: Path, asked: object) -> None:
-    with pytest.raises(HobbleError, match="--config mocap: must be the name of one folder"):
-        Project(base, {"mocap": asked})

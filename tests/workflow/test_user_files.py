@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from hobble.database.reader import Database
-from hobble.workflow.contents import Contents
+from hobble.workflow.fingerprint import Contents
 
 TARGET = "results/datasets/mine/database/plain"
 DATASET = "skeleton: holden31\nfolder: mine\nmirror: false\nterrain: {patches: 50}\n"

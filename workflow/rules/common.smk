@@ -2,11 +2,9 @@
 from hobble.channels import display_modules
 from hobble.measures.measure import all_measures, measure_named
 from hobble.workflow import demands
-from hobble.workflow.clips import channels_of_folder
-from hobble.workflow.configurations import PUBLISHED
-from hobble.workflow.contents import Contents
-from hobble.workflow.datasets import healthy_originals
-from hobble.workflow.fingerprint import Package
+from hobble.workflow.datasets import channels_of_folder, healthy_originals, plain
+from hobble.workflow.fingerprint import Contents, Package
+from hobble.workflow.project import PUBLISHED
 
 package = Package(project.base)
 DOWNLOADED = project.base / "data" / "downloaded"
@@ -35,7 +33,7 @@ def network_file(name):
 
 def section(name):
     """A param function: a section of the configuration."""
-    return lambda w: configuration(w).section(name)
+    return lambda w: plain(configuration(w).settings, name)
 
 
 def network_code(script, *modules):
@@ -44,7 +42,7 @@ def network_code(script, *modules):
 
 
 def contents_of(files):
-    """A param function: hashes of the user's files, see hobble.workflow.contents. files: an input function.
+    """A param function: hashes of the user's files, see hobble.workflow.fingerprint. files: an input function.
 
     (Snakemake does not compare params that are made from `input`.)
     """

@@ -17,7 +17,9 @@ rule database_clips:
     params:
         clips=lambda w: [{"clip": name} for name in batch_of(w).names],
         channels=lambda w: dataset(w).channels,
-        options=lambda w: dataset(w).options_of("database", RowOptions),
+        options=lambda w: plain(
+            dataset(w).settings, "database", RowOptions.model_fields
+        ),
         code=lambda w: package.code(
             "database_clips",
             *(f"hobble.channels.{name}" for name in dataset(w).channels),
@@ -48,7 +50,7 @@ rule database_merge:
         sources=lambda w: healthy_originals(splits_of(w)),
         # Training uses every n-th row of hurt versions; this is n.
         hurt_every=lambda w: dataset(w).hurt_row_step,
-        options=lambda w: dataset(w).options_of("database", Merging),
+        options=lambda w: plain(dataset(w).settings, "database", Merging.model_fields),
         code=lambda w: package.code(
             "database_merge",
             *(f"hobble.channels.{name}" for name in channels_of_folder(w.channels)),

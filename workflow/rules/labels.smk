@@ -24,7 +24,7 @@ rule labels_clips:
         ],
         contents=contents_of(label_inputs),
         mirrored=lambda w: batch_of(w).mirrored,
-        options=lambda w: dataset(w).options("labels"),
+        options=lambda w: plain(dataset(w).settings, "labels"),
         code=lambda w: package.code("labels_clips"),
     script:
         "../scripts/labels_clips.py"

@@ -17,7 +17,7 @@ rule synthetic_clips:
         clip=lambda w: w.clip,
         frames=lambda w: dataset(w).frames(w.clip),
         recipe=lambda w: dataset(w).entry(w.clip).recipe,
-        options=lambda w: dataset(w).options("synthetic"),
+        options=lambda w: plain(dataset(w).settings, "synthetic"),
         code=lambda w: package.code("synthetic_clips"),
     script:
         "../scripts/synthetic_clips.py"

@@ -16,7 +16,9 @@ rule terrain_patches:
         runtime=10,
     params:
         contents=contents_of(heightmap_inputs),
-        options=lambda w: dataset(w).options_of("terrain", PatchOptions),
+        options=lambda w: plain(
+            dataset(w).settings, "terrain", PatchOptions.model_fields
+        ),
         code=lambda w: package.code("terrain_patches"),
     script:
         "../scripts/terrain_patches.py"
@@ -41,8 +43,10 @@ rule terrain_fits:
             {"clip": name, "ground": dataset(w).entry(name).ground}
             for name in batch_of(w).names
         ],
-        options=lambda w: dataset(w).options_of("terrain", FitOptions),
-        sampling=lambda w: dataset(w).options_of("database", HeightSampling),
+        options=lambda w: plain(dataset(w).settings, "terrain", FitOptions.model_fields),
+        sampling=lambda w: plain(
+            dataset(w).settings, "database", HeightSampling.model_fields
+        ),
         code=lambda w: package.code("terrain_fits"),
     script:
         "../scripts/terrain_fits.py"

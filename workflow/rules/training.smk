@@ -34,12 +34,12 @@ rule training:
         configuration=lambda w: w.configuration,
         network=section("network"),
         # Only the keys of the recipe: those about machines do not change the result.
-        training=lambda w: configuration(w).section("training", *Recipe.model_fields),
+        training=lambda w: plain(
+            configuration(w).settings, "training", Recipe.model_fields
+        ),
         # Of a network that is built: the clips from whose rows it is built.
         clips=lambda w: configuration(w).clips_to_build_from(),
-        terrain_side=lambda w: configuration(w).dataset.options(
-            "database", "terrain_side"
-        )["terrain_side"],
+        terrain_side=lambda w: configuration(w).dataset.settings.database.terrain_side,
         # The folder in which a later run of a killed job finds its checkpoints.
         checkpoints="results/{configuration}/checkpoints",
         code=network_code("training"),

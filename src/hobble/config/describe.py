@@ -1,6 +1,7 @@
 """Writes config/README.md with every key, and JSON schemas for editors: python -m hobble.config.describe"""
 
 import json
+import re
 from collections.abc import Iterator, Mapping
 from functools import reduce
 from operator import or_
@@ -59,17 +60,9 @@ def readme() -> str:
 def _keys(section: Schema, named: Schema, above: str, seen: tuple[str, ...]) -> Iterator[str]:
     """A line for each key of a section and of the sections in it. named: the models by name."""
     for key, value in section.get("properties", {}).items():
-        parts = [value, *value.get("anyOf", ()), *value.get("allOf", ())]
-        parts += [
-            part["additionalProperties"]
-            for part in parts
-            if isinstance(part.get("additionalProperties"), dict)
-        ]
-        parts += [part for inner in parts for part in inner.get("anyOf", ())]
-        names = list(dict.fromkeys(part["$ref"].rpartition("/")[2] for part in parts if "$ref" in part))
-        default = (
-            "" if value.get("default") in (None, {}, []) else f", default `{json.dumps(value['default'])}`"
-        )
+        names = list(dict.fromkeys(re.findall(r'"#/\$defs/(\w+)"', json.dumps(value))))
+        has_default = value.get("default") not in (None, {}, [])
+        default = f", default `{json.dumps(value['default'])}`" if has_default else ""
         text = " ".join(value.get("description", "").split())
         if not names:
             yield f"- `{above}{key}` ({_type(value)}{default})" + (f": {text}" if text else "")

@@ -4,6 +4,7 @@ Values from the command line override those of a configuration. Errors name the 
 """
 
 import copy
+import functools
 import re
 from collections.abc import Mapping
 from datetime import date
@@ -36,18 +37,11 @@ def merge(base: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
     merged = copy.deepcopy(dict(base))
     for key, value in over.items():
         mergeable = isinstance(value, Mapping) and isinstance(merged.get(key), Mapping)
-        if mergeable and key == "network" and _network_kind(value, merged[key]) != _network_kind(merged[key]):
-            mergeable = False
+        if mergeable and key == "network":
+            kind = merged[key].get("kind", DEFAULT_KIND)
+            mergeable = value.get("kind", kind) == kind
         merged[key] = merge(merged[key], value) if mergeable else copy.deepcopy(value)
     return merged
-
-
-def _network_kind(network: Mapping[str, Any], base: Mapping[str, Any] | None = None) -> Any:
-    """The kind of network in a section `network`. If it names none, the kind in `base`, or else DEFAULT_KIND.
-
-    base: the section that this section overrides, if there is one.
-    """
-    return network.get("kind", _network_kind(base) if base is not None else DEFAULT_KIND)
 
 
 def read_yaml(path: Path) -> dict[str, Any]:
@@ -98,10 +92,6 @@ def with_training(folder: Path, values: dict[str, Any], within: tuple[str, ...] 
     name = values.get("training")
     if not isinstance(name, str):
         return values
-    if within and not NAME.fullmatch(name):
-        raise InputError(
-            folder / f"{within[-1]}.yaml", f"training: {name!r:.80} is not a valid name", fix=NAME_HINT
-        )
     if name in within:
         raise InputError(folder / f"{name}.yaml", f"`training: {name}` refers to itself")
     return {**values, "training": read_layers(folder, name, within)[0].get("training", {})}
@@ -164,15 +154,15 @@ class Catalogue:
     def __init__(self, folder: Path, overrides: Mapping[str, Any] | None = None) -> None:
         self.folder = folder
         self.overrides = dict(overrides or {})
-        self._cache: dict[tuple[str, str], Any] = {}
 
     def names(self) -> list[str]:
         """Names of all configurations."""
         return sorted(path.stem for path in self.folder.glob("*.yaml"))
 
+    @functools.cache  # noqa: B019 - a catalogue lives as long as the process
     def configuration(self, name: str) -> Configuration:
         """The configuration `name`, merged over those that it extends."""
-        return self._get("configuration", name, self.folder, Configuration, self.overrides)
+        return self._read(name, self.folder, Configuration, self.overrides)
 
     @staticmethod
     def _model_for(model: type[Model], values: Mapping[str, Any], where: str) -> type[Model]:
@@ -183,29 +173,26 @@ class Catalogue:
         network = values.get("network")
         if model is not Configuration or not isinstance(network, Mapping):
             return model
-        kind = _network_kind(network)
+        kind = network.get("kind", DEFAULT_KIND)
         if kind not in NETWORK_KINDS:
             kinds = ", ".join(NETWORK_KINDS)
             raise HobbleError(f"{where}: network.kind: there is no kind {kind!r:.40}, only {kinds}.")
         return configuration_of(kind)  # type: ignore[return-value]
 
+    @functools.cache  # noqa: B019
     def dataset(self, name: str) -> Dataset:
         """The data set `name`, merged over those that it extends."""
-        return self._get("dataset", name, self.folder / "datasets", Dataset, {})
+        return self._read(name, self.folder / "datasets", Dataset, {})
 
+    @functools.cache  # noqa: B019
     def skeleton(self, name: str) -> SkeletonFile:
         """The skeleton `name`."""
-        return self._get("skeleton", name, self.folder / "skeletons", SkeletonFile, {})
+        return self._read(name, self.folder / "skeletons", SkeletonFile, {})
 
-    def _get(self, kind: str, name: str, folder: Path, model: type[Model], over: Mapping[str, Any]) -> Model:
-        """The file `<folder>/<name>.yaml`, merged and validated, or the result of an earlier call.
-
-        kind: what the file describes, such as "dataset". over: values that are merged over those of the file.
-        """
-        if (kind, name) not in self._cache:
-            values, files = read_layers(folder, name)
-            where = " < ".join(str(path) for path in files)
-            if over:
-                values, where = with_training(folder, merge(values, over)), f"{where} < --config"
-            self._cache[kind, name] = validate(self._model_for(model, values, where), values, where)
-        return self._cache[kind, name]
+    def _read(self, name: str, folder: Path, model: type[Model], over: Mapping[str, Any]) -> Model:
+        """The file `<folder>/<name>.yaml`, merged and validated. over: values merged over its own."""
+        values, files = read_layers(folder, name)
+        where = " < ".join(str(path) for path in files)
+        if over:
+            values, where = with_training(folder, merge(values, over)), f"{where} < --config"
+        return validate(self._model_for(model, values, where), values, where)

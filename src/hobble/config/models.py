@@ -53,8 +53,6 @@ def _check_channel_name(name: str) -> str:
 Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,99}$")]
 ClipName = Annotated[str, AfterValidator(_check_clip_name)]
 ChannelName = Annotated[str, AfterValidator(_check_channel_name)]
-# Keys of a clip's entry that only the generator of synthetic clips reads.
-GENERATOR_KEYS = ("recipe", "share")
 
 
 class ClipEntry(Section):
@@ -138,24 +136,10 @@ class Dataset(Section):
             raise ValueError("a synthetic data set needs a list of its `clips`")
         if self.download is not None and not (self.folder and self.clips):
             raise ValueError("a data set that downloads its clips needs a list of its `clips` and a `folder`")
-        if self.synthetic is None:
-            self._refuse_generator_keys()
         unknown = [c for c in self.held_out if self.clips and c not in self.clips]
         if unknown:
             raise ValueError(f"held_out names clips that are not in `clips`: {', '.join(unknown)}")
-        if self.hurt is None and self.extends is None:
-            for clip, entry in self.clips.items():
-                if entry and entry.hurt is not None:
-                    raise ValueError(f"clips.{clip}.hurt: the data set has no section `hurt`")
         return self
-
-    def _refuse_generator_keys(self) -> None:
-        for clip, entry in self.clips.items():
-            for key in GENERATOR_KEYS:
-                if entry and getattr(entry, key) != ClipEntry.model_fields[key].default:
-                    raise ValueError(
-                        f"clips.{clip}.{key}: only clips of a `synthetic` data set have this key"
-                    )
 
 
 class Configuration(Section):

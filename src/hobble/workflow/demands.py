@@ -12,7 +12,7 @@ import os
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from hobble.channels import channel
 from hobble.core.clip_files import is_hurt_version, original
@@ -20,10 +20,9 @@ from hobble.labels.local_phase import PARTS
 from hobble.measures.measure import Cost, measure_named
 from hobble.models.blend import BlendedOptions
 from hobble.rows.layout import RowLayout
-from hobble.training.options import Machines
-from hobble.workflow.configurations import NamedConfiguration
-from hobble.workflow.datasets import NamedDataset
-from hobble.workflow.project import Project
+from hobble.training.options import Machines, Recipe
+from hobble.workflow.datasets import NamedDataset, plain
+from hobble.workflow.project import NamedConfiguration, Project
 
 # Memory of Snakemake itself, which runs twice in a cluster job (for SLURM's step and for the script), and of
 # Python with numpy, scipy and the package.
@@ -35,7 +34,6 @@ CLIP_SECONDS = 0.1  # seconds for each clip, in addition to the seconds for its 
 ASSUMED_FRAMES = 20_000  # frames of a clip whose length is unknown, such as one that is not downloaded yet
 VISITS_PER_PASS = 10  # how often a pass of training uses a frame: once on each of the grounds fitted under it
 HEADER_BYTES = 1 << 20  # the motion of a BVH file begins within this many bytes
-EXCERPT_THOUSANDS = 2.0  # thousands of frames that a measurement reads at once if it reads only a sample
 WEEK_MINUTES = 7 * 24 * 60  # a job requests at most this time
 
 # What the jobs of a stage need: MB and seconds for each thousand frames, and the least number of minutes.
@@ -85,27 +83,20 @@ def job_request(
     """
     rate = RATES[stage]
     sizes = [thousands_of_frames(dataset, clip) for clip in clips or dataset.entries]
-    times = 1 + (stage in WITH_MIRRORS and dataset.settings.mirror)
-    if stage == "channels":
-        times = len(dataset.channels)
+    mirrored = 1 + (stage in WITH_MIRRORS and dataset.settings.mirror)
+    times = len(dataset.channels) if stage == "channels" else mirrored
     kept = KEPT_MB * times * sum(sizes) if stage in KEEPING else 0.0
     seconds = times * rate.seconds_per_1000_frames * sum(sizes) + CLIP_SECONDS * len(sizes)
     return request(rate.mb_per_1000_frames * max(sizes) + kept, seconds, attempt, rate.least_minutes)
 
 
 def measure_request(configuration: NamedConfiguration, name: str, attempt: int = 1) -> Request:
-    """The request of the measurement `name`. Some measurements read only a sample of the frames."""
-    measure, dataset = measure_named(name), configuration.dataset
-    frames = all_thousands_of_frames(dataset)
+    """The request of the measurement `name`."""
+    cost, dataset = measure_named(name).cost, configuration.dataset
     longest = max(thousands_of_frames(dataset, clip) for clip in dataset.entries)
-    if "sample_frames" in measure.options.model_fields:
-        sample = configuration.section("evaluation")["sample_frames"] / 1e3
-        sample *= _joints(dataset) / MEASURED_JOINTS
-        if sample < frames:
-            frames, longest = sample, EXCERPT_THOUSANDS
-    cost = measure.cost
     megabytes = cost.memory_mb + cost.mb_per_1000_frames * longest
-    return request(megabytes, cost.seconds_per_1000_frames * frames, attempt, cost.least_minutes)
+    seconds = cost.seconds_per_1000_frames * all_thousands_of_frames(dataset)
+    return request(megabytes, seconds, attempt, cost.least_minutes)
 
 
 def training_request(configuration: NamedConfiguration, attempt: int = 1) -> Request:
@@ -121,19 +112,8 @@ def training_request(configuration: NamedConfiguration, attempt: int = 1) -> Req
     if configuration.is_built:
         layout = layout_of(configuration)
         needed += 12e-3 * (layout.x_size + layout.y_size) * all_thousands_of_frames(configuration.dataset)
-    seconds = expected_seconds(configuration, options.model_dump()) / machines.count
+    seconds = expected_seconds(configuration, options) / machines.count
     return request(machines.processes_per_node * needed, seconds, attempt, 60)
-
-
-def training_samples(configuration: NamedConfiguration, passes: float) -> float:
-    """About how many samples a training sees in a number of passes."""
-    dataset = configuration.dataset
-    frames = sum(
-        _frames(dataset, original(clip)) / (dataset.hurt_row_step if is_hurt_version(clip) else 1)
-        for clip, split in configuration.splits.items()
-        if split == "train"
-    )
-    return frames * VISITS_PER_PASS * passes
 
 
 def machines_of(configuration: NamedConfiguration) -> Machines:
@@ -181,7 +161,7 @@ def layout_of(configuration: NamedConfiguration) -> RowLayout:
     dataset = configuration.dataset
     skeleton = dataset.catalogue.skeleton(dataset.settings.skeleton)
     channels = tuple((name, len(channel(name).columns(skeleton))) for name in configuration.channels)
-    row_options = dataset.options("database", "window", "step")
+    row_options = plain(dataset.settings, "database", ("window", "step"))
     local_phases = len(PARTS) if dataset.settings.database.local_phases else 0
     return RowLayout(len(skeleton.joints), channels=channels, local_phases=local_phases, **row_options)
 
@@ -220,17 +200,15 @@ def bvh_seconds(path: Path) -> float | None:
     is not used, because it may be wrong. None if the length cannot be estimated.
     """
     try:
-        size = os.path.getsize(path)
         with open(path, "rb") as file:
             start = file.read(HEADER_BYTES)
-    except OSError:
+        found = re.search(rb"Frame Time:[ \t]*([0-9.eE+-]+)\s*\n([^\n]+\n)", start)
+        if found is None:
+            return None
+        frame_time = min(float(found[1]), 1.0)  # a larger one must be a mistake
+        return frame_time * (os.path.getsize(path) - found.start(2)) / len(found[2]) or None
+    except (OSError, ValueError):
         return None
-    found = re.search(rb"Frame Time:[ \t]*([0-9.eE+-]+)\s*\n([^\n]+\n)", start)
-    try:
-        frame_time = min(float(found[1]), 1.0) if found else 0.0  # a larger one must be a mistake
-    except ValueError:
-        return None
-    return frame_time * (size - found.start(2)) / len(found[2]) if found and frame_time > 0 else None
 
 
 # How long trainings take, for the plan that a user sees before the first job.
@@ -255,33 +233,32 @@ def sentences_about_plan(project: Project, jobs: Sequence[tuple[str, Mapping[str
     if not names:
         return []
     sentences = []
-    fast = FAST in project.catalogue.names() and project.catalogue.configuration(FAST).training.model_dump()
+    fast = FAST in project.catalogue.names() and project.catalogue.configuration(FAST).training
     for configuration in map(project.configuration, names):
         training = configuration.settings.training
         if gpus(configuration) or not parameter_count(configuration):
             continue
-        seconds = expected_seconds(configuration, training.model_dump()) / training.count
-        sentence = f"training {configuration.name}: {_range(seconds)}"
-        if fast and seconds * SLOWEST > LONG_SECONDS:
-            faster = expected_seconds(configuration, fast) / training.count
-            if faster < seconds / 2:
-                sentence += f"; with --config training={FAST} {_range(faster)} (docs/training.md)"
-        sentences.append(f"{sentence}.")
+        seconds = expected_seconds(configuration, training) / training.count
+        faster = expected_seconds(configuration, fast) / training.count if fast else seconds
+        hint = f"; with --config training={FAST} {_range(faster)} (docs/training.md)"
+        is_slow = seconds * SLOWEST > LONG_SECONDS and faster < seconds / 2
+        sentences.append(f"training {configuration.name}: {_range(seconds)}{hint if is_slow else ''}.")
     return sentences
 
 
-def expected_seconds(configuration: NamedConfiguration, training: Mapping[str, Any]) -> float:
-    """Seconds of a training on the machine of STEP_SECONDS. training: the keys `passes` and `batch`."""
-    samples = training_samples(configuration, training["passes"])
-    step = STEP_SECONDS + SAMPLE_SECONDS * training["batch"]
-    return samples / training["batch"] * step * parameter_count(configuration)
+def expected_seconds(configuration: NamedConfiguration, training: Recipe) -> float:
+    """Seconds of a training with this recipe on the machine of STEP_SECONDS."""
+    dataset = configuration.dataset
+    frames = sum(
+        _frames(dataset, original(clip)) / (dataset.hurt_row_step if is_hurt_version(clip) else 1)
+        for clip, split in configuration.splits.items()
+        if split == "train"
+    )
+    steps = frames * VISITS_PER_PASS * training.passes / training.batch
+    return steps * (STEP_SECONDS + SAMPLE_SECONDS * training.batch) * parameter_count(configuration)
 
 
 def _range(seconds: float) -> str:
     """A time as text, from the fastest to the slowest known machine."""
-    fastest, slowest = _minutes(seconds), _minutes(seconds * SLOWEST)
+    fastest, slowest = (max(1, round(each / 60)) for each in (seconds, seconds * SLOWEST))
     return f"{fastest} min" if fastest == slowest else f"{fastest} to {slowest} min on two quiet cores"
-
-
-def _minutes(seconds: float) -> int:
-    return max(1, round(seconds / 60))

@@ -1,18 +1,30 @@
-"""Computes a hash of a rule's code: its script and every project module that the script imports.
+"""Computes hashes of what Snakemake does not compare: the code of a rule, and the content of a user's file.
 
-Snakemake runs a rule's jobs again if the hash changes. So the hash ignores what cannot change a result:
-comments, docstrings, annotations of functions, the text of errors and log messages, and the modules of
-`INFRASTRUCTURE`. It also ignores the fields of configuration sections, because their
-values are params of the rules, and Snakemake compares these itself.
+The code is the rule's script and every project module that the script imports. Snakemake runs a rule's jobs
+again if the hash changes. So the hash ignores what cannot change a result: comments, docstrings, annotations
+of functions, the text of errors and log messages, and the modules of `INFRASTRUCTURE`. It also ignores the
+fields of configuration sections, because their values are params of the rules, and Snakemake compares these
+itself.
+
+Snakemake compares the times of files: it does not see another file with an older time (`cp -p`). So the rules
+that read the user's files have their hashes as a param. A file is hashed again only if its size, times or
+inode have changed. Nobody can set the time of its last change of any kind (ctime) back.
 """
 
 from __future__ import annotations
 
 import ast
+import atexit
+import contextlib
 import functools
 import hashlib
+import json
+import os
 from collections.abc import Iterable
 from pathlib import Path
+
+from hobble.core.errors import HobbleError
+from hobble.core.files import write_text
 
 # Modules and packages that cannot change a result -> the reason. A change in them re-runs nothing.
 INFRASTRUCTURE = {
@@ -22,9 +34,8 @@ INFRASTRUCTURE = {
     "hobble.core.files": "only limits what is read, and reads a file back as it was written, or refuses it",
     "hobble.core.section": "checks the configuration before any job runs",
 }
-# Calls such as logger.info(...) are not hashed. LOGGERS are names of loggers, LOG_METHODS those of methods.
+# Calls such as logger.info(...) are not hashed.
 LOGGERS = {"log", "logger", "logging", "warnings"}
-LOG_METHODS = {"debug", "info", "warning", "error", "exception", "critical", "warn"}
 # Lines `from MODULE import ...` with these modules are not hashed.
 NOT_HASHED = {"__future__", "collections.abc", "logging", "typing", "warnings"}
 
@@ -71,63 +82,40 @@ class _Remover(ast.NodeTransformer):
     def __init__(self) -> None:
         self.imported: set[str] = set()  # full names of what is imported: modules, and objects in them
 
-    def visit_Expr(self, node: ast.Expr) -> ast.AST:
-        value = node.value
-        if isinstance(value, ast.Constant) and isinstance(value.value, str):
-            return ast.Pass()  # a docstring
-        if isinstance(value, ast.Call) and isinstance(value.func, ast.Attribute):
-            logger = value.func.value
-            if value.func.attr in LOG_METHODS and isinstance(logger, ast.Name) and logger.id in LOGGERS:
+    def visit(self, node: ast.AST) -> ast.AST:
+        """The node without what cannot change a result."""
+        match node:
+            case ast.Expr(ast.Constant(str())) | ast.If(ast.Name("TYPE_CHECKING")):
+                return ast.Pass()  # a docstring, or imports for a type checker
+            case ast.Expr(ast.Call(ast.Attribute(ast.Name(logger)))) if logger in LOGGERS:
                 return ast.Pass()
+            case ast.Call(ast.Name(error)) if error.endswith("Error"):
+                return ast.Call(node.func, [], [])  # without the message
+            case ast.Assert():
+                node.msg = None
+            case ast.FunctionDef():
+                node.returns = None
+            case ast.arg():
+                node.annotation = None
+            case ast.ClassDef(bases=[ast.Name("Section"), *_]):  # a configuration section
+                kept = [statement for statement in node.body if not isinstance(statement, ast.AnnAssign)]
+                node.body = kept or [ast.Pass()]
+            case ast.Import():
+                self._note(alias.name for alias in node.names)
+            case ast.ImportFrom():
+                return self._imported_from(node)
         return self.generic_visit(node)
 
-    def visit_Call(self, node: ast.Call) -> ast.AST:
-        if _last_name(node.func).endswith("Error"):
-            return ast.Call(node.func, [], [])  # without the message
-        return self.generic_visit(node)
-
-    def visit_Assert(self, node: ast.Assert) -> ast.AST:
-        node.msg = None
-        return self.generic_visit(node)
-
-    def visit_ClassDef(self, node: ast.ClassDef) -> ast.AST:
-        if any(_last_name(base) == "Section" for base in node.bases):  # a configuration section
-            kept = [statement for statement in node.body if not isinstance(statement, ast.AnnAssign)]
-            node.body = kept or [ast.Pass()]
-        return self.generic_visit(node)
-
-    def visit_FunctionDef(self, node: ast.FunctionDef) -> ast.AST:
-        node.returns = None
-        return self.generic_visit(node)
-
-    def visit_arg(self, node: ast.arg) -> ast.AST:
-        node.annotation = None
-        return node
-
-    def visit_If(self, node: ast.If) -> ast.AST:
-        return ast.Pass() if _last_name(node.test) == "TYPE_CHECKING" else self.generic_visit(node)
-
-    def visit_Import(self, node: ast.Import) -> ast.AST:
-        names = [alias.name for alias in node.names]
-        self.imported.update(name for name in names if not _is_infrastructure(name))
-        return node
-
-    def visit_ImportFrom(self, node: ast.ImportFrom) -> ast.AST:
+    def _imported_from(self, node: ast.ImportFrom) -> ast.AST:
         module = node.module or ""
         if module in NOT_HASHED or _is_infrastructure(module):
             return ast.Pass()
-        if not node.level:  # not a relative import
-            full = [f"{module}.{alias.name}" for alias in node.names]
-            self.imported.update(name for name in (module, *full) if not _is_infrastructure(name))
-            node.names = [alias for alias in node.names if not _is_infrastructure(f"{module}.{alias.name}")]
+        self._note([module, *(f"{module}.{alias.name}" for alias in node.names)])
+        node.names = [alias for alias in node.names if not _is_infrastructure(f"{module}.{alias.name}")]
         return node if node.names else ast.Pass()
 
-
-def _last_name(node: ast.AST) -> str:
-    """The last part of a dotted name; "" if the node is not a name."""
-    if isinstance(node, ast.Attribute):
-        return node.attr
-    return node.id if isinstance(node, ast.Name) else ""
+    def _note(self, names: Iterable[str]) -> None:
+        self.imported.update(name for name in names if not _is_infrastructure(name))
 
 
 def _is_infrastructure(module: str) -> bool:
@@ -143,8 +131,8 @@ def _files_of(module: str, source: Path) -> tuple[Path, ...]:
     """
     parts = module.split(".")
     heres = [source.joinpath(*parts[:n]) for n in range(1, len(parts) + 1)]
-    candidates = [path for here in heres for path in (here / "__init__.py", here.with_suffix(".py"))]
-    return tuple(path for path in candidates if path.is_file())
+    files = [path for here in heres for path in (here / "__init__.py", here.with_suffix(".py"))]
+    return tuple(filter(Path.is_file, files))
 
 
 class Package:
@@ -167,3 +155,50 @@ class Package:
         """Paths of the package's files that match patterns, such as "report/web/*.js", in a fixed order."""
         files = [path for pattern in patterns for path in self.folder.glob(pattern) if path.is_file()]
         return sorted(str(path) for path in files if "__pycache__" not in path.parts)
+
+
+# The content of the user's files.
+
+
+KNOWN = Path(".snakemake/hobble-contents.json")  # path of a file -> [its stamp, its hash]
+
+
+def stamp(path: str | Path) -> list[int]:
+    """Size, times of the last change of content and of any kind (ns), and inode of a file."""
+    status = os.stat(path)
+    return [status.st_size, status.st_mtime_ns, status.st_ctime_ns, status.st_ino]
+
+
+class Contents:
+    """The hashes of the user's files. made: the folder of files that are downloaded, which have checksums."""
+
+    def __init__(self, made: Path, known: Path = KNOWN) -> None:
+        self.made, self.file = f"{made}/", known
+        self.known: dict[str, list] = {}
+        self.changed = False
+        atexit.register(self.keep)
+        with contextlib.suppress(OSError, ValueError):
+            found = json.loads(known.read_text(encoding="utf-8"))
+            self.known = found if isinstance(found, dict) else {}
+
+    def of(self, paths: Iterable[str]) -> list[str]:
+        """Path and hash of each of these files that the user gives, for a rule's params."""
+        given = [path for path in map(str, paths) if not path.startswith(("results/", self.made))]
+        return [f"{path} {self._hash(path)}" for path in given if os.path.isfile(path)]
+
+    def keep(self) -> None:
+        """Write the hashes, for the next run."""
+        if self.changed:
+            with contextlib.suppress(HobbleError):  # a folder that cannot be written
+                write_text(self.file, json.dumps(self.known))
+
+    def _hash(self, path: str) -> str:
+        try:
+            now = stamp(path)
+            if path not in self.known or self.known[path][0] != now:
+                with open(path, "rb") as file:
+                    digest = hashlib.file_digest(file, "sha256").hexdigest()[:16]
+                self.known[path], self.changed = [now, digest], True
+            return str(self.known[path][1])
+        except (OSError, LookupError, TypeError):
+            return "cannot be read"  # no error here: the job that reads the file says why

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import contextlib
 import errno
+import functools
 import hashlib
 import json
 import logging
@@ -24,7 +25,7 @@ from typing import Any
 from hobble.core.clip_files import MIRROR_SUFFIX, original
 from hobble.core.errors import HobbleError, InputError, unforeseen
 from hobble.core.files import failed_write_error, write_text
-from hobble.workflow.contents import stamp
+from hobble.workflow.fingerprint import stamp
 from hobble.workflow.lifetime import ends_with_run
 
 # The disk is full, a quota is used up, or the disk is read-only. Every other clip would fail, too.
@@ -73,11 +74,8 @@ class Inputs:
         for path in self.files.values():
             if path.endswith(f"/{name}"):
                 return path
-        raise InputError(
-            name,
-            "is missing in the folder of its batch",
-            fix="Delete that folder in batches/; the same command makes it again.",
-        )
+        fix = "Delete that folder in batches/; the same command makes it again."
+        raise InputError(name, "is missing in the folder of its batch", fix=fix)
 
     def each(self, name: str, clips: Iterable[str]) -> dict[str, str]:
         """Clip -> path of its file. name: contains {clip}."""
@@ -154,14 +152,10 @@ class _Maker:
         self.make_files, self.reads, self.writes, self.folder = make, reads, writes, folder
         self.root = folder.parents[2]  # the folder of the data set
         self.records = self.root / RECORDS / Path(snakemake.log[0]).parent.name
-        self.params = {
-            name: value for name, value in snakemake.params.items() if name not in ("clips", "contents")
-        }
+        params, inputs = dict(snakemake.params.items()), dict(snakemake.input.items())
+        self.params = {name: params[name] for name in params if name not in ("clips", "contents")}
+        self.shared = {name: inputs[name] for name in inputs if name not in ("batches", "files")}
         self.inputs = Inputs(snakemake.input)
-        self.shared = {
-            name: file for name, file in snakemake.input.items() if name not in ("batches", "files")
-        }
-        self.digests: dict[tuple[str, Any], str] = {}
 
     def make(self, own: Mapping[str, Any], log: logging.Logger) -> bool:
         """Make the files of one clip. Returns whether they were there already."""
@@ -196,21 +190,21 @@ class _Maker:
     def _key(self, piece: Piece, stamps: Mapping[str, Any], writes: Mapping[str, str]) -> str:
         """Hash of everything on which the files of a clip depend."""
         inputs = {
-            name: [(Path(path).name, self._digest(path, stamps.get(path))) for path in _as_list(value)]
+            name: [(Path(path).name, _digest(path, stamps.get(path))) for path in _as_list(value)]
             for name, value in piece.input.items()
         }
         text = json.dumps([dict(piece.params), inputs, dict(writes)], sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()
 
-    def _digest(self, path: str, stamp: Any) -> str:
-        """SHA-256 of a file. A file that several clips need is read once."""
-        if (path, stamp) not in self.digests:
-            try:
-                with open(path, "rb") as file:
-                    self.digests[path, stamp] = hashlib.file_digest(file, "sha256").hexdigest()
-            except OSError:
-                return "cannot be read"  # no error here: what reads the file says why
-        return self.digests[path, stamp]
+
+@functools.cache
+def _digest(path: str, stamp: Any) -> str:
+    """SHA-256 of a file. A file that several clips need is read once. stamp: differs after each change."""
+    try:
+        with open(path, "rb") as file:
+            return hashlib.file_digest(file, "sha256").hexdigest()
+    except OSError:
+        return "cannot be read"  # no error here: what reads the file says why
 
 
 def _names(patterns: Mapping[str, str], params: Mapping[str, Any]) -> dict[str, Any]:
@@ -257,7 +251,7 @@ def _give_second_name(source: Path, target: Path) -> None:
 
 
 def _stamps(paths: Iterable[str]) -> dict[str, tuple[int, ...]]:
-    """Path -> `hobble.workflow.contents.stamp`, for those of the files that exist."""
+    """Path -> `hobble.workflow.fingerprint.stamp`, for those of the files that exist."""
     out = {}
     for path in paths:
         if os.path.isfile(path):
@@ -309,12 +303,12 @@ class _Log:
         self.logger = logging.getLogger("hobble")
         self.logger.setLevel(logging.INFO)
         file_handler.setFormatter(logging.Formatter("%(asctime)s %(levelname)s %(message)s"))
-        self.terminal = logging.StreamHandler(sys.stderr)
-        self.terminal.setLevel(logging.WARNING)
+        terminal = logging.StreamHandler(sys.stderr)
+        terminal.setLevel(logging.WARNING)
         # On a terminal, each message first clears the line of progress, which Snakemake's process prints.
         clear = "\r\x1b[K" if sys.stderr.isatty() else ""
-        self.terminal.setFormatter(logging.Formatter(f"{clear}{rule}: %(message)s"))
-        self.logger.handlers = [file_handler, self.terminal]
+        terminal.setFormatter(logging.Formatter(f"{clear}{rule}: %(message)s"))
+        self.logger.handlers = [file_handler, terminal]
         logging.captureWarnings(True)
 
     def error(self, error: Exception, what: str = "") -> None:
@@ -333,9 +327,7 @@ class _Log:
                 self.logger.error("%s: %s. See %s", path, reason, self.path)
             else:
                 self.logger.error("%s%s", what, unforeseen(error, self.path))
-            self.logger.removeHandler(self.terminal)  # the traceback goes only to the file
-            self.logger.error("%s", "".join(traceback.format_exception(error)))
-            self.logger.addHandler(self.terminal)
+            self.logger.info("%s", "".join(traceback.format_exception(error)))  # only to the file
 
 
 def with_true_advice(error: HobbleError, inputs: Iterable[str]) -> HobbleError:

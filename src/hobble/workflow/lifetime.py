@@ -129,15 +129,9 @@ def _exit(number: int, frame: FrameType | None) -> None:
     # After Ctrl-C a job gets two signals, from the terminal and from its run. The second one must not
     # interrupt the clean-up.
     for caught in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(caught, _disregard)
+        # Not SIG_IGN, with which Python prints a traceback if two signals come at once.
+        signal.signal(caught, lambda *_: None)
     raise SystemExit(128 + number)  # not caught by `except Exception`, and runs every `finally`
-
-
-def _disregard(number: int, frame: FrameType | None) -> None:
-    """Signal handler that does nothing.
-
-    It is used instead of SIG_IGN, with which Python prints a traceback if two signals come at once.
-    """
 
 
 def _exit_with_run(run: str, done: threading.Event) -> None:

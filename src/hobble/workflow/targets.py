@@ -4,23 +4,16 @@ A target is the path of a file that a run makes: results/<configuration>/<folder
 results/datasets/<data set>/... or results/compare/...
 """
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, get_args
+from typing import Any
 
 from hobble.channels import all_channels
 from hobble.core.errors import HobbleError, InputError
-from hobble.core.section import PhaseMode
 from hobble.workflow import lifetime
-from hobble.workflow.configurations import NamedConfiguration
 from hobble.workflow.datasets import NamedDataset
-from hobble.workflow.project import COMPARE, Project
-
-if TYPE_CHECKING:
-    from hobble.config.models import SkeletonFile
+from hobble.workflow.project import COMPARE, NamedConfiguration, Project
 
 PAGE = "page"  # the folder in results/ with the files that all reports share
 
@@ -61,7 +54,7 @@ def check_targets(project: Project, targets: Iterable[str]) -> list[str]:
     datasets: list[str] = []
     configurations: dict[str, NamedConfiguration] = {}
     for target in list(targets) or ["results/limp/report.html"]:
-        _, name, folder, file, *_ = (*Path(target).parts, "", "", "")
+        _, name, folder, *_ = (*Path(target).parts, "", "")
         if name == "datasets":
             datasets.append(folder)
         elif name == COMPARE:
@@ -69,7 +62,7 @@ def check_targets(project: Project, targets: Iterable[str]) -> list[str]:
                 _check_configuration(project, compared.name, configurations)
         elif name and name != PAGE:
             _check_configuration(project, name, configurations)
-            _check_target_possible(configurations[name], project, folder, file)
+            _check_target_possible(configurations[name], project, folder)
     used = [configuration.dataset.name for configuration in configurations.values()]
     datasets = list(dict.fromkeys([*datasets, *used]))
     for dataset in datasets:
@@ -86,43 +79,29 @@ def _check_configuration(project: Project, name: str, seen: dict[str, NamedConfi
     configuration = seen[name] = project.configuration(name)
     settings = configuration.settings
     for other in filter(None, (settings.network_of, settings.training.continues)):
-        if other == name:
-            raise HobbleError(
-                f"configuration {name} names itself in `network_of` or `training.continues`. "
-                "Name another configuration there"
-            )
         _check_configuration(project, other, seen)
     if settings.training.continues:
         _check_continues(configuration, seen[settings.training.continues])
     if not settings.network_of:
-        _check_local_phases(configuration)
-    if settings.training.symmetric and not settings.network_of:
-        _check_symmetric(configuration)
+        _check_network(configuration)
 
 
-def _check_symmetric(configuration: NamedConfiguration) -> None:
-    """Check that the network can be symmetric and that the data set has mirrored clips."""
-    where = f"configuration {configuration.name}: training.symmetric"
-    if why := configuration.settings.network.why_not_symmetric:
-        raise HobbleError(f"{where}: {why}. Write `symmetric: false`.")
-    if not configuration.dataset.settings.mirror:
+def _check_network(configuration: NamedConfiguration) -> None:
+    """Check that the data set has local phases exactly if the network uses them, and what symmetry needs."""
+    settings, dataset = configuration.settings, configuration.dataset
+    where, uses = f"configuration {configuration.name}", settings.network.uses_local_phases
+    if uses != dataset.settings.database.local_phases:
+        needs, there = ("needs", "has none") if uses else ("cannot use", "has them")
         raise HobbleError(
-            f"{where}: data set {configuration.dataset.name} has no mirrored clips, so its left and right "
-            "may differ. Write `mirror: true` in the data set, or `symmetric: false`."
+            f"{where}: a network of kind {settings.network.kind} {needs} local phases, and data set "
+            f"{dataset.name} {there}. Set `database: {{local_phases: {str(uses).lower()}}}` in it."
         )
-
-
-def _check_local_phases(configuration: NamedConfiguration) -> None:
-    """Check that the data set has local phases exactly if the network uses them."""
-    network, dataset = configuration.settings.network, configuration.dataset
-    if network.uses_local_phases != dataset.settings.database.local_phases:
-        there = "has none" if network.uses_local_phases else "has them"
-        raise HobbleError(
-            f"configuration {configuration.name}: a network of kind {network.kind} "
-            f"{'needs' if network.uses_local_phases else 'cannot use'} local phases, and data set "
-            f"{dataset.name} {there}. Set `database: {{local_phases: "
-            f"{str(network.uses_local_phases).lower()}}}` in a data set that extends it."
-        )
+    if settings.training.symmetric:
+        why = settings.network.why_not_symmetric
+        if not why and not dataset.settings.mirror:
+            why = f"data set {dataset.name} has no mirrored clips, as with `mirror: true`"
+        if why:
+            raise HobbleError(f"{where}: training.symmetric: {why}. Write `symmetric: false`.")
 
 
 def _check_continues(later: NamedConfiguration, earlier: NamedConfiguration) -> None:
@@ -133,10 +112,6 @@ def _check_continues(later: NamedConfiguration, earlier: NamedConfiguration) -> 
     """
     where = f"configuration {later.name} continues from {earlier.name}"
     new, old = later.settings, earlier.settings
-    if later.is_built:
-        raise HobbleError(
-            f"{where}, but {new.network.kind} is built and not trained. Remove `training.continues`"
-        )
     for key, value, wanted in (
         ("channels", list(new.channels), list(old.channels)),
         ("network", new.network.model_dump(), old.network.model_dump()),
@@ -145,10 +120,8 @@ def _check_continues(later: NamedConfiguration, earlier: NamedConfiguration) -> 
         if value != wanted:
             raise HobbleError(f"{where}, so its {key} must be {wanted}, not {value}")
     if new.training.passes < old.training.passes:
-        raise HobbleError(
-            f"{where}, which has training.passes: {old.training.passes}. Write at least this number, not "
-            f"{new.training.passes}"
-        )
+        passes = f"{old.training.passes:g} or more, not {new.training.passes:g}"
+        raise HobbleError(f"{where}, so its training.passes must be {passes}")
 
 
 def _check_dataset(project: Project, dataset: NamedDataset) -> None:
@@ -165,33 +138,23 @@ def _check_dataset(project: Project, dataset: NamedDataset) -> None:
                 raise InputError(place, f"no such recipe: {entry.recipe:.80}", fix=fix)
     links = [f"{a}-{b}" for a, b in skeleton.links]
     if settings.hurt is not None and dataset.hurt_versions:
-        if not links:
-            raise HobbleError(
-                f"{where}: hurt: skeleton {settings.skeleton} has no `links`. Add them to its file."
-            )
-        if unknown := [link for link in settings.hurt.links if link not in links]:
-            there = ", ".join(links)
-            raise HobbleError(f"{where}: hurt.links: no such link: {', '.join(unknown)}. There are {there}.")
+        unknown = [link for link in settings.hurt.links if link not in links]
+        if unknown or not links:
+            problem = f"no such link: {', '.join(unknown)}" if unknown else "the skeleton has no `links`"
+            raise HobbleError(f"{where}: hurt.links: {problem}. There are {', '.join(links) or 'none'}.")
     dataset.check_channels()
     dataset.splits(dataset.channels)  # raises HobbleError if `held_out` is wrong, or leaves no clip
     if settings.mirror:
-        _check_mirror(settings.skeleton, skeleton)
+        from hobble.core.skeleton import Skeleton  # imports numpy, too
+        from hobble.motion.edit import mirror_skeleton
+
+        rig = Skeleton.from_dict({"name": settings.skeleton, **skeleton.model_dump(exclude={"maps"})})
+        mirror_skeleton(rig)
+        _ = rig.mirror_links  # raises HobbleError if a link has no counterpart on the other side
 
 
-def _check_mirror(name: str, skeleton_file: SkeletonFile) -> None:
-    """Raise HobbleError for a skeleton that cannot be mirrored. name: the skeleton's name."""
-    from hobble.core.skeleton import Skeleton
-    from hobble.motion.edit import mirror_skeleton
-
-    skeleton = Skeleton.from_dict({"name": name, **skeleton_file.model_dump(exclude={"maps"})})
-    mirror_skeleton(skeleton)
-    _ = skeleton.mirror_links  # raises HobbleError if a link has no counterpart on the other side
-
-
-def _check_target_possible(
-    configuration: NamedConfiguration, project: Project, folder: str, file: str
-) -> None:
-    """Raise HobbleError if a configuration cannot make the target results/<name>/<folder>/<file>."""
+def _check_target_possible(configuration: NamedConfiguration, project: Project, folder: str) -> None:
+    """Raise HobbleError if a configuration cannot make the files in results/<name>/<folder>/."""
     name, owner = configuration.name, configuration.network_owner
     channels = project.catalogue.configuration(owner).channels
     if folder == "stimuli" and not channels:
@@ -205,9 +168,3 @@ def _check_target_possible(
                 f"results/{name}/{folder}: the network of configuration {owner} has no channel "
                 f"{channel.name}. Use a configuration with `channels: [{channel.name}]`."
             )
-    stem, _, suffix = file.rpartition(".")
-    if folder == "export" and suffix == "onnx" and stem not in get_args(PhaseMode):
-        raise HobbleError(
-            f"results/{name}/export/{file}: {stem} is not a phase mode. The phase modes are "
-            f"{', '.join(get_args(PhaseMode))}, as in results/{name}/export/cubic.onnx"
-        )

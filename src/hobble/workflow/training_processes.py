@@ -21,7 +21,6 @@ from hobble.core.errors import HobbleError
 from hobble.core.section import Section
 from hobble.training.options import Machines, Training
 from hobble.workflow import lifetime
-from hobble.workflow.lifetime import ends_with_run
 
 SLURM_VARIABLE = "SLURM_JOB_ID"  # environment variable that SLURM sets in a job
 GRACE_SECONDS = 10.0  # time for torchrun to end its processes
@@ -34,10 +33,7 @@ def on_machines(training: Training, machines: Machines, gpus: bool) -> Training:
     process uses a GPU; a single process uses the device of `training` instead.
     """
     device = training.device if machines.count == 1 else "cuda" if gpus else "cpu"
-    keys = {
-        "nodes": machines.nodes,
-        **({"gpus": machines.processes_per_node} if gpus else {"processes": machines.processes_per_node}),
-    }
+    keys = {"nodes": machines.nodes, "gpus" if gpus else "processes": machines.processes_per_node}
     return Training.model_validate({**training.model_dump(), **keys, "device": device})
 
 
@@ -60,14 +56,9 @@ def train_together(machines: Machines, threads: int, log: Path, arguments: Mappi
         own_threads = max(1, threads // machines.processes_per_node)  # of each process
         job_file.write_text(json.dumps({**job, "threads": own_threads, "log": str(log)}), encoding="utf-8")
         with open(log, "ab") as output:
+            streams: Any = {"stdin": subprocess.DEVNULL, "stdout": output, "stderr": output}
             environment = _environment(machines, own_threads)
-            process = subprocess.Popen(
-                command(machines, job_file),
-                stdin=subprocess.DEVNULL,
-                stdout=output,
-                stderr=output,
-                env=environment,
-            )
+            process = subprocess.Popen(command(machines, job_file), **streams, env=environment)
             try:
                 status = process.wait()
             finally:
@@ -89,8 +80,8 @@ def command(machines: Machines, job_file: Path) -> list[str]:
 
     Raises HobbleError for several machines without SLURM.
     """
-    torchrun = [sys.executable, "-m", "torch.distributed.run"]
-    torchrun.append(f"--nproc-per-node={machines.processes_per_node}")
+    count = f"--nproc-per-node={machines.processes_per_node}"
+    torchrun = [sys.executable, "-m", "torch.distributed.run", count]
     program = ["-m", "hobble.workflow.training_processes", str(job_file)]
     if machines.nodes == 1:
         return [*torchrun, "--standalone", *program]
@@ -126,9 +117,6 @@ def _environment(machines: Machines, threads: int) -> dict[str, str]:
     return variables
 
 
-LOG_FORMAT = "%(asctime)s %(levelname)s %(message)s"
-
-
 def main(job_file: Path) -> int:
     """Train together with the other processes. Returns the exit status.
 
@@ -140,11 +128,11 @@ def main(job_file: Path) -> int:
     logger = logging.getLogger("hobble")
     logger.setLevel(logging.INFO if rank == 0 else logging.ERROR)  # one process logs for all
     file_handler = logging.FileHandler(job["log"], encoding="utf-8")
-    file_handler.setFormatter(logging.Formatter(LOG_FORMAT))
+    file_handler.setFormatter(logging.Formatter("%(asctime)s %(levelname)s %(message)s"))
     logger.addHandler(file_handler)
     try:
         # If the training has only one machine, this process ends when the job that started torchrun ends.
-        with ends_with_run():
+        with lifetime.ends_with_run():
             _train(job)
     except HobbleError as error:
         # If several processes fail, the user sees the message of the lowest rank. Five digits keep the file
@@ -158,7 +146,6 @@ def _train(job: dict[str, Any]) -> None:
     """Train together with the other processes. job: the content of JOB.json."""
     from hobble.database.reader import Database
     from hobble.models import network_options
-    from hobble.training.options import Training
     from hobble.training.processes import join_processes
     from hobble.training.train import train
 
