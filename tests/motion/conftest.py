@@ -1,7 +1,6 @@
 """A small made-up walk, exact enough to measure sliding feet, and functions that write it to files."""
 
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,19 +10,15 @@ import pytest
 from hobble.core import quat
 from hobble.core.bvh import write_bvh
 from hobble.core.clip import Clip
-from hobble.core.skeleton import Skeleton, aim_bone, local_rotations, two_bone_knee
+from hobble.core.skeleton import Skeleton, aim_bone, local_rotations, rest_positions, two_bone_knee
+from hobble.motion.make import make_clip
 from hobble.motion.options import ClipMotion
-
-OPTIONS: dict[str, Any] = ClipMotion().model_dump()
 
 
 def make_walk(skeleton: Skeleton, frames: int, fps: float, name: str = "walk") -> Clip:
     """A walk along +Z at 1 m/s on any rig with a T-pose. Feet on the ground do not slide."""
     time = np.arange(frames) / fps
-    rest = np.zeros((len(skeleton.joints), 3))
-    for j, p in enumerate(skeleton.parents):
-        rest[j] = rest[p] + skeleton.offsets[j] if p >= 0 else 0.0
-    height = -0.93 * rest[skeleton.role("left_toe"), 1]
+    height = -0.93 * rest_positions(skeleton)[skeleton.role("left_toe"), 1]
     hips = np.stack([2 * np.sin(2 * np.pi * time), height + np.cos(4 * np.pi * time), 100 * time], axis=1)
     world = np.zeros((frames, len(skeleton.joints), 4))
     body = quat.mul(
@@ -39,11 +34,7 @@ def make_walk(skeleton: Skeleton, frames: int, fps: float, name: str = "walk") -
 
 
 def _below(skeleton: Skeleton, joint: int) -> list[int]:
-    out = [joint]
-    for j, p in enumerate(skeleton.parents):
-        if p in out:
-            out.append(j)
-    return out
+    return [j for j in range(len(skeleton.joints)) if joint in skeleton.path_up(j)]
 
 
 def _walk_leg(skeleton, world, hips, side, sign, time):
@@ -61,10 +52,7 @@ def _walk_leg(skeleton, world, hips, side, sign, time):
     world[:, _below(skeleton, heel)] = foot[:, None]
     ankle = ball - quat.rotate(foot, skeleton.offsets[toe])
     start = hips.copy()
-    chain = [hip]
-    while skeleton.parents[chain[-1]] > 0:
-        chain.append(skeleton.parents[chain[-1]])
-    for j in reversed(chain):
+    for j in reversed(skeleton.path_up(hip, 0)):
         start = start + quat.rotate(world[:, skeleton.parents[j]], skeleton.offsets[j])
     thigh, shank = skeleton.offsets[knee], skeleton.offsets[heel]
     middle, ankle = two_bone_knee(
@@ -78,12 +66,6 @@ def _walk_leg(skeleton, world, hips, side, sign, time):
 def walk(holden31: Skeleton) -> Clip:
     """Two seconds of walking at 120 Hz on the 31 joints."""
     return make_walk(holden31, 241, 120.0)
-
-
-@pytest.fixture
-def options() -> dict[str, Any]:
-    """The `motion` section with its defaults."""
-    return dict(OPTIONS)
 
 
 @pytest.fixture
@@ -101,14 +83,13 @@ def bvh(tmp_path: Path) -> Callable[..., Path]:
 
 
 @pytest.fixture
-def make(root: Path, options: dict[str, Any]):
+def make(root: Path):
     """`make_clip` onto a skeleton of config/skeletons, with options by keyword."""
-    from hobble.motion.make import make_clip
+    folder = root / "config" / "skeletons"
 
-    def run(path: Path, skeleton: str = "holden31", **changed: Any):
-        folder = root / "config" / "skeletons"
-        file, keys = folder / f"{skeleton}.yaml", ClipMotion().model_copy(update=options | changed)
-        return make_clip(path, file, folder, path.stem, skeleton, keys)
+    def run(path: Path, skeleton: str = "holden31", **options: Any):
+        file = folder / f"{skeleton}.yaml"
+        return make_clip(path, file, folder, path.stem, skeleton, ClipMotion(**options))
 
     return run
 
@@ -117,14 +98,3 @@ def make(root: Path, options: dict[str, Any]):
 def walker() -> Callable[..., Clip]:
     """`make_walk`."""
     return make_walk
-
-
-@pytest.fixture(scope="session")
-def scaled() -> Callable[[Clip, float], Clip]:
-    """The same motion in other units."""
-
-    def scale(clip: Clip, factor: float) -> Clip:
-        skeleton = replace(clip.skeleton, offsets=clip.skeleton.offsets * factor)
-        return replace(clip, skeleton=skeleton, root=clip.root * factor)
-
-    return scale

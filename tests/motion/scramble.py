@@ -12,7 +12,7 @@ from __future__ import annotations
 import argparse
 import re
 import tempfile
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -38,73 +38,68 @@ NEAR = 3.5  # cm
 BALL = 1.2  # cm: allowed error of the height of a figure whose balls of the feet had to be guessed
 RESTS = ("own", "a pose", "arms down", "lying", "facing x", "one axis", "one axis per side", "twisted")
 RESTS += ("heap", "sitting")
-Words = Sequence[str | None]
 SIDES = (("Left", "L"), ("Right", "R"))
 TRUNK = ("Hips", "LowerBack", "Spine", "Spine1", "Neck", "Neck1", "Head")
 LIMB = ("Shoulder", "Arm", "ForeArm", "Hand", "FingerBase", "HandIndex1", "Thumb")
 LEG = ("HipJoint", "UpLeg", "Leg", "Foot", "ToeBase")
 
 
-def _names(
-    trunk: Sequence[str | None], limb: Sequence[str | None], leg: Sequence[str | None], side: Callable
-):
-    """Joint of the 31 -> its name in another program. Joints without a name are left out."""
-    out = dict(zip(TRUNK, trunk, strict=True))
-    for mine, letter in SIDES:
-        prefix = {"HipJoint": letter, "Thumb": letter}
-        for part, name in zip((*LIMB, *LEG), (*limb, *leg), strict=True):
-            out[prefix.get(part, mine) + part] = None if name is None else side(name, mine)
-    return {a: b for a, b in out.items() if b is not None}
+# Three lines for each program: its name and how it names limbs ({n} is the word, {side} the side, {S} and {s}
+# its letter); names of TRUNK; words of LIMB and LEG. Joints without a name ("-") are left out.
+PROGRAMS = """
+mixamo|mixamorig:{side}{n}
+mixamorig:Hips, mixamorig:Spine, mixamorig:Spine1, mixamorig:Spine2, -, mixamorig:Neck, mixamorig:Head
+Shoulder, Arm, ForeArm, Hand, -, HandIndex1, HandThumb1, -, UpLeg, Leg, Foot, ToeBase
+blender|{n}.{S}
+spine, -, spine.001, spine.003, -, spine.004, spine.006
+shoulder, upper_arm, forearm, hand, -, f_index.01, thumb.01, -, thigh, shin, foot, toe
+rigify|{n}.{S}
+DEF-spine, DEF-spine.001, DEF-spine.002, DEF-spine.003, -, DEF-spine.004, DEF-spine.006
+DEF-shoulder, DEF-upper_arm, DEF-forearm, DEF-hand, -, -, -, -, DEF-thigh, DEF-shin, DEF-foot, DEF-toe
+biped|Bip01 {S} {n}
+Bip01 Pelvis, Bip01 Spine, Bip01 Spine1, Bip01 Spine2, -, Bip01 Neck, Bip01 Head
+Clavicle, UpperArm, Forearm, Hand, -, Finger1, Finger0, -, Thigh, Calf, Foot, Toe0
+rokoko|{side}{n}
+Hips, Spine1, Spine2, Spine4, -, Neck, Head
+Shoulder, Arm, ForeArm, Hand, -, Finger2Proximal, Finger1Metacarpal, -, Thigh, Shin, Foot, Toe
+xsens|{side}{n}
+Hips, Chest, Chest2, Chest4, -, Neck, Head
+Collar, Shoulder, Elbow, Wrist, -, -, -, -, Hip, Knee, Ankle, Toe
+motionbuilder|Bob:{side}{n}
+Hips, Spine, Spine1, Spine2, -, Neck, Head
+Shoulder, Arm, ForeArm, Hand, -, HandIndex1, HandThumb1, -, UpLeg, Leg, Foot, ToeBase
+neuron|Robot_{side}{n}
+Robot_Hips, Robot_Spine, Robot_Spine1, Robot_Spine2, -, Robot_Neck, Robot_Head
+Shoulder, Arm, ForeArm, Hand, -, HandIndex, HandThumb1, -, UpLeg, Leg, Foot, -
+smpl|{S}_{n}
+Pelvis, Spine1, Spine2, Spine3, -, Neck, Head
+Collar, Shoulder, Elbow, Wrist, -, Hand, -, -, Hip, Knee, Ankle, Foot
+daz|{s}{n}
+hip, abdomen, abdomen2, chest, -, neck, head
+Collar, Shldr, ForeArm, Hand, -, Index1, Thumb1, Buttock, Thigh, Shin, Foot, Toe
+"""
 
 
-def _prefixed(text: str):
-    return lambda name, side: text.format(name=name, side=side, s=side[0].lower(), S=side[0])
+def _styles() -> dict[str, dict[str, str]]:
+    """Program -> {joint of the 31: its name there}."""
+    sided = [
+        ((letter if part in ("HipJoint", "Thumb") else side) + part, k, {"side": side, "S": letter})
+        for side, letter in SIDES
+        for k, part in enumerate((*LIMB, *LEG))
+    ]
+    out = {"own": {joint: joint for joint in (*TRUNK, *(joint for joint, _, _ in sided))}}
+    lines = PROGRAMS.strip().splitlines()
+    for head, *lists in zip(lines[::3], lines[1::3], lines[2::3], strict=True):
+        (program, style), (trunk, limbs) = head.split("|"), (line.split(", ") for line in lists)
+        names = dict(zip(TRUNK, trunk, strict=True))
+        for joint, k, side in sided:
+            name = style.format(n=limbs[k], s=side["S"].lower(), **side)
+            names[joint] = "-" if limbs[k] == "-" else name
+        out[program] = {joint: name for joint, name in names.items() if name != "-"}
+    return out | {"words": {}}
 
 
-STYLES = {
-    "own": {name: name for name in _names(TRUNK, LIMB, LEG, lambda n, s: s[0] + n if n in ("HipJoint", "Thumb") else s + n).values()},  # noqa: E501
-    "mixamo": _names(
-        ("mixamorig:Hips", "mixamorig:Spine", "mixamorig:Spine1", "mixamorig:Spine2", None, "mixamorig:Neck", "mixamorig:Head"),  # noqa: E501
-        ("Shoulder", "Arm", "ForeArm", "Hand", None, "HandIndex1", "HandThumb1"),
-        (None, "UpLeg", "Leg", "Foot", "ToeBase"), _prefixed("mixamorig:{side}{name}")),
-    "blender": _names(
-        ("spine", None, "spine.001", "spine.003", None, "spine.004", "spine.006"),
-        ("shoulder", "upper_arm", "forearm", "hand", None, "f_index.01", "thumb.01"),
-        (None, "thigh", "shin", "foot", "toe"), _prefixed("{name}.{S}")),
-    "rigify": _names(
-        ("DEF-spine", "DEF-spine.001", "DEF-spine.002", "DEF-spine.003", None, "DEF-spine.004", "DEF-spine.006"),  # noqa: E501
-        ("DEF-shoulder", "DEF-upper_arm", "DEF-forearm", "DEF-hand", None, None, None),
-        (None, "DEF-thigh", "DEF-shin", "DEF-foot", "DEF-toe"), _prefixed("{name}.{S}")),
-    "biped": _names(
-        ("Bip01 Pelvis", "Bip01 Spine", "Bip01 Spine1", "Bip01 Spine2", None, "Bip01 Neck", "Bip01 Head"),
-        ("Clavicle", "UpperArm", "Forearm", "Hand", None, "Finger1", "Finger0"),
-        (None, "Thigh", "Calf", "Foot", "Toe0"), _prefixed("Bip01 {S} {name}")),
-    "rokoko": _names(
-        ("Hips", "Spine1", "Spine2", "Spine4", None, "Neck", "Head"),
-        ("Shoulder", "Arm", "ForeArm", "Hand", None, "Finger2Proximal", "Finger1Metacarpal"),
-        (None, "Thigh", "Shin", "Foot", "Toe"), _prefixed("{side}{name}")),
-    "xsens": _names(
-        ("Hips", "Chest", "Chest2", "Chest4", None, "Neck", "Head"),
-        ("Collar", "Shoulder", "Elbow", "Wrist", None, None, None),
-        (None, "Hip", "Knee", "Ankle", "Toe"), _prefixed("{side}{name}")),
-    "motionbuilder": _names(
-        ("Hips", "Spine", "Spine1", "Spine2", None, "Neck", "Head"),
-        ("Shoulder", "Arm", "ForeArm", "Hand", None, "HandIndex1", "HandThumb1"),
-        (None, "UpLeg", "Leg", "Foot", "ToeBase"), _prefixed("Bob:{side}{name}")),
-    "neuron": _names(
-        ("Robot_Hips", "Robot_Spine", "Robot_Spine1", "Robot_Spine2", None, "Robot_Neck", "Robot_Head"),
-        ("Shoulder", "Arm", "ForeArm", "Hand", None, "HandIndex", "HandThumb1"),
-        (None, "UpLeg", "Leg", "Foot", None), _prefixed("Robot_{side}{name}")),
-    "smpl": _names(
-        ("Pelvis", "Spine1", "Spine2", "Spine3", None, "Neck", "Head"),
-        ("Collar", "Shoulder", "Elbow", "Wrist", None, "Hand", None),
-        (None, "Hip", "Knee", "Ankle", "Foot"), _prefixed("{S}_{name}")),
-    "daz": _names(
-        ("hip", "abdomen", "abdomen2", "chest", None, "neck", "head"),
-        ("Collar", "Shldr", "ForeArm", "Hand", None, "Index1", "Thumb1"),
-        ("Buttock", "Thigh", "Shin", "Foot", "Toe"), _prefixed("{s}{name}")),
-    "words": {},
-}  # fmt: skip
+STYLES = _styles()
 SYLLABLES = ("ka", "lo", "mi", "ru", "ta", "ne", "so", "vi", "pe", "du", "gra", "zo", "fi", "bu", "qua")
 
 
@@ -245,16 +240,8 @@ def _style(clip: Clip, how: Scramble, rng: np.random.Generator) -> dict[str, str
             while (word := "".join(rng.choice(SYLLABLES, 3))) in names.values():
                 pass
             names[joint] = word
-        for gone in [
-            "LHipJoint",
-            "RHipJoint",
-            "Neck",
-            "LeftFingerBase",
-            "RightFingerBase",
-            "LThumb",
-            "RThumb",
-        ]:
-            names.pop(gone)
+        unnamed = ("LHipJoint", "RHipJoint", "Neck", "LeftFingerBase", "RightFingerBase", "LThumb", "RThumb")
+        names = {joint: name for joint, name in names.items() if joint not in unnamed}
     gone = (() if how.toes else ("LeftToeBase", "RightToeBase")) + (() if how.neck else ("Neck", "Neck1"))
     return {a: b for a, b in names.items() if a not in gone}
 
@@ -419,9 +406,8 @@ def main() -> None:
     """Scramble as many clips as requested, and print the outcome of each that is not right."""
     parser = argparse.ArgumentParser(description=main.__doc__)
     parser.add_argument("folder", type=Path, help="clips of the 31 joints")
-    parser.add_argument("--count", type=int, default=240)
-    parser.add_argument("--first", type=int, default=0)
-    parser.add_argument("--frames", type=int)
+    for name, default in (("--count", 240), ("--first", 0), ("--frames", None)):
+        parser.add_argument(name, type=int, default=default)
     given = parser.parse_args()
     files, outcomes = sorted(given.folder.glob("*.bvh")), []
     for seed in range(given.first, given.first + given.count):

@@ -24,17 +24,23 @@ def test_a_clip_on_the_target_skeleton_is_unchanged_and_always_the_same(walk, bv
     np.testing.assert_array_equal(clip.skeleton.offsets, walk.skeleton.offsets)
 
 
+def scaled(clip, factor):
+    """The same motion in another unit."""
+    skeleton = replace(clip.skeleton, offsets=clip.skeleton.offsets * factor)
+    return replace(clip, skeleton=skeleton, root=clip.root * factor)
+
+
 @pytest.mark.parametrize(
     ("factor", "unit"),
     [(1.0, 1.0), (1 / 2.54, 2.54), (0.01, 100.0), (10.0, 0.1), (1 / 5.6444, 5.6444), (1 / 30.48, 30.48)],
 )
-def test_the_unit_is_found_from_the_legs(walk, bvh, make, scaled, factor, unit):
+def test_the_unit_is_found_from_the_legs(walk, bvh, make, factor, unit):
     clip, report = make(bvh(scaled(walk, factor), decimals=12))
     assert report["unit"] == unit
     np.testing.assert_allclose(clip.positions, walk.positions[::2], atol=2e-3 if factor < 1 else 1e-4)
 
 
-def test_the_unit_can_be_set_and_is_in_doubt_for_a_rig_of_no_known_size(walk, bvh, make, scaled):
+def test_the_unit_can_be_set_and_is_in_doubt_for_a_rig_of_no_known_size(walk, bvh, make):
     clip, report = make(bvh(walk), unit=2.0, proportions="clip")
     assert report["unit"] == 2.0
     np.testing.assert_allclose(clip.positions, 2 * walk.positions[::2], atol=1e-3)
