@@ -4,36 +4,36 @@ A rig is a text with a line `name|parent|joint` for each joint. The joint is one
 `+x,y,z` moves it by so many centimetres in that joint's own axes.
 """
 
+from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from hobble.core import quat
+from hobble.core.bvh import write_bvh
 from hobble.core.clip import Clip
 from tests.motion.scramble import SYLLABLES, Rig, Scramble, as_clip, from_world
 
-LEG, ARM = ("UpLeg", "Leg", "Foot", "ToeBase"), ("Shoulder", "Arm", "ForeArm", "Hand")
 SIDES = {"L": "Left", "R": "Right"}
 
 
 def human(name: str, trunk: str, leg: str, arm: str) -> str:
-    """A rig by names. name: of a limb's joint, with {n} for the word and {l} for the side's letter.
+    """A rig by names: `name=joint` of the trunk from the hips to the head, and of each limb.
 
-    trunk: `name=joint` from the hips to the head. leg, arm: the words of the four joints of each.
+    name: of a limb's joint, with {n} for its name and {l} or {L} for the side's letter.
     """
-    lines, chain = [], [part.split("=") for part in trunk.split()]
-    last = "-"
-    for joint, place in chain:
-        lines.append(f"{joint}|{last}|{place}")
-        last = joint
-    chest = next(joint for joint, place in chain if place == "Spine1")
+    chain, leg_joints, arm_joints = ([part.split("=") for part in text.split()] for text in (trunk, leg, arm))
+    lines = [
+        f"{own}|{above}|{joint}" for (above, _), (own, joint) in zip([("-", ""), *chain], chain, strict=False)
+    ]
+    chest = next(own for own, joint in reversed(chain) if joint == "Spine1")
     for letter, side in SIDES.items():
-        for words, parts, top in ((leg, LEG, chain[0][0]), (arm, ARM, chest)):
-            last = top
-            for word, part in zip(words.split(), parts, strict=True):
-                own = name.format(n=word, l=letter.lower())
-                lines.append(f"{own}|{last}|{side}{part}")
+        for joints, last in ((leg_joints, chain[0][0]), (arm_joints, chest)):
+            for word, joint in joints:
+                own = name.format(n=word, l=letter.lower(), L=letter)
+                lines.append(f"{own}|{last}|{side}{joint}")
                 last = own
     return "\n".join(lines)
 
@@ -41,8 +41,15 @@ def human(name: str, trunk: str, leg: str, arm: str) -> str:
 PLAIN = human(
     "{n}_{l}",
     "hips=Hips spine=Spine chest=Spine1 neck=Neck1 head=Head",
-    "thigh shin foot toe",
-    "shoulder upper_arm forearm hand",
+    "thigh=UpLeg shin=Leg foot=Foot toe=ToeBase",
+    "shoulder=Shoulder upper_arm=Arm forearm=ForeArm hand=Hand",
+)
+# As the Master Motor Map of KIT has it: several joints in one place, one for each axis.
+KIT = human(
+    "{L}{n}",
+    "root=Hips BPx=LowerBack BPy=LowerBack BTx=Spine1 BTy=Spine1 BLNx=Neck1 BLNy=Neck1 BUNx=Head",
+    "Hx=UpLeg Hy=UpLeg Hz=UpLeg Kx=Leg Ax=Foot Ay=Foot Fx=ToeBase",
+    "SCx=Shoulder Sx=Arm Sy=Arm Ex=ForeArm Ez=ForeArm Wx=Hand",
 )
 # Pairs of chains that are no limbs: four joints of skirt on each side, twin tails of hair, wings, a tail.
 TAIL = "\ntail1|hips|Hips+0,0,-8\ntail2|tail1|Hips+0,-5,-30\ntail3|tail2|Hips+0,-10,-55"
@@ -58,25 +65,6 @@ CLOTHES = TAIL + "".join(
 GAME = "".join(
     f"\nthigh_twist_{s}|thigh_{s}|{side}UpLeg+0,-20,0\nik_hand_{s}|root|{side}Hand\nik_foot_{s}|root|{side}Foot"
     for s, side in (("l", "Left"), ("r", "Right"))
-)
-# As the Master Motor Map of KIT has it: several joints in one place, one for each axis.
-KIT = "\n".join(
-    f"{name}|{parent}|{joint}"
-    for name, parent, joint in (
-        *(("root", "-", "Hips"), ("BPx", "root", "LowerBack"), ("BPy", "BPx", "LowerBack")),
-        *(("BTx", "BPy", "Spine1"), ("BTy", "BTx", "Spine1"), ("BLNx", "BTy", "Neck1")),
-        *(("BLNy", "BLNx", "Neck1"), ("BUNx", "BLNy", "Head")),
-        *(
-            (letter + name, parent if parent in ("root", "BTy") else letter + parent, side + joint)
-            for letter, side in SIDES.items()
-            for name, parent, joint in (
-                *(("Hx", "root", "UpLeg"), ("Hy", "Hx", "UpLeg"), ("Hz", "Hy", "UpLeg")),
-                *(("Kx", "Hz", "Leg"), ("Ax", "Kx", "Foot"), ("Ay", "Ax", "Foot"), ("Fx", "Ay", "ToeBase")),
-                *(("SCx", "BTy", "Shoulder"), ("Sx", "SCx", "Arm"), ("Sy", "Sx", "Arm")),
-                *(("Ex", "Sy", "ForeArm"), ("Ez", "Ex", "ForeArm"), ("Wx", "Ez", "Hand")),
-            )
-        ),
-    )
 )
 
 
@@ -120,3 +108,13 @@ def rezeroed(clip: Clip, joints: tuple[str, ...], turn: np.ndarray) -> Clip:
         if name.startswith(joints):
             turned[:, j] = quat.mul(turned[:, j], turn)
     return from_world(clip.skeleton, clip.fps, places, turned)
+
+
+def both(
+    clip: Clip, rig: str, folder: Path, make: Callable, **how: Any
+) -> tuple[Clip, Clip, dict, dict[str, str]]:
+    """Results for a clip and for it on another rig, the latter's report, and the names that both have."""
+    other, names = rigged(clip, rig, **how)
+    write_bvh(folder / "plain.bvh", clip, decimals=6)
+    write_bvh(folder / "other.bvh", other, "YZX", decimals=8)
+    return make(folder / "plain.bvh")[0], *make(folder / "other.bvh"), names

@@ -21,31 +21,6 @@ def top_speed(clip):
     return np.linalg.norm(np.diff(clip.positions, axis=0), axis=-1).max()
 
 
-def teleported(clip):
-    return replace(clip, root=clip.root + np.where(np.arange(len(clip)) >= 100, 200.0, 0.0)[:, None])
-
-
-@pytest.mark.parametrize("fps", [30.0, 120.0])
-@pytest.mark.parametrize(
-    ("damage", "kept", "said"),
-    [
-        (
-            lambda clip: with_rest_pose(clip, slice(-3, None), 0.0),
-            slice(0, -3),
-            "Frames 239 to 241 (no pose) cut off",
-        ),
-        (teleported, slice(100, None), "Frames 1 to 100 cut off"),
-    ],
-)
-def test_a_broken_end_is_cut_off(walker, holden31, fps, damage, kept, said):
-    clip = walker(holden31, 241, fps)
-    mended, start, told = repair_defects(damage(clip))
-    assert start == kept.start
-    np.testing.assert_array_equal(mended.rotations, clip.rotations[kept])
-    assert told[0].startswith(said)
-    assert find_jumps(mended) == []
-
-
 def test_a_few_broken_frames_in_the_middle_are_bridged(walk):
     mended, _start, said = repair_defects(with_rest_pose(walk, slice(120, 126), 0.0))
     assert len(mended) == 241

@@ -10,10 +10,8 @@ from hobble.core.bvh import write_bvh
 from hobble.core.clip import Clip
 from hobble.core.errors import InputError
 from hobble.motion.axes import degrees_between
-from tests.motion.other_rigs import PLAIN, rigged
+from tests.motion.other_rigs import PLAIN, both, rigged
 from tests.motion.scramble import X, compare, source_of
-
-SIDES = ("left", "right")
 
 
 @pytest.mark.shared
@@ -43,20 +41,13 @@ def bent(clip: Clip, joints: tuple[str, ...], angles: np.ndarray) -> Clip:
     return replace(clip, rotations=rotations)
 
 
-def rewritten(clip: Clip, rest: str, tmp_path, make) -> tuple[Clip, Clip, dict[str, str], dict]:
-    """Results for the clip and for the clip on another rig, the joints' names there, and its report."""
-    rig = PLAIN.replace("spine|hips|Spine", "low|hips|LowerBack\nspine|low|Spine")
-    other, names = rigged(clip, rig, rest=rest)
-    write_bvh(tmp_path / "plain.bvh", clip, decimals=6)
-    write_bvh(tmp_path / "other.bvh", other, decimals=8)
-    made, report = make(tmp_path / "other.bvh")
-    return make(tmp_path / "plain.bvh")[0], made, names, report
+RIG = PLAIN.replace("spine|hips|Spine", "low|hips|LowerBack\nspine|low|Spine")
 
 
 @pytest.mark.parametrize("rest", ["own", "one axis", "twisted"])
 def test_a_bow_does_not_tilt_the_pelvis(standing, tmp_path, make, rest):
     bow = bent(standing, ("LowerBack", "Spine"), 0.7 * (1 - np.cos(np.arange(300) / 30)) / 2)
-    first, second, names, _ = rewritten(bow, rest, tmp_path, make)
+    first, second, _, names = both(bow, RIG, tmp_path, make, rest=rest)
     assert compare(first, second, names).mean() < 0.7
 
 
@@ -71,9 +62,9 @@ def squat(clip: Clip, tiptoe: float) -> Clip:
 
 
 def test_a_squat_on_tiptoe_without_a_standing_zero_pose_is_refused(standing, tmp_path, make):
-    rewritten(squat(standing, 0.0), "one axis", tmp_path, make)
+    both(squat(standing, 0.0), RIG, tmp_path, make, rest="one axis")
     with pytest.raises(InputError, match="The height of the ankles is uncertain"):
-        rewritten(squat(standing, 0.5), "one axis", tmp_path, make)
+        both(squat(standing, 0.5), RIG, tmp_path, make, rest="one axis")
 
 
 def without_toes(clip: Clip, site: tuple[float, float, float] | None) -> Clip:
