@@ -8,14 +8,14 @@ from collections.abc import Sequence
 from importlib.metadata import version
 
 from hobble.cli import characters, clips, gait  # noqa: F401 - they add their commands
-from hobble.cli.command import CHARACTERS, CLIPS, COMMANDS, LIMPS, SHELL, arg, command
+from hobble.cli.command import COMMANDS, arg, command
 from hobble.core.errors import HobbleError, keep_traceback
 from hobble.measures import score
 
-command(CLIPS, score.add_arguments, name="score")(score.run)
+command("BVH files", score.add_arguments, name="score")(score.run)
 
 
-@command(SHELL, arg("shell", choices=("bash", "zsh", "fish")))
+@command("the shell", arg("shell", choices=("bash", "zsh", "fish")))
 def completion(options: argparse.Namespace) -> int:
     """Print a script that completes the command in a shell.
 
@@ -66,10 +66,8 @@ def _parsers(parent: argparse.ArgumentParser | None = None) -> dict[str, argpars
 
 def _description() -> str:
     """What `hobble --help` says: the subcommands with the first line of their texts, in groups."""
-    lines = [
-        "Commands for single clips and networks. A Snakemake workflow trains a character: see README.md."
-    ]
-    for group in (CLIPS, LIMPS, CHARACTERS, SHELL):
+    lines = ["Commands for clips and networks. A Snakemake workflow trains a character: see README.md."]
+    for group in dict.fromkeys(found.group for found in COMMANDS.values()):
         known = {name: found.text for name, found in COMMANDS.items() if found.group == group}
         lines += ["", f"{group}:", *(f"  {name:12}{text.splitlines()[0]}" for name, text in known.items())]
     return "\n".join(lines)

@@ -5,7 +5,7 @@ import webbrowser
 from pathlib import Path
 from typing import get_args
 
-from hobble.cli.command import CHARACTERS, arg, command
+from hobble.cli.command import arg, command
 from hobble.core.errors import HobbleError, InputError
 from hobble.core.section import PhaseMode
 from hobble.measures import study
@@ -15,7 +15,7 @@ from hobble.runtime.options import Runtime
 
 
 @command(
-    CHARACTERS,
+    "a trained character",
     arg("results", nargs="?", type=Path, help="its folder, or a report; default: the newest report"),
     arg("--print", action="store_true", help="print the address, open no browser"),
 )
@@ -53,7 +53,7 @@ MODE = "how the network's weights are interpolated over the phase; cubic is exac
 
 
 @command(
-    CHARACTERS,
+    "a trained character",
     arg("to", choices=("onnx", "bin", "bvh"), help=TO),
     arg("network", help="weights.npz, the folder that holds it, or a folder of .bin files"),
     arg("target", help="the file or folder to write"),
@@ -78,4 +78,4 @@ def export(options: argparse.Namespace) -> int:
     return 0
 
 
-command(CHARACTERS, study.add_arguments, name="study", text=str(study.__doc__))(study.run)
+command("a trained character", study.add_arguments, name="study", text=str(study.__doc__))(study.run)

@@ -10,20 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from hobble.channels.injury.status import (
-    FPS,
-    InjurySpell,
-    Status,
-    parse_links,
-    write_status,
-    write_statuses,
-)
+from hobble.channels.injury.status import FPS, InjurySpell, Status, parse_links, write_status, write_statuses
 from hobble.channels.shown import channel_display
 from hobble.cli.command import (
-    CLIPS,
     FOLDER,
     JSON,
-    LIMPS,
     Argument,
     Message,
     add_motion_options,
@@ -51,12 +42,7 @@ from hobble.motion.make import clip_problems, load_source, make_clip
 from hobble.motion.options import accept
 from hobble.motion.other_formats import read_motion
 from hobble.motion.read import decode_channels
-from hobble.motion.skeleton_file import (
-    draft_skeleton_file,
-    find_skeleton,
-    load_skeleton,
-    skeleton_folder,
-)
+from hobble.motion.skeleton_file import draft_skeleton_file, find_skeleton, load_skeleton, skeleton_folder
 
 # Clips are retargeted to this skeleton before they are labelled; label files fit any skeleton, because they
 # name no joints. `hobble motion` without --skeleton uses its roles, such as hips and left heel, to recognise
@@ -76,7 +62,7 @@ def out(text: str) -> tuple[Argument, ...]:
 
 
 @command(
-    CLIPS,
+    "BVH files",
     FOLDER,
     skeleton_argument("skeleton to which the clips are retargeted"),
     arg("--skeletons", type=Path, help="folder of the skeleton files (default config/skeletons)"),
@@ -101,7 +87,7 @@ def look(options: argparse.Namespace) -> int:
 
 
 @command(
-    CLIPS,
+    "BVH files",
     arg("file", type=Path, help="a BVH file"),
     arg("--to", type=Path, help="the file to write (default: print it)"),
 )
@@ -128,7 +114,7 @@ def skeleton_draft(file: Path) -> str:
 
 
 @command(
-    CLIPS,
+    "BVH files",
     *out("the folder to write into; the clips keep their names"),
     arg("--fps", type=float, default=60.0, help="frame rate to write (default 60)"),
     arg("--skeleton", help="retarget to this skeleton: a name from config/skeletons, or a YAML file"),
@@ -182,7 +168,7 @@ def report_messages(report: Mapping[str, Any]) -> list[Message]:
 
 
 @command(
-    CLIPS,
+    "BVH files",
     *out("the folder to write into; if it is FOLDER, label files lie beside the clips"),
     arg("--gait", choices=GAITS, help="the main gait of the clips; used where the gait is unclear"),
     arg("--overwrite", action="store_true", help="replace existing label files"),
@@ -237,7 +223,7 @@ def _labelled(
 
 
 @command(
-    LIMPS,
+    "what hurts",
     *out("the folder to write into: CLIP_limps.bvh and CLIP_limps_injuries.txt"),
     arg("--injury", required=True, help="what hurts: PART[severity];..."),
 )
@@ -271,7 +257,7 @@ def hurt(options: argparse.Namespace) -> int:
 
 
 @command(
-    LIMPS,
+    "what hurts",
     arg("body", type=Path, help="the BVH file whose path, legs and trunk are kept"),
     arg("other", type=Path, help="the BVH file from which a part of the body is taken"),
     arg("out", type=Path, help="the BVH file to write"),
@@ -296,7 +282,7 @@ def combine(options: argparse.Namespace) -> int:
 
 
 @command(
-    LIMPS,
+    "what hurts",
     arg("table", type=Path, help="CSV with the columns clip, link, severity, from, to"),
     arg("folder", type=Path, help="folder with the clips' BVH files"),
     skeleton_argument("skeleton that lists the links"),

@@ -28,7 +28,7 @@ Argument = Callable[[argparse.ArgumentParser], Any]  # adds one argument or seve
 class Command(NamedTuple):
     """A subcommand.
 
-    group: the heading under which `hobble --help` lists it, such as CLIPS. run: runs it with the parsed
+    group: the heading under which `hobble --help` lists it, such as "BVH files". run: runs it with the parsed
     arguments and returns the exit status. text: its help.
     """
 
@@ -39,7 +39,6 @@ class Command(NamedTuple):
 
 
 COMMANDS: dict[str, Command] = {}  # filled by `command`
-CLIPS, LIMPS, CHARACTERS, SHELL = "BVH files", "what hurts", "a trained character", "the shell"
 
 
 def command(group: str, *arguments: Argument, name: str = "", text: str = "") -> Callable:
@@ -63,7 +62,7 @@ FOLDER = arg("folder", type=Path, help="a folder of BVH, glTF or FBX files, or o
 
 def print_result(options: argparse.Namespace, data: Any, text: str) -> None:
     """Print a result: with --json the data, else the text."""
-    print(json.dumps(data, indent=1, ensure_ascii=False) if options.json else text)
+    print(json.dumps(data, indent=1, ensure_ascii=False, default=float) if options.json else text)
 
 
 def add_motion_options(parser: argparse.ArgumentParser) -> None:

@@ -5,16 +5,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from hobble.cli.command import (
-    JSON,
-    LIMPS,
-    add_motion_options,
-    arg,
-    command,
-    motion_options,
-    print_result,
-    progress,
-)
+from hobble.cli.command import JSON, add_motion_options, arg, command, motion_options, print_result, progress
 from hobble.core.clip import Clip
 from hobble.core.errors import HobbleError, InputError
 from hobble.gait.cycles import measure_clip
@@ -26,21 +17,16 @@ from hobble.motion.options import ClipMotion
 from hobble.motion.read import read_bvh
 from hobble.motion.skeleton_file import find_skeleton, load_skeleton, skeleton_folder
 
-NO_HEALTHY = (
-    "The clips were compared with the mean of ten healthy people, for whom an unusual build can look like a "
-    "limp. Name healthy walks of the same person after --healthy."
-)
+NO_HEALTHY = "Compared with the mean of ten healthy people; --healthy names walks of the same person instead."
 HEALTHY = "clips of healthy walks of the same person"
-SIDE = "the hurt side; default: the side that is recognised, else right"
-WINDOW = "length of a window in seconds. The whole clip is recognised, and also each window on its own"
 
 
 @command(
-    LIMPS,
+    "what hurts",
     arg("clips", nargs="+", type=Path, metavar="CLIP.bvh", help="clips of walks to recognise and measure"),
     arg("--healthy", nargs="+", type=Path, default=[], metavar="CLIP.bvh", help=HEALTHY),
-    arg("--side", choices=("right", "left"), help=SIDE),
-    arg("--window", type=float, default=4.0, help=WINDOW),
+    arg("--side", choices=("right", "left"), help="the hurt side (default: as recognised)"),
+    arg("--window", type=float, default=4.0, help="seconds of the windows that are also recognised"),
     JSON,
     add_motion_options,
 )
@@ -99,10 +85,7 @@ def as_data(compared: WalkComparison) -> dict[str, Any]:
         "cycles": compared.cycles,
         "graded": {**answer(grade, list(compared.window_grades)), **graded},
         "linear": answer(compared.answer, list(compared.window_answers)),
-        "effects": {
-            side: {key: float(value) for key, value in values.items()}
-            for side, values in compared.effects.items()
-        },
+        "effects": compared.effects,
     }
 
 
@@ -120,7 +103,7 @@ def describe(name: str, compared: WalkComparison, side: str | None = None) -> st
         f"  what may hurt: {', '.join(grade.parts) or 'nothing'}",
         f"  probabilities: {_listed(grade.probabilities)}",
         f"  share of the {len(compared.window_grades)} windows with each answer: "
-        f"{_in_words(shares_of_answers(compared.window_grades))}",
+        f"{_listed(shares_of_answers(compared.window_grades)) or 'none has enough cycles'}",
         f"  effects if the {side} side is hurt. "
         f"The other columns show limps of people: mean ± standard deviation ({SOURCE})",
         " " * 24 + "".join(f"{gait[:13]:>15}" for gait in people),
@@ -131,13 +114,7 @@ def describe(name: str, compared: WalkComparison, side: str | None = None) -> st
     return "\n".join(lines)
 
 
-def _listed(probabilities: Mapping[str, float]) -> str:
-    """The answers with a probability that is not 0 in two digits, the likeliest first."""
-    likely = sorted(probabilities.items(), key=lambda item: -item[1])
+def _listed(shares: Mapping[str, float]) -> str:
+    """The answers with a share or a probability that is not 0 in two digits, the likeliest first."""
+    likely = sorted(shares.items(), key=lambda item: -item[1])
     return ", ".join(f"{name} {value:.2f}" for name, value in likely if value >= 0.005)
-
-
-def _in_words(shares: Mapping[str, float]) -> str:
-    """shares: an answer, such as "antalgic right" -> share of the windows with this answer."""
-    said = ", ".join(f"{name} {share:.2f}" for name, share in shares.items())
-    return said or "none, because no window has enough cycles"

@@ -9,15 +9,7 @@ from pydantic import AfterValidator, Field, create_model, field_validator, model
 
 from hobble.channels import CHANNEL_NAMES, channel
 from hobble.core.clip_files import CLIP_NAME_RULE, is_valid_clip_name
-from hobble.core.section import (
-    FrameRange,
-    Gait,
-    Ground,
-    Positive,
-    PositiveFloat,
-    RelativePath,
-    Section,
-)
+from hobble.core.section import FrameRange, Gait, Ground, Positive, PositiveFloat, RelativePath, Section
 from hobble.core.skeleton import SkeletonData
 from hobble.database.options import DatabaseOptions
 from hobble.hurt.options import Hurt

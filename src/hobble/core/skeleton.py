@@ -250,7 +250,7 @@ def path_to_root(parents: Sequence[int], joint: int) -> list[int]:
     return chain
 
 
-def lowest_common_ancestor(parents: Sequence[int], joints: Iterable[int]) -> int:
+def common_ancestor(parents: Sequence[int], joints: Iterable[int]) -> int:
     """The lowest common ancestor of `joints`. A joint counts as its own ancestor here."""
     first, *others = (path_to_root(parents, j) for j in joints)
     return next(j for j in first if all(j in other for other in others))
@@ -258,7 +258,7 @@ def lowest_common_ancestor(parents: Sequence[int], joints: Iterable[int]) -> int
 
 def path_between(parents: Sequence[int], start: int, end: int) -> list[int]:
     """The joints from `start` to `end`, both included: up to their lowest common ancestor, then down."""
-    meet = lowest_common_ancestor(parents, (start, end))
+    meet = common_ancestor(parents, (start, end))
     up, down = path_to_root(parents, start), path_to_root(parents, end)
     return up[: up.index(meet) + 1] + down[: down.index(meet)][::-1]
 

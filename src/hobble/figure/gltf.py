@@ -160,9 +160,8 @@ def _primitive(mesh: Mesh, bones: Rig, buffer: _Buffer) -> dict[str, object]:
 
     A corner with several places in the texture is in the file as often.
     """
-    found, faces = np.unique(
-        np.column_stack([mesh.faces.ravel(), mesh.uv.reshape(-1, 2)]), axis=0, return_inverse=True
-    )
+    table = np.column_stack([mesh.faces.ravel(), mesh.uv.reshape(-1, 2)])
+    found, faces = np.unique(table, axis=0, return_inverse=True)
     corner, uv = found[:, 0].astype(int), found[:, 1:]
     weights = whole_weights(mesh.weights[corner])
     # glTF wants bone 0 where the weight is 0.
@@ -235,8 +234,7 @@ def _write(path: str | Path, document: dict[str, object], data: bytes) -> None:
     data += b"\0" * (-len(data) % 4)
     length = 12 + 8 + len(text) + 8 + len(data)  # 12 bytes of file header, 8 bytes before each chunk
     header = struct.pack("<4sII", b"glTF", 2, length)
-    chunks = [
-        struct.pack("<I4s", len(part), kind) + part for part, kind in ((text, b"JSON"), (data, b"BIN\0"))
-    ]
+    parts = ((text, b"JSON"), (data, b"BIN\0"))
+    chunks = [struct.pack("<I4s", len(part), kind) + part for part, kind in parts]
     with atomic_path(path) as temporary:
         temporary.write_bytes(b"".join([header, *chunks]))

@@ -17,13 +17,7 @@ from hobble.core import quat
 from hobble.core.compiled import njit
 from hobble.core.files import load_npz
 from hobble.core.quat import Array
-from hobble.core.skeleton import (
-    NEEDED_ROLES,
-    Skeleton,
-    lowest_common_ancestor,
-    path_between,
-    rest_positions,
-)
+from hobble.core.skeleton import LIMB_PARTS, NEEDED_ROLES, Skeleton, path_between, rest_positions
 
 FIGURE = Path(__file__).with_name("body.npz")
 TEXTURE = Path(__file__).with_name("body.jpg")
@@ -58,8 +52,7 @@ def modelled_pose(skeleton: Skeleton) -> Pose:
     """
     joint_of, rest = _find_bones(skeleton), rest_positions(skeleton)
     aims = _bone_directions(joint_of)
-    count = len(skeleton.joints)
-    rotations, positions = np.tile(quat.IDENTITY, (count, 1)), np.zeros((count, 3))
+    rotations, positions = np.tile(quat.IDENTITY, (len(rest), 1)), np.zeros_like(rest)
     heels = {joint_of[f"{side}_heel"] for side in SIDES}  # the feet stay as in the rest pose
     for j, p in enumerate(skeleton.parents):
         if p >= 0:
@@ -85,8 +78,8 @@ def _find_bones(skeleton: Skeleton) -> dict[str, int]:
     """`Pose.joint_of` for a skeleton."""
     found = {role: skeleton.role(role) for role in {*NEEDED_ROLES, *skeleton.roles}}
     found.setdefault("neck", max(skeleton.parents[found["head"]], 0))
-    shoulders = [found[f"{side}_shoulder"] for side in SIDES]
-    found.setdefault("chest", lowest_common_ancestor(skeleton.parents, shoulders))
+    left, right = (skeleton.path_up(found[f"{side}_shoulder"]) for side in SIDES)
+    found.setdefault("chest", next(joint for joint in left if joint in right))
     # The first joint on the way from the hips to the chest, if there is one.
     found.setdefault("spine", path_between(skeleton.parents, found["hips"], found["chest"])[:2][-1])
     return found
@@ -222,12 +215,9 @@ def _fit(figure: dict[str, Array], body: dict[str, Array], roles: list[str]) -> 
 
     figure, body: role -> position of its joint in the modelled pose.
     """
-    scale = sum(
-        float(np.linalg.norm(body[f"{s}_{a}"] - body[f"{s}_{b}"]))
-        for s in SIDES
-        for a, b in (("heel", "knee"), ("knee", "hip"))
-    ) / (2 * LEG_LENGTH)
-    scale = max(scale, 0.05)
+    bones = [(f"{s}_{a}", f"{s}_{b}") for s in SIDES for a, b in (("heel", "knee"), ("knee", "hip"))]
+    length = sum(float(np.linalg.norm(body[a] - body[b])) for a, b in bones)
+    scale = max(length / (2 * LEG_LENGTH), 0.05)
     before, after = _bone_axes(figure, 1.0), _bone_axes(body, scale)
     fit, move = [], []
     for role in roles:
@@ -247,9 +237,8 @@ def _bone_axes(at: dict[str, Array], scale: float) -> dict[str, tuple[Array, Arr
     position. scale: size of the body, where no joint tells a size.
     """
     x, y, z = scale * np.eye(3)
-    hips, shoulders = (
-        np.array([1.0, 0, 0]) * (at[f"left_{role}"] - at[f"right_{role}"]) for role in ("hip", "shoulder")
-    )
+    hips, shoulders = (at[f"left_{role}"] - at[f"right_{role}"] for role in ("hip", "shoulder"))
+    hips, shoulders = hips * [1.0, 0, 0], shoulders * [1.0, 0, 0]
     middle = (at["left_hip"] + at["right_hip"]) / 2
     out = {
         "hips": (middle, [hips, at["spine"] - middle, z]),
@@ -259,9 +248,7 @@ def _bone_axes(at: dict[str, Array], scale: float) -> dict[str, tuple[Array, Arr
         "head": (at["head"], [x, y, z]),
     }
     for side in SIDES:
-        hip, knee, heel, toe, shoulder, elbow, wrist = (
-            at[f"{side}_{role}"] for role in ("hip", "knee", "heel", "toe", "shoulder", "elbow", "wrist")
-        )
+        shoulder, elbow, wrist, hip, knee, heel, toe = (at[f"{side}_{part}"] for part in LIMB_PARTS)
         hand = scale * _unit(wrist - elbow)
         for role, start, along in (
             ("hip", hip, knee - hip), ("knee", knee, heel - knee), ("shoulder", shoulder, elbow - shoulder),

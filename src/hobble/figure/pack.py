@@ -167,25 +167,15 @@ def links_of_bones(skeleton: Skeleton, links: Sequence[str]) -> list[list[int]]:
     bones = body_mesh(skeleton).bones.tolist()
     branching = {skeleton.role(role) for role in ("hips", "chest") if role in skeleton.roles}
     links_of_bones: list[list[int]] = [[] for _ in bones]
-    for index, ends in enumerate(link_ends(skeleton.joints, links)):
-        if ends is None:
-            continue
-        upper, lower = ends
+    known = ((index, ends) for index, ends in enumerate(link_ends(skeleton.joints, links)) if ends)
+    for index, (upper, lower) in known:
         way = path_to_root(skeleton.parents, upper)
         bone = next((joint for joint in way if joint in bones), way[-1])
         if bone in branching:
-            bone = next((j for j in _below(skeleton, lower) if j in bones), bone)
+            bone = next((j for j in bones if lower in skeleton.path_up(j)), bone)
         if bone in bones:
             links_of_bones[bones.index(bone)].append(index)
     return links_of_bones
-
-
-def _below(skeleton: Skeleton, joint: int) -> list[int]:
-    """The joint and all its descendants, nearest first."""
-    out = [joint]
-    for j in out:
-        out += skeleton.children(j)
-    return out
 
 
 def link_ends(joints: Sequence[str], links: Sequence[str]) -> list[tuple[int, int] | None]:

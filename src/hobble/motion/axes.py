@@ -82,26 +82,6 @@ def pointed_along(rotation: Array, axis: Array, bone: Array) -> Array:
     return quat.mul(quat.between(quat.rotate(rotation, axis), bone), rotation)
 
 
-def robust_mean(vectors: Array) -> Array:
-    """Mean (3,) of vectors (S, 3), without those that lie unusually far from their median."""
-    distances = np.linalg.norm(vectors - np.median(vectors, axis=0), axis=-1)
-    return vectors[distances <= 3 * np.median(distances) + 1e-9].mean(axis=0)
-
-
-def mean_rotation(rotations: Array) -> Array:
-    """Mean (4,) of rotations (S, 4), without outliers.
-
-    It is computed twice. The second time, rotations that lie unusually far from the first mean are left out.
-    """
-    for _ in range(2):
-        # The mean of quaternions is the eigenvector with the largest eigenvalue (Markley et al. 2007).
-        _, vectors = np.linalg.eigh(rotations.T @ rotations)
-        mean = vectors[:, -1]
-        angles = quat.angle(rotations, mean)
-        rotations = rotations[angles <= 2.5 * np.median(angles) + 1e-9]
-    return mean
-
-
 def bend_direction(hip: Array, knee: Array, heel: Array) -> Array:
     """(..., 3) how far the middle joint of a limb lies out from the line between the ends (positions)."""
     line = unit(heel - hip)
@@ -188,26 +168,21 @@ def straighten(
 
 def _up_axis(clip: Clip, standing: bool) -> tuple[str, str, bool]:
     """The axis that points up, and what `straighten` returns last."""
-    in_motion, in_rest = (
-        max(DIRECTIONS, key=lambda axis: DIRECTIONS[axis] @ along)
-        for along in (
-            _along_body(clip.skeleton, positions).mean(axis=0)
-            for positions in (clip.positions, rest_positions(clip.skeleton)[None])
-        )
-    )
+
+    def axis_of_body(positions: Array) -> str:
+        along = _along_body(clip.skeleton, positions).mean(axis=0)
+        return max(DIRECTIONS, key=lambda axis: float(DIRECTIONS[axis] @ along))
+
+    in_motion, in_rest = map(axis_of_body, (clip.positions, rest_positions(clip.skeleton)[None]))
     crawls = _crawls(clip, in_motion)
     if not standing and crawls:
-        raise ValueError(
-            f"the body moves along the line from its feet to its head ({in_motion}) as if it crawled, and "
-            "nobody could stand in its zero pose"
-        )
+        moves = f"the body moves from its feet to its head ({in_motion}) as if it crawled"
+        raise ValueError(f"{moves}, and nobody could stand in its zero pose")
     if in_motion == in_rest or not standing:
         return in_motion, "", False
     up, why = (in_rest, "the body crawls") if crawls else (in_motion, "the motion is more reliable")
-    note = (
-        f"From feet to head, the body points along {in_motion} and its rest pose along {in_rest}. {up} was "
-        f"taken for up, because {why} (motion.up overrides this)."
-    )
+    apart = f"From feet to head, the body points along {in_motion} and its rest pose along {in_rest}"
+    note = f"{apart}. {up} was taken for up, because {why} (motion.up overrides this)."
     return up, note, not crawls and not _travels(clip, in_motion)
 
 

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from hobble.core.quat import Array
-from hobble.core.skeleton import Skeleton, lowest_common_ancestor, path_between, path_to_root
+from hobble.core.skeleton import Skeleton, common_ancestor, path_between, path_to_root
 from hobble.motion.names import part_of
 
 SIDES = ("left", "right")
@@ -66,10 +66,10 @@ class Body:
     @property
     def chains(self) -> list[tuple[int, ...]]:
         """The chains of joints of a body: the spine, then each limb, after the joint that carries it."""
-        limbs = [
-            limb for side in SIDES for limb in ((self.chest, *self.arms[side]), (self.hips, *self.legs[side]))
-        ]
-        return [self.spine, *(tuple(j for j in limb if j is not None) for limb in limbs)]
+        out = [self.spine]
+        for side in SIDES:
+            out += [(self.chest, *self.arms[side]), (self.hips, *self.legs[side])]
+        return [tuple(j for j in chain if j is not None) for chain in out]
 
     @property
     def joints(self) -> list[int]:
@@ -137,7 +137,7 @@ def body_by_roles(skeleton: Skeleton) -> Body:
     parents, at = skeleton.parents, {role: skeleton.role(role) for role in skeleton.roles}
     hips, head = at["hips"], at["head"]
     shoulders = [at[f"{side}_shoulder"] for side in SIDES]
-    chest = at.get("chest", lowest_common_ancestor(parents, shoulders))
+    chest = at.get("chest", common_ancestor(parents, shoulders))
     trunk = [j for j in path_between(parents, hips, chest) if j != hips]
     neck = [j for j in path_between(parents, chest, head) if j not in (chest, head, hips, *trunk)]
     arms, legs = {}, {}
@@ -245,9 +245,8 @@ def _possible_fingers(skeleton: Skeleton, wrist: int, forearm: float) -> list[tu
         places = np.cumsum(skeleton.offsets[chain], axis=0)
         distances = np.linalg.norm(places, axis=-1)
         in_range = np.flatnonzero((distances > AWAY[0] * forearm) & (distances < AWAY[1] * forearm))
-        is_hand = part_of(skeleton.joints[wrist]) == "wrist" and any(
-            part_of(skeleton.joints[j]) == "hand" for j in chain
-        )
+        parts = {part_of(skeleton.joints[j]) for j in chain}
+        is_hand = part_of(skeleton.joints[wrist]) == "wrist" and "hand" in parts
         points_like_hand = "index" in text or "middle" in text or is_hand or number is not None
         if len(in_range) and length < forearm:
             base = int(in_range[0])

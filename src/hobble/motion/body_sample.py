@@ -28,17 +28,7 @@ from hobble.core import quat
 from hobble.core.clip import Clip
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton, rest_positions
-from hobble.motion.axes import (
-    AHEAD,
-    LEFT,
-    UP,
-    degrees_between,
-    mean_rotation,
-    pointed_along,
-    rest_frame,
-    robust_mean,
-    unit,
-)
+from hobble.motion.axes import AHEAD, LEFT, UP, degrees_between, pointed_along, rest_frame, unit
 from hobble.motion.body import REACH, SIDES, Body, across, body_by_roles, distance_shares
 
 SAMPLES = 400  # at most this many frames of the clip are measured
@@ -248,7 +238,9 @@ class BodySample:
 
     def mean_in_joint_axes(self, joint: int, vectors: Array) -> Array:
         """(3,) mean of `vectors` (S, 3) of the world, without outliers, in the joint's own axes."""
-        return robust_mean(quat.rotate(quat.inv(self.rotations[:, joint]), vectors))
+        own = quat.rotate(quat.inv(self.rotations[:, joint]), vectors)
+        distances = np.linalg.norm(own - np.median(own, axis=0), axis=-1)
+        return own[distances <= 3 * np.median(distances) + 1e-9].mean(axis=0)
 
     def bone(self, start: int, end: int) -> Array:
         """(3,) mean vector from the joint `start` to the joint `end`, in the own axes of `start`."""
@@ -426,6 +418,20 @@ class BodySample:
         if degrees_between(toe_direction, forward) > FORWARD and degrees_between(thigh, shank) > STRAIGHT:
             return None
         return float(np.arcsin(np.clip(foot @ shank, -1.0, 1.0)))
+
+
+def mean_rotation(rotations: Array) -> Array:
+    """Mean (4,) of rotations (S, 4), without outliers.
+
+    It is computed twice. The second time, rotations that lie unusually far from the first mean are left out.
+    """
+    for _ in range(2):
+        # The mean of quaternions is the eigenvector with the largest eigenvalue (Markley et al. 2007).
+        _, vectors = np.linalg.eigh(rotations.T @ rotations)
+        mean = vectors[:, -1]
+        angles = quat.angle(rotations, mean)
+        rotations = rotations[angles <= 2.5 * np.median(angles) + 1e-9]
+    return mean
 
 
 def outward(side: str) -> Array:

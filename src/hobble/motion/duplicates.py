@@ -13,11 +13,8 @@ from hobble.motion.edit import resample
 from hobble.motion.root import facing_directions
 
 RATE = 30.0  # poses a second that are compared
-JOINTS = (
-    "hips",
-    "head",
-    *(f"{side}_{part}" for part in ("wrist", "knee", "heel") for side in ("left", "right")),
-)
+LIMBS = (f"{side}_{part}" for part in ("wrist", "knee", "heel") for side in ("left", "right"))
+JOINTS = ("hips", "head", *LIMBS)
 # cm: two clips show the same motion if these joints are on average less than this apart. In the release of
 # Holden et al. (2017), mirrored clips are 1.2 cm from the mirror images of their originals. Different walks
 # and runs of one person in `cmu` are at least 1.9 cm apart in the seconds in which they are most alike.

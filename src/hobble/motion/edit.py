@@ -83,8 +83,8 @@ def mirror_skeleton(skeleton: Skeleton) -> Skeleton:
     for j, p in enumerate(skeleton.parents):
         if p >= 0 and skeleton.parents[swap[j]] != swap[p]:
             a, b = skeleton.joints[j], skeleton.joints[swap[j]]
-            why = f"the parents of {a} and {b} are not counterparts on the left and on the right"
-            raise HobbleError(f"skeleton {skeleton.name} cannot be mirrored: {why}")
+            problem = f"skeleton {skeleton.name} cannot be mirrored"
+            raise HobbleError(f"{problem}: the parents of {a} and {b} are no counterparts")
     ends = {}
     for name in skeleton.end_sites:
         # A joint without a counterpart keeps its own end site, mirrored.
@@ -113,14 +113,10 @@ def loop_clip(clip: Clip, times: int) -> Clip:
     HobbleError for a clip of less than four frames.
     """
     if len(clip) < 4:
-        raise HobbleError(
-            f"{clip.name}: {len(clip)} frames are too few to be repeated as a cycle; at least 4 are needed"
-        )
+        raise HobbleError(f"{clip.name}: {len(clip)} frames are too few for a cycle, which needs 4 at least")
     first, second, last = (_pose(clip, i) for i in (0, 1, -1))
-    repeats = (
-        np.linalg.norm(first - last, axis=-1).mean() < 0.5 * np.linalg.norm(first - second, axis=-1).mean()
-    )
-    cycle = clip.part(slice(0, -1)) if repeats else clip
+    step, gap = (np.linalg.norm(first - other, axis=-1).mean() for other in (second, last))
+    cycle = clip.part(slice(0, -1)) if gap < 0.5 * step else clip
     turn, shift = _move_between_cycles(cycle)
     reach = max(2, min(round(SEAM * clip.fps), len(cycle) // 2))
     while True:
@@ -232,10 +228,8 @@ def repair_defects(clip: Clip) -> tuple[Clip, int, list[str]]:
     mended = _copy(clip) if glitches else clip
     for frame, size, joint in glitches:
         _interpolate(mended, frame, frame)
-        sentences.append(
-            f"Frame {frame + 1} is off by {size:.0f} cm at {joint}. It was replaced by the mean of the "
-            "frames before and after it."
-        )
+        off = f"Frame {frame + 1} is off by {size:.0f} cm at {joint}"
+        sentences.append(f"{off}. It was replaced by the mean of the frames before and after it.")
     jumps, bridges = _pair_jumps(mended, find_jumps(mended))
     if not jumps and not bridges:
         return mended, 0, sentences

@@ -111,19 +111,16 @@ def tilt_problem(clip: Clip) -> Problem | None:
     if tilt is None:
         return None
     degrees, what = tilt
-    return Problem(
-        f"{what} by {degrees:.0f} degrees, so the whole world seems tilted",
-        "Make the floor level in the program that the clip comes from, and export the clip again.",
-    )
+    seen = f"{what} by {degrees:.0f} degrees, so the whole world seems tilted"
+    return Problem(seen, "Make the floor level in the program that the clip comes from, and export it again.")
 
 
 def _cycle_length(clip: Clip) -> int:
     """The frames of a cycle that the whole clip only repeats, at least twice; else those of the clip."""
     rotations = clip.rotations.reshape(len(clip), -1)
     same = np.flatnonzero(np.abs(rotations[: len(clip) // 2 + 1] - rotations[0]).max(axis=1) < SAME_POSE)
-    repeats = (
-        n for n in same[same > SHORTEST_CYCLE] if np.abs(rotations[n:] - rotations[:-n]).max() < SAME_POSE
-    )
+    same = same[same > SHORTEST_CYCLE]
+    repeats = (n for n in same if np.abs(rotations[n:] - rotations[:-n]).max() < SAME_POSE)
     return int(next(repeats, len(clip)))
 
 

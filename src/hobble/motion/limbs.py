@@ -14,7 +14,7 @@ from itertools import pairwise
 import numpy as np
 
 from hobble.core.quat import Array
-from hobble.core.skeleton import lowest_common_ancestor, path_between, path_to_root
+from hobble.core.skeleton import common_ancestor, path_between, path_to_root
 from hobble.motion.axes import bend_direction, degrees_between, unit
 from hobble.motion.body import SIDES, Body, middle
 from hobble.motion.names import are_twins, is_end, kind_score, limb_parts, part_of, side_of, side_of_pair
@@ -54,10 +54,6 @@ Triple = tuple[int, int, int]
 
 class Doubt(Exception):
     """It is uncertain which joints of a rig are which parts of the body."""
-
-
-class TwoFigures(Doubt):
-    """A rig with more than one body."""
 
 
 @dataclass(frozen=True)
@@ -165,9 +161,8 @@ class MovingRig:
         """
         below = [(c, d) for c in self.children[a] for d in self.children[b] if self.are_counterparts(c, d)]
         # Of equally long chains, the first counts.
-        longest = max(
-            (self.equal_chains(c, d) for c, d in below), key=lambda found: found[0], default=(0.0, (), ())
-        )
+        chains = (self.equal_chains(c, d) for c, d in below)
+        longest = max(chains, key=lambda found: found[0], default=(0.0, (), ()))
         return float(min(self.lengths[a], self.lengths[b])) + longest[0], (a, *longest[1]), (b, *longest[2])
 
     @cached_property
@@ -188,8 +183,8 @@ def find_body(names: Sequence[str], parents: Sequence[int], positions: Array) ->
     """Find the parts of a body. Also says whether the names of its joints distinguish left and right.
 
     names, parents: of the J joints; the root's parent is -1. positions: (F, J, 3) of the joints in the world,
-    in any unit and along any axes. Raises TwoFigures if there is a second body, and Doubt if the rig and the
-    motion do not determine the parts.
+    in any unit and along any axes. Raises Doubt if there is a second body, or if the rig and the motion do
+    not determine the parts.
     """
     sampled = np.unique(np.linspace(0, len(positions) - 1, SAMPLES).round().astype(int))
     rig = MovingRig(names, parents, positions[sampled])
@@ -199,13 +194,13 @@ def find_body(names: Sequence[str], parents: Sequence[int], positions: Array) ->
     arms = _left_arm_first(rig, legs, arms)
     # The body's hips are the joint from which both hip joints (the tops of the thighs) hang.
     tops = legs.joints[0][0], legs.joints[1][0]
-    hips = lowest_common_ancestor(parents, tops)
+    hips = common_ancestor(parents, tops)
     hips = parents[hips] if hips in tops else hips
     trunk = [j for j in path_between(parents, hips, arms.hub) if j not in path_to_root(parents, hips)]
     if len(trunk) > 1 and part_of(names[trunk[-1]]) == "neck" and head != trunk[-1]:
         neck = (trunk.pop(), *neck)  # in rigs of 3ds Max the neck carries the arms
     if other := _find_second_figure(rig, hips):
-        raise TwoFigures(f"it has two figures, {names[hips]} and {names[other]}")
+        raise Doubt(f"it has two figures, {names[hips]} and {names[other]}. Export each figure on its own")
     of_arms = {side: (_find_clavicle(rig, arms, k), *arms.joints[k]) for k, side in enumerate(SIDES)}
     of_legs = {side: (*legs.joints[k], _find_toe(rig, legs, k)) for k, side in enumerate(SIDES)}
     return Body(hips, tuple(trunk), neck, head, of_arms, of_legs), sided
@@ -318,10 +313,8 @@ def _without_hub_joints(rig: MovingRig, pair: Limbs) -> Limbs:
     """The pair without the first joints of both chains that lie at the same place, as LHipJoint and RHipJoint
     of CMU do. A thigh or an upper arm begins on its own side of the body."""
     one, other = pair.chains
-    apart = (
-        i for i, (a, b) in enumerate(zip(one, other, strict=True)) if rig.distance(a, b) > 0.01 * rig.size
-    )
-    first = next(apart, 0)
+    pairs = enumerate(zip(one, other, strict=True))
+    first = next((i for i, (a, b) in pairs if rig.distance(a, b) > 0.01 * rig.size), 0)
     return replace(pair, chains=(one[first:], other[first:]))
 
 
@@ -456,9 +449,8 @@ def _left_arm_first(rig: MovingRig, legs: Limbs, arms: Limbs) -> Limbs:
     Raises Doubt if places and names disagree.
     """
     hips, shoulders = (unit(rig.vectors(limbs.joints[1][0], limbs.joints[0][0])) for limbs in (legs, arms))
-    side = float(
-        np.mean(np.sum(hips * shoulders, axis=-1))
-    )  # positive if arm 0 is on the side of the left leg
+    # Positive if arm 0 is on the side of the left leg.
+    side = float(np.mean(np.sum(hips * shoulders, axis=-1)))
     votes = _named_sides(rig, arms)
     named = votes[0] * votes[1] < 0
     as_named = side * np.sign(votes[0] - votes[1]) if named else abs(side)

@@ -73,12 +73,10 @@ def summarise_clips(
     skeleton_folder: the folder of the skeleton files. options: how the files are read (the section `motion`
     of a data set). progress: shows how far the work has come, while it hands on the files.
     """
-    clips, files = [], list(clips_in(folder, MOTION_SUFFIXES).values())
+    clips, files, options = [], list(clips_in(folder, MOTION_SUFFIXES).values()), options or ClipMotion()
     for file in progress(files):
         try:
-            made = make_clip(
-                file, skeleton, skeleton_folder, file.stem, skeleton.stem, options or ClipMotion()
-            )
+            made = make_clip(file, skeleton, skeleton_folder, file.stem, skeleton.stem, options)
             clips.append(summary_of_clip(*made))
         except HobbleError as error:
             # In the table, the message follows the clip's name.
@@ -134,10 +132,7 @@ def standing_notes(clips: Sequence[ClipSummary]) -> list[str]:
     """
     if not clips or any(clip.standing > 0 or clip.refused for clip in clips):
         return []
-    return [
-        "Nobody stands in these clips, so the character will not learn to stand, to start or to stop. "
-        "Add a clip in which somebody stands, starts and stops."
-    ]
+    return ["Nobody stands in these clips, so the character will not learn to stand, start or stop."]
 
 
 def format_table(clips: Sequence[ClipSummary], notes: Sequence[str]) -> str:
@@ -167,10 +162,7 @@ FRAMES, SECONDS = 40, 4.0  # the small figure shows up to 40 frames from the mid
 MOST_READ = 600  # clips; as many make a page of 10 MB in half a minute
 MOST_NOTES = 40  # at most this many notes above the table are shown, such as notes on duplicates
 LABELS = ("cycles", "seconds", "warnings")  # keys of `labels/<clip>.json` that the page shows
-SAMPLED = (
-    "To keep this page small, only {} clips were read, clips with warnings first. Only these have a figure "
-    "and all numbers. Duplicates were searched only among them."
-)
+SAMPLED = "To keep this page small, only {} clips were read and compared, those with warnings first."
 GOLDEN = 0.6180339887498949  # golden ratio - 1; its multiples, modulo 1, are spread evenly over 0..1
 # The columns of texts, then those of numbers.
 COLUMNS = (
@@ -232,9 +224,8 @@ def look_page(
     the clips of `choose_clips`, one after another.
     """
     summaries = [summary_of_report(report) for report in reports]
-    chosen = choose_clips(
-        [bool(summary.warnings or of["warnings"]) for summary, of in zip(summaries, labels, strict=True)]
-    )
+    warned = (summary.warnings or of["warnings"] for summary, of in zip(summaries, labels, strict=True))
+    chosen = choose_clips([bool(warnings) for warnings in warned])
     figures, foot_down = [], {}
     for n in chosen:
         clip, contacts = read(n)

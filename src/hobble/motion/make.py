@@ -25,15 +25,7 @@ from hobble.motion.other_formats import read_motion
 from hobble.motion.physics import pace_problem, rate_problem
 from hobble.motion.read import MOST_JOINT_POSES, Bvh, check_angles, decode_channels, frame_rate
 from hobble.motion.rest_pose import why_not_standing, with_upright_rest
-from hobble.motion.retarget import (
-    KNEE_AHEAD,
-    KNEE_BACKWARD,
-    compare_motions,
-    difference_problems,
-    knee_problem,
-    plan,
-    retarget_clip,
-)
+from hobble.motion.retarget import compare_motions, difference_problems, knee_problem, plan, retarget_clip
 from hobble.motion.rig import LENGTH_OF_LEG, RigMatch, below_hips, body_in_file, likely_unit, match_rig
 from hobble.motion.skeleton_file import KnownSkeleton, load_skeleton
 
@@ -122,8 +114,7 @@ def clip_problems(
     """
     found: list[Problem | None] = []
     if options.defects != "leave":
-        found.append(knee_problem(clip, KNEE_AHEAD if options.handedness == "auto" else KNEE_BACKWARD))
-        found.append(pace_problem(clip))
+        found += [knee_problem(clip, options.handedness), pace_problem(clip)]
         found.append(tilt_problem(clip) if options.up == "auto" else None)
     return [*found, rate_problem(clip, source_fps, scale)]
 
@@ -152,11 +143,9 @@ def _check_length(file: Bvh, clip: Clip, target: Skeleton, options: ClipMotion) 
     frames = len(clip) / clip.fps * options.fps * options.loops
     if frames * max(len(clip.skeleton.joints), len(target.joints)) > MOST_JOINT_POSES:
         problem = f"{len(clip)} frames at {clip.fps:g} a second become {frames:.0f} at {options.fps:g}"
-        raise InputError(
-            file.path,
-            f"{problem}; frames times joints may be at most {MOST_JOINT_POSES}",
-            fix="Cut it into shorter clips, set its source_fps, or set fewer loops.",
-        )
+        most = f"frames times joints may be at most {MOST_JOINT_POSES}"
+        fix = "Cut it into shorter clips, set its source_fps, or set fewer loops."
+        raise InputError(file.path, f"{problem}; {most}", fix=fix)
 
 
 def _check_finite(file: Bvh, clip: Clip) -> None:
@@ -229,9 +218,8 @@ def _load_rig(file: Bvh, target: KnownSkeleton, folder: str | Path, options: Cli
         clip = whole
         match = known or RigMatch(UNKNOWN_RIG, body.roles(clip.skeleton.joints))
     leg = _leg_length(file, clip, body)
-    stands = (
-        match.is_usable or why_not_standing(body, LENGTH_OF_LEG / leg * rest_positions(clip.skeleton)) is None
-    )
+    rest = LENGTH_OF_LEG / leg * rest_positions(clip.skeleton)
+    stands = match.is_usable or why_not_standing(body, rest) is None
     if not stands and on_four_legs(body, clip.positions):
         fix = "Only clips of figures with two legs can be used."
         raise InputError(file.path, "the figure goes on four legs", fix=fix)

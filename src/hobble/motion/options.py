@@ -23,9 +23,7 @@ class Download(Section):
         description="address of a clip; {clip} is the clip's name, {subject} is the name up to the first _"
     )
     checksums: RelativePath | None = Field(
-        None,
-        description="file of SHA-256 sums, as sha256sum writes them; its path is relative to the folder of "
-        "the data set's file. Without it, the listed clips are downloaded and not checked",
+        None, description="file of SHA-256 sums beside the data set's file; without it no clip is checked"
     )
 
     @model_validator(mode="after")
@@ -53,22 +51,17 @@ class MotionOptions(Section):
     unit: Literal["auto"] | PositiveFloat = Field("auto", description="centimetres per unit of the file")
     up: Literal["auto", "Y", "Z"] = Field("auto", description="axis of the file that points up")
     handedness: Literal["auto", "right", "left"] = Field(
-        "auto",
-        description="handedness of the file's coordinates; left-handed ones are converted by negating x. "
-        "`auto` needs joint names that say left and right",
+        "auto", description="of the file's coordinates; `auto` needs joint names that say left and right"
     )
     proportions: Literal["skeleton", "clip"] = Field(
         "skeleton", description="retarget onto the skeleton's bone lengths, or keep each clip's own"
     )
     defects: Literal["repair", "leave"] = Field(
         "repair",
-        description="what to do with broken frames and with a floor that is not at height 0. `repair` mends "
-        "and reports them, `leave` takes the clip as it is, like the code of Holden et al.",
+        description="mend and report broken frames and a floor off height 0, or leave both",
     )
     accept_doubt: bool = Field(
-        False,
-        description="use clips that would be refused because something in them is doubtful (a tilted world, "
-        "knees that point aside, sliding feet, an uncertain height); the report says what",
+        False, description="use clips that would be refused for a doubt (tilt, knees, sliding feet, height)"
     )
     loops: Positive = Field(1, description="how many times a clip of one cycle is played in a row")
 

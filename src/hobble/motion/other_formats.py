@@ -70,18 +70,11 @@ def read_fbx(path: Path, animation: str | None = None) -> Bvh:
         elif blender := shutil.which("blender"):
             command = [blender, "--background", "--factory-startup", "--python-expr", BLENDER_SCRIPT, "--"]
         else:
-            fix = (
-                "Install it (`pip install bpy`, or `blender` on the PATH), or export the clip as BVH or glTF."
-            )
+            fix = "Install it (`pip install bpy`, or `blender` on the PATH), or export BVH or glTF."
             raise InputError(path, "only Blender can read FBX files, and it is not installed", fix=fix)
         try:
-            done = subprocess.run(
-                [*command, str(path.resolve()), str(target)],
-                capture_output=True,
-                text=True,
-                check=False,
-                timeout=BLENDER_SECONDS,
-            )
+            command += [str(path.resolve()), str(target)]
+            done = subprocess.run(command, capture_output=True, text=True, timeout=BLENDER_SECONDS)
             last = [line for line in (done.stderr or done.stdout).splitlines() if line.strip()][-1:]
         except subprocess.TimeoutExpired:
             last = [f"it took more than {BLENDER_SECONDS} seconds"]
@@ -203,15 +196,13 @@ class _Scene:
         turns = quat.mul(turns, quat.inv(rest_turns))
         offsets = rest_places - rest_places[self.parents]
         offsets[0] = 0.0
-        channels, columns = [], []
+        channels, columns, least = [], [], MOVES * float(np.linalg.norm(offsets, axis=-1).max())
         for j, p in enumerate(self.parents):
             local, place, moves = turns[:, j], places[:, j], True
             if p >= 0:
                 local = quat.mul(quat.inv(turns[:, p]), local)
                 place = quat.rotate(quat.inv(turns[:, p]), place - places[:, p])
-                moves = np.abs(place - offsets[j]).max() > MOVES * float(
-                    np.linalg.norm(offsets, axis=-1).max()
-                )
+                moves = np.abs(place - offsets[j]).max() > least
             channels.append((POSITIONS if moves else ()) + ROTATIONS)
             columns += [place] if moves else []
             columns.append(np.degrees(quat.to_euler(local, ORDER)))

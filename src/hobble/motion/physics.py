@@ -85,11 +85,8 @@ def find_balance(clip: Clip) -> Balance | None:
     speed = np.sum(velocity * ahead, axis=-1) / np.sqrt(GRAVITY * leg)
     lean = np.radians(np.interp(speed, RUN_SPEEDS, LEAN))[:, None] * ahead
     push = acceleration / (GRAVITY + acceleration[:, 1:2])
-    slow = {  # role of a foot's joint -> (F,) whether the joint is slow
-        f"{side}_{part}": _speed(at[f"{side}_{part}"], reach) * fps < SLOW_FOOT * leg
-        for side in SIDES
-        for part in ("toe", "heel")
-    }
+    feet = [f"{side}_{part}" for side in SIDES for part in ("toe", "heel")]
+    slow = {role: _speed(at[role], reach) * fps < SLOW_FOOT * leg for role in feet}  # role -> (F,)
     ups, seconds = [], []
     for side, other in (SIDES, SIDES[::-1]):
         # `alone`: the frames in which the foot of this side stands alone.
@@ -198,10 +195,8 @@ def rate_problem(clip: Clip, source_fps: float, scale: float) -> Problem | None:
     # The usual rate nearest to the one that explains the motion, but never the file's own.
     rate = min((r for r in RATES if r != source_fps), key=lambda r: abs(np.log(r * times / source_fps)))
     # Accelerations grow with the square of the speed.
-    return Problem(
-        f"the body's accelerations are {times**2:.{1 if times > 1 else 2}f} times those of people in steps "
-        f"of {step:.0f} cm; at {rate} fps they would be usual (source_fps: {rate})"
-    )
+    seen = f"the body's accelerations are {times**2:.{1 if times > 1 else 2}f} times those of people in steps"
+    return Problem(f"{seen} of {step:.0f} cm; at {rate} fps they would be usual (source_fps: {rate})")
 
 
 def times_too_fast(clip: Clip, steps: int, scale: float = 1.0) -> float | None:

@@ -158,9 +158,8 @@ def _is_trunk_twisted(sample: BodySample, zero: Frames) -> bool:
     """
     in_motion = _trunk_frames(_upright_moments(sample, False), zero)
     joints = (sample.body.hips, *sample.body.trunk)
-    return (
-        max(degrees_between(*(quat.rotate(f[j], LEFT) for f in (zero, in_motion))) for j in joints) > TRUSTED
-    )
+    lefts = ([quat.rotate(frames[j], LEFT) for j in joints] for frames in (zero, in_motion))
+    return bool(degrees_between(*map(np.array, lefts)).max() > TRUSTED)
 
 
 # The trunk in motion
@@ -209,9 +208,8 @@ def _trunk_frames(sample: BodySample, zero: Frames | None) -> Frames:
         frames[body.head] = chest
     else:  # the head is assumed to look ahead on average
         ahead = unit(np.cross(sample.chest_left + sample.hips_left, UP) * [1, 0, 1])
-        up, ahead = (
-            sample.mean_in_joint_axes(body.head, np.broadcast_to(v, ahead.shape)) for v in (UP, ahead)
-        )
+        upward = np.broadcast_to(UP, ahead.shape)
+        up, ahead = (sample.mean_in_joint_axes(body.head, v) for v in (upward, ahead))
         frames[body.head] = aligned(up, UP, ahead, AHEAD)
     return frames
 
@@ -442,13 +440,8 @@ def _with_rest_pose(
     for joint in further:
         path = path_to_root(clip.skeleton.parents, joint)[1:]
         above[joint] = next((j for j in path if j in above), body.hips)
-    skeleton = Skeleton(
-        clip.skeleton.name,
-        tuple(names[j] for j in joints),
-        (-1, *(new[above[j]] for j in joints[1:])),
-        np.zeros((len(joints), 3)),
-        roles,
-    )
+    parents, offsets = (-1, *(new[above[j]] for j in joints[1:])), np.zeros((len(joints), 3))
+    skeleton = Skeleton(clip.skeleton.name, tuple(names[j] for j in joints), parents, offsets, roles)
     rotations, positions = (np.stack([of[j] for j in joints], axis=1) for of in (turned, places))
     return _clip_from_world(clip, skeleton, rotations, positions), body.renumbered(new)
 

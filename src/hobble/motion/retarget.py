@@ -99,15 +99,12 @@ def plan(source: Skeleton, target: Skeleton, followed_joints: Mapping[str, str])
     the roles hips and head, and on both sides shoulder, hip, knee, heel and toe. Raises HobbleError if the
     target's hips, or a hip, knee or heel, follows nothing, or if a bone of a leg has no length.
     """
-    pairs = sorted(
-        (target.index(follower), source.index(leader)) for follower, leader in followed_joints.items()
-    )
+    pairs = sorted((target.index(mine), source.index(theirs)) for mine, theirs in followed_joints.items())
     joints, follows = (np.array(column) for column in zip(*pairs, strict=True))
     for role in ("hips", *(f"{s}_{part}" for s in SIDES for part in ("hip", "knee", "heel"))):
         if target.role(role) not in joints:
-            raise HobbleError(
-                f"no joint of {source.name} moves {target.roles[role]} ({role}) of {target.name}"
-            )
+            joint = f"{target.roles[role]} ({role}) of {target.name}"
+            raise HobbleError(f"no joint of {source.name} moves {joint}")
     # The upright pose has the body's left at +X, up at +Y and forward at +Z.
     upright_to_source, upright_to_target = rest_frame(source), rest_frame(target)
     target_to_upright = quat.inv(upright_to_target)
@@ -356,9 +353,8 @@ class _Leg:
         upper, lower = self.rotations[:, self.hip], self.rotations[:, self.knee]
         thigh = quat.rotate(upper, self.thigh)
         pole = bend_direction(np.zeros(3), thigh, thigh + quat.rotate(lower, self.shank))
-        pole += np.maximum(STRAIGHT - np.linalg.norm(pole, axis=-1), 0.0)[:, None] * quat.rotate(
-            upper, self.forward
-        )
+        straight = np.maximum(STRAIGHT - np.linalg.norm(pole, axis=-1), 0.0)[:, None]
+        pole = pole + straight * quat.rotate(upper, self.forward)
         lengths = float(np.linalg.norm(self.thigh)), float(np.linalg.norm(self.shank))
         knee_at, ankle_at = two_bone_knee(start, ankle, pole, *lengths)
         self.rotations[:, self.hip] = aim_bone(upper, self.thigh, knee_at - start)
@@ -446,15 +442,16 @@ def difference_problems(path: Path, differences: dict[str, Any], rig: str) -> li
     return out
 
 
-def knee_problem(clip: Clip, least: float) -> Problem | None:
+def knee_problem(clip: Clip, handedness: str) -> Problem | None:
     """A knee that, while it is bent, does not point forward.
 
-    The mean cosine of the angle between where the knee points and where the body faces is less than `least`.
+    The mean cosine of the angle between where the knee points and where the body faces is less than
+    KNEE_AHEAD, or KNEE_BACKWARD if the option `handedness` is not "auto".
     A frame counts by how much further than BENT_KNEE the knee bends, since a nearly straight leg hardly shows
     where its knee points, and not at all if the thigh is lifted. A knee of which less than a tenth of the
     frames count is not judged.
     """
-    at = clip.at_roles()
+    at, least = clip.at_roles(), KNEE_AHEAD if handedness == "auto" else KNEE_BACKWARD
     # The body's left times its up gives its forward.
     up = unit(at["head"] - at["hips"])
     ahead = unit(np.cross(at["left_hip"] - at["right_hip"], up))

@@ -18,7 +18,7 @@ from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton, path_between, path_to_root, rest_positions
 from hobble.motion.axes import body_axes, unit
 from hobble.motion.body import ARM, LEG, SIDES, Body, body_by_roles, with_fingers
-from hobble.motion.limbs import Doubt, TwoFigures, find_body
+from hobble.motion.limbs import Doubt, find_body
 from hobble.motion.skeleton_file import KnownSkeleton, load_skeleton
 
 # Centimetres: cm, inch, m, mm, the unit of CMU files (an inch / 0.45), and foot.
@@ -88,19 +88,11 @@ def below_hips(clip: Clip, target: KnownSkeleton, folder: str | Path) -> tuple[C
         moved = moved[:, joints]
         moved[:, 0] = 0.0
         moved = moved if np.ptp(moved, axis=0).max() > 1e-3 * np.abs(rig.offsets).max() else None
-    below = replace(
-        clip,
-        skeleton=replace(
-            rig,
-            joints=names,
-            parents=tuple(-1 if j == hips else joints.index(rig.parents[j]) for j in joints),
-            offsets=rig.offsets[joints],
-            end_sites={joint: site for joint, site in rig.end_sites.items() if joint in names},
-        ),
-        rotations=quat.continuous(rotations),
-        root=clip.positions[:, hips],
-        translations=moved,
-    )
+    parents = tuple(-1 if j == hips else joints.index(rig.parents[j]) for j in joints)
+    ends = {joint: site for joint, site in rig.end_sites.items() if joint in names}
+    own = replace(rig, joints=names, parents=parents, offsets=rig.offsets[joints], end_sites=ends)
+    rotations, root = quat.continuous(rotations), clip.positions[:, hips]
+    below = replace(clip, skeleton=own, rotations=rotations, root=root, translations=moved)
     above = ", ".join(rig.joints[j] for j in path_to_root(rig.parents, hips)[:0:-1])
     return below, [f"The joints above {name} ({above:.100}) were left out; their motion was added to it."]
 
@@ -141,11 +133,8 @@ def has_equal_rest_pose(rig: Skeleton, known: Skeleton) -> bool:
     if "left_toe" not in rig.roles:
         return False
     of_rig, of_known = _bone_directions(rig), _bone_directions(known)
-    return all(
-        of_rig[end] @ of_known[end] >= np.cos(np.radians(MOST_APART[end.partition("_")[2]]))
-        for end in of_known
-        if end in of_rig
-    )
+    most = {end: np.radians(MOST_APART[end.partition("_")[2]]) for end in of_known if end in of_rig}
+    return all(of_rig[end] @ of_known[end] >= np.cos(angle) for end, angle in most.items())
 
 
 def _bone_directions(skeleton: Skeleton) -> dict[str, Array]:
@@ -233,8 +222,6 @@ def body_in_file(path: Path, raw: Clip, known: RigMatch | None, handedness: str)
         return body_by_roles(rig), []
     try:
         body, sided = find_body(rig.joints, rig.parents, raw.positions)
-    except TwoFigures as error:
-        raise InputError(path, str(error), fix="Export each figure on its own.") from None
     except Doubt as doubt:
         problem = f"it is in doubt which joints are which parts of a body: {doubt}"
         draft = f"`hobble rig {path.name} --to config/skeletons/<name>.yaml`"
@@ -244,10 +231,7 @@ def body_in_file(path: Path, raw: Clip, known: RigMatch | None, handedness: str)
     if not sided:
         unsided = "its joint names do not tell left from right"
         if handedness == "auto":
-            fix = (
-                "Set motion.handedness (option --handedness) to right, the standard of BVH files, or to left "
-                "if the program that wrote the file has left-handed coordinates."
-            )
+            fix = "Set motion.handedness (option --handedness) to right, as most BVH files are, or to left."
             raise InputError(path, f"{unsided}, and a mirror image moves like a person, too", fix=fix)
         notes.append(f"{unsided.capitalize()}, so motion.handedness: {handedness} was used.")
         if handedness == "left":
@@ -267,9 +251,8 @@ def _check_bones(path: Path, rig: Skeleton, positions: Array, name: str) -> None
             if not set(roles) <= set(rig.roles):
                 continue
             a, b = (rig.role(role) for role in roles)
-            low, median, high = np.percentile(
-                np.linalg.norm(positions[:, b] - positions[:, a], axis=-1), [3, 50, 97]
-            )
+            lengths = np.linalg.norm(positions[:, b] - positions[:, a], axis=-1)
+            low, median, high = np.percentile(lengths, [3, 50, 97])
             if high - low > STRETCH * median:
                 ends = f"{rig.joints[a]} ({roles[0]}) and {rig.joints[b]} ({roles[1]})"
                 problem = f"{ends} are {low:.3g} to {high:.3g} units apart, so a joint between them bends"

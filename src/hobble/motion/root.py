@@ -42,10 +42,8 @@ def across_body(skeleton: Skeleton, positions: Array) -> Array:
 
     positions: (..., J, 3) of the joints.
     """
-    shoulders = (
-        positions[..., skeleton.role("left_shoulder"), :] - positions[..., skeleton.role("right_shoulder"), :]
-    )
-    hips = positions[..., skeleton.role("left_hip"), :] - positions[..., skeleton.role("right_hip"), :]
+    pairs = ([skeleton.role(f"{s}_{part}") for s in ("left", "right")] for part in ("shoulder", "hip"))
+    shoulders, hips = (positions[..., a, :] - positions[..., b, :] for a, b in pairs)
     across = shoulders + hips
     return across / np.maximum(np.linalg.norm(across, axis=-1, keepdims=True), 1e-9)
 

@@ -19,7 +19,7 @@ from pydantic import ValidationError
 
 from hobble.core.errors import InputError
 from hobble.core.files import printable, read_text, read_yaml
-from hobble.core.skeleton import Skeleton, SkeletonData, lowest_common_ancestor, path_between, path_to_root
+from hobble.core.skeleton import Skeleton, SkeletonData, common_ancestor, path_between, path_to_root
 from hobble.motion.body import ARM, LEG, SIDES, TRUNK
 from hobble.motion.names import side_of
 
@@ -148,8 +148,7 @@ def _hub_mistakes(
     """The arms hang from the chest or the neck, and the legs from a joint near the hips."""
     index = {role: names.index(joint) for role, joint in roles.items()}
     arms, legs = (
-        lowest_common_ancestor(parents, [index[f"{side}_{part}"] for side in SIDES])
-        for part in ("shoulder", "hip")
+        common_ancestor(parents, [index[f"{side}_{part}"] for side in SIDES]) for part in ("shoulder", "hip")
     )
     if "chest" in index and arms not in (index["chest"], index.get("neck")):
         yield "roles", "chest", f"chest is {roles['chest']}, but the arms hang from {names[arms]}", None
