@@ -5,7 +5,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import yaml
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
@@ -14,12 +13,8 @@ from hobble.core import quat
 from hobble.core.files import load_npz
 from hobble.core.skeleton import NEEDED_ROLES, Skeleton, forward_kinematics, rest_positions
 from hobble.figure.mesh import FIGURE, Mesh, body_mesh, mesh_key, modelled_pose
-from hobble.figure.pack import links_of_bones, part_spheres, whole_weights
-
-
-def rig(root: Path, name: str) -> Skeleton:
-    data = yaml.safe_load((root / f"config/skeletons/{name}.yaml").read_text())
-    return Skeleton.from_dict({"name": name, **{k: v for k, v in data.items() if k != "maps"}})
+from hobble.figure.pack import links_of_bones, whole_weights
+from hobble.motion.skeleton_file import load_skeleton
 
 
 def edges(mesh: Mesh) -> np.ndarray:
@@ -65,7 +60,11 @@ def test_the_surface_is_closed_smooth_in_one_piece_and_of_a_persons_volume(
 def test_every_rig_gets_a_body_of_its_size(root: Path, holden31: Skeleton, name: str) -> None:
     """Also one without a joint for spine, chest and neck: they are where a person has them."""
     needed = {role: joint for role, joint in holden31.roles.items() if role in NEEDED_ROLES}
-    skeleton = replace(holden31, roles=needed) if name == "no chest" else rig(root, name)
+    skeleton = (
+        replace(holden31, roles=needed)
+        if name == "no chest"
+        else load_skeleton(root / f"config/skeletons/{name}.yaml").skeleton
+    )
     made, rest = body_mesh(skeleton), rest_positions(skeleton)
     assert closed(made)
     assert len(made.bones) == 19
@@ -102,8 +101,6 @@ def test_a_corner_has_at_most_four_bones_whose_shares_sum_to_one(mesh: Mesh) -> 
     steps = whole_weights(mesh.weights)
     assert steps.sum(axis=1).tolist() == [255] * len(steps)
     assert np.abs(steps / 255 - mesh.weights).max() < 0.02
-    balls = part_spheres(mesh)
-    assert 1 < balls[:, 3].min() <= balls[:, 3].max() < 25
 
 
 def test_a_rigid_movement_of_all_bones_moves_the_body_rigidly(mesh: Mesh) -> None:
@@ -135,7 +132,5 @@ def test_each_link_colours_the_part_of_the_body_that_it_names(mesh: Mesh, holden
     assert lies["LeftUpLeg-LeftLeg"] == "LeftUpLeg"
     assert lies["Hips-LowerBack"] == "Spine"
     assert lies["LeftHand-LThumb"] == "LeftHand"
-    hyphens = holden31.joints[1].replace("L", "L-", 1)
-    renamed = tuple(hyphens if name == holden31.joints[1] else name for name in holden31.joints)
-    skeleton = replace(holden31, joints=renamed)
-    assert any(links_of_bones(skeleton, (f"Hips-{hyphens}",)))
+    skeleton = replace(holden31, joints=("Hips", "L-HipJoint", *holden31.joints[2:]))
+    assert any(links_of_bones(skeleton, ("Hips-L-HipJoint",)))
