@@ -68,7 +68,7 @@ def test_an_edit_runs_what_depends_on_it(copied, labels: bool) -> None:
         if path.is_file() and inside in ("Snakefile", "config", "profiles", "src", "workflow"):
             path.touch()
     pages = {"report/page.html.j2": "{# a comment #}", "report/web/charts.js": "// a comment"}
-    edits = {"labels/contacts.py": "_EDITED = 1"} if labels else {**pages, "core/quat.py": "# a comment"}
+    edits = {"labels/footfall.py": "_EDITED = 1"} if labels else {**pages, "core/quat.py": "# a comment"}
     for file, line in edits.items():
         (source / file).write_text(f"{(source / file).read_text()}\n{line}\n")
     copied.edit("config/datasets/tiny.yaml", "held_out:", "motion: {up: auto}\nheld_out:")  # the default
