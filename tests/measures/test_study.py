@@ -159,25 +159,23 @@ def test_the_command_writes_fourteen_tables_with_the_published_beside_ours(
     assert "| Ferre et al. (2019) | yes: 5 (62 %) | no: 3 (38 %) |  |  |  |" in text
 
 
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        (lambda d: d | {"study": "old"}, "answers another questionnaire"),
-        (lambda d: d | {"answers": d["answers"][1:]}, "film 13 is not answered"),
-        (lambda d: d | {"answers": [d["answers"][0], *d["answers"]]}, "film 13 is answered twice"),
-        (lambda d: d | {"answers": [d["answers"][0] | {"parts": ["tail"]}]}, "answer 1: no such part: tail"),
-        (lambda d: d | {"answers": [d["answers"][0] | {"fluidity": 6}]}, "answer 1: fluidity: .* 'fair'"),
-        (lambda d: d | {"answers": [d["answers"][0] | {"film": 14}]}, "there is no film 14"),
-        (lambda d: d | {"answers": 3}, "has no list `answers`"),
-        (lambda d: [d], "answers another questionnaire"),
-    ],
-)
+WRONG = [  # change of a file of answers, message
+    (lambda d: d | {"study": "old"}, "answers another questionnaire"),
+    (lambda d: d | {"answers": d["answers"][1:]}, "film 13 is not answered"),
+    (lambda d: d | {"answers": [d["answers"][0], *d["answers"]]}, "film 13 is answered twice"),
+    (lambda d: d | {"answers": [d["answers"][0] | {"parts": ["tail"]}]}, "answer 1: no such part: tail"),
+    (lambda d: d | {"answers": [d["answers"][0] | {"fluidity": 6}]}, "answer 1: fluidity: .* 'fair'"),
+    (lambda d: d | {"answers": [d["answers"][0] | {"film": 14}]}, "there is no film 14"),
+    (lambda d: d | {"answers": 3}, "has no list `answers`"),
+    (lambda d: [d], "answers another questionnaire"),
+]
+
+
+@pytest.mark.parametrize(("change", "message"), WRONG)
 def test_a_malformed_file_of_answers_is_refused_with_its_place(
-    tmp_path: Path, change: Callable[[Any], Any], message: str
+    tmp_path: Path, change: Any, message: str
 ) -> None:
-    study = module.read_study(write_study(tmp_path))
-    path = write(tmp_path, "someone", printed_answer(0))
+    study, path = module.read_study(write_study(tmp_path)), write(tmp_path, "someone", printed_answer(0))
     path.write_text(json.dumps(change(json.loads(path.read_text()))))
-    with pytest.raises(InputError, match=message) as error:
+    with pytest.raises(InputError, match=rf"someone\.json: .*{message}"):
         module.read_answers(path, study)
-    assert "someone.json" in str(error.value)

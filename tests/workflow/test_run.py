@@ -9,6 +9,7 @@ import pytest
 
 from hobble.engine.compile import LIBRARIES
 from hobble.measures.measure import all_measures
+from hobble.report.parts import format_number
 from tests.faults.same import main as compare_runs
 
 pytestmark = pytest.mark.workflow
@@ -35,7 +36,7 @@ def test_the_report_and_all_other_results_are_made(finished) -> None:
     injury = json.loads((results / "evaluation/injury.json").read_text())
     assert injury["applies"]
     page = (finished.folder / TARGET).read_text()
-    assert f"{accuracy['held_out']['position_error_cm']:.1f}" in page
+    assert f"{format_number(accuracy['held_out']['position_error_cm'])} cm per joint on average" in page
 
 
 def test_a_second_call_has_nothing_to_do(finished) -> None:
