@@ -16,6 +16,7 @@ from hobble.motion.edit import mirror_clip
 from hobble.workflow.project import Project
 
 REPORT = LabelReport("straight", "automatic", "automatic", "right", "extend", 0)
+NAMED = {"name": "a", "version_number": 0, "ground": "flat"}
 
 
 def test_hurt_versions_of_the_synthetic_clips_hurt_all_thirty_links(root, holden31) -> None:
@@ -70,9 +71,7 @@ def test_without_in_between_no_cycle_has_a_severity_in_between(made, mirrored) -
     shares = []
     for in_between in (False, True):
         options = Hurt(severities=(10.0,), seconds=5, at_once=1, in_between=in_between, longest=1)
-        hurt, report, _ = hurt_version(
-            clip, labels, REPORT, options, name="a", version_number=0, ground="flat"
-        )
+        hurt, report, _ = hurt_version(clip, labels, REPORT, options, **NAMED)
         own = hurt.labels
         if mirrored:
             own, _ = mirror_labels(own, report, mirror_clip(hurt.clip, "image"))
@@ -101,9 +100,7 @@ def test_the_shown_severity_follows_the_requested_one(made, hurting, holden31) -
 def test_guarding_changes_in_a_version_and_the_channel_reads_its_course(made) -> None:
     """In one half of a stretch the body guards as much as it does not in the other half."""
     clip, labels, _ = made("straight")
-    hurt, _, course = hurt_version(
-        clip, labels, REPORT, Hurt(seconds=5), name="a", version_number=0, ground="flat"
-    )
+    hurt, _, course = hurt_version(clip, labels, REPORT, Hurt(seconds=5), **NAMED)
     frames, values = np.array(course)
     assert (np.diff(frames) > 0).all()
     assert values[0] == values[1] != values[2]

@@ -25,12 +25,8 @@ def feet_only(skeleton: Skeleton, right: np.ndarray, left: np.ndarray, hips: np.
     translations = np.tile(skeleton.offsets, (frames, 1, 1))
     for role, place in (("right_heel", right), ("left_heel", left)):
         joint = skeleton.role(role)
-        rest = np.zeros(3)
-        parent = skeleton.parents[joint]
-        while parent > 0:
-            rest = rest + skeleton.offsets[parent]
-            parent = skeleton.parents[parent]
-        translations[:, joint] = place - hips - rest
+        above = skeleton.path_up(skeleton.parents[joint])[:-1]  # without the root
+        translations[:, joint] = place - hips - skeleton.offsets[above].sum(axis=0)
     return Clip(name, skeleton, 60.0, rotations, hips, translations)
 
 
@@ -50,14 +46,7 @@ def stepping(landings: np.ndarray, swing: int, stride: float, frames: int, side:
 def walker(holden31: Skeleton) -> Callable[..., Clip]:
     """Makes a walk: the right foot lands every 2 `half` frames from `start`, the left at `limp` of that."""
 
-    def make(
-        frames: int = 600,
-        half: int = 30,
-        limp: float = 0.5,
-        start: int = 40,
-        swing: int = 24,
-        stride: float = 120.0,
-    ) -> Clip:
+    def make(frames=600, half=30, limp=0.5, start=40, swing=24, stride=120.0) -> Clip:
         right = np.arange(start, frames - 10, 2 * half, dtype=float)
         left = right + 2 * half * limp
         left = left[left < frames - 10]

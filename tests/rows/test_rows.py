@@ -59,14 +59,8 @@ def rows_as_configured(shared: Path, root: Path, margins: str = "drop", **terrai
     """The rows of the reference clip, made by all stages with the options of the configuration."""
     skeletons = root / "config" / "skeletons"
     folder = shared / "mocap" / "pfnn"
-    clip, report = make_clip(
-        folder / f"{NAME}.bvh",
-        skeletons / "holden31.yaml",
-        skeletons,
-        NAME,
-        "holden31",
-        ClipMotion(**options("motion")),
-    )
+    bvh, skeleton, motion = folder / f"{NAME}.bvh", skeletons / "holden31.yaml", options("motion")
+    clip, report = make_clip(bvh, skeleton, skeletons, NAME, "holden31", ClipMotion(**motion))
     files = [folder / f"{NAME}{end}" for end in (".phase", ".gait", "_footsteps.txt", "_gait.txt")]
     labelling = LabelOptions.model_validate(options("labels", margins=margins))
     labels = vars(label_clip(clip, files, report, "walk", "flat", labelling)[0])
@@ -124,17 +118,12 @@ def walk() -> Clip:
     """A rigid figure that moves 2 cm a frame along +X and turns by 0.01 radians a frame."""
     names = ("Hips", "LeftUpLeg", "RightUpLeg", "LeftArm", "RightArm")
     offsets = np.array([[0, 0, 0], [10, -5, 0], [-10, -5, 0], [20, 40, 3], [-20, 40, 3]], float)
-    roles = dict(
-        zip(("hips", "left_hip", "right_hip", "left_shoulder", "right_shoulder"), names, strict=True)
-    )
-    skeleton = Skeleton(
-        "stiff", names, (-1, 0, 0, 0, 0), offsets, roles, (("Hips", "LeftUpLeg"), ("Hips", "LeftArm"))
-    )
-    frames = 300
-    t = np.arange(frames)
-    rotations = np.tile(quat.IDENTITY, (frames, 5, 1))
+    kinds = ("hips", "left_hip", "right_hip", "left_shoulder", "right_shoulder")
+    links, roles = (("Hips", "LeftUpLeg"), ("Hips", "LeftArm")), dict(zip(kinds, names, strict=True))
+    skeleton, t = Skeleton("stiff", names, (-1, 0, 0, 0, 0), offsets, roles, links), np.arange(300)
+    rotations = np.tile(quat.IDENTITY, (300, 5, 1))
     rotations[:, 0] = quat.yaw(0.01 * t)
-    root = np.stack([2.0 * t, np.full(frames, 90.0), np.zeros(frames)], axis=1)
+    root = np.stack([2.0 * t, np.full(300, 90.0), np.zeros(300)], axis=1)
     return Clip("walk", skeleton, 60.0, rotations, root)
 
 
@@ -157,11 +146,17 @@ def terrain(labels) -> dict[str, np.ndarray]:
     return flat_terrain(labels["cycles"], np.array([3.0, 4.0, 5.0]))
 
 
+def build(clip: Clip, labels, terrain=None, severity=None, **changed) -> ClipRows:
+    """The rows of a clip, by default on flat ground and without an injury."""
+    cycles = labels["cycles"]
+    terrain = flat_terrain(cycles, np.zeros(len(cycles))) if terrain is None else terrain
+    severity = np.zeros((len(clip), 2)) if severity is None else severity
+    return build_clip_rows("walk", clip, labels, {"injury": severity}, terrain, **OPTIONS | changed)
+
+
 def test_rows_of_a_rigid_turning_figure_are_exact(walk, labels, terrain):
     severity = np.random.default_rng(0).random((300, 2)) * 10
-    rows = build_clip_rows(
-        "walk", walk, labels, {"injury": severity}, terrain, **{**OPTIONS, "facing_sigma": 0.0}
-    )
+    rows = build(walk, labels, terrain, severity, facing_sigma=0.0)
     layout, frame = rows.layout, rows.frame
     assert layout == RowLayout(5, channels=(("injury", 2),))
     np.testing.assert_array_equal(frame, np.r_[60:101, 100:131, 200:240])
@@ -213,12 +208,9 @@ def test_fits_of_a_row_differ_only_in_the_ground(walk, labels, terrain):
     rng = np.random.default_rng(1)
     n = len(terrain["frame"])
     hilly = {**terrain, "fits": np.full(n, 10), "heights": rng.normal(0, 9, (10 * n, 36))}
-    rows = build_clip_rows("walk", walk, labels, {"injury": np.zeros((300, 2))}, hilly, **OPTIONS)
-    layout = rows.layout
-    x, y = (
-        np.concatenate(parts)
-        for parts in list(zip(*pair_batches(rows, rows.layout.with_channels(())), strict=True))[:2]
-    )
+    rows = build(walk, labels, hilly)
+    layout, pairs = rows.layout, pair_batches(rows, rows.layout.with_channels(()))
+    x, y = (np.concatenate(parts) for parts in list(zip(*pairs, strict=True))[:2])
     centre = hilly["heights"][:, 12:24].mean(axis=1)
     np.testing.assert_allclose(x[:, layout.x_terrain], hilly["heights"] - centre[:, None], atol=1e-4)
     hips = y[:, layout.y_joint_position.start + 1]
@@ -227,51 +219,31 @@ def test_fits_of_a_row_differ_only_in_the_ground(walk, labels, terrain):
 
 
 def test_a_clip_without_cycles_has_no_rows(walk, labels):
-    nothing = {**labels, "cycles": np.zeros((0, 2), int)}
-    rows = build_clip_rows(
-        "walk",
-        walk,
-        nothing,
-        {"injury": np.zeros((300, 2))},
-        flat_terrain(nothing["cycles"], np.zeros(0)),
-        **OPTIONS,
-    )
+    rows = build(walk, {**labels, "cycles": np.zeros((0, 2), int)})
     rows.check("walk")
     assert len(rows) == 0
     assert list(pair_batches(rows, rows.layout)) == []
 
 
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        ({"phase": np.zeros(299)}, r"phase has shape \(299,\).* expected \(300\)"),
-        ({"cycles": np.array([[60, 100], [100, 130], [200, 241]])}, "other cycles"),
-    ],
-)
-def test_files_that_do_not_belong_together_are_refused(walk, labels, terrain, change, message):
-    with pytest.raises(InputError, match=f"^walk: .*{message}"):
-        build_clip_rows(
-            "walk", walk, {**labels, **change}, {"injury": np.zeros((300, 2))}, terrain, **OPTIONS
-        )
-
-
-def test_severities_and_cycles_that_do_not_fit_are_refused(walk, labels, terrain):
-    with pytest.raises(InputError, match=r"injury has shape \(300, 3\).* expected \(300, 2\)"):
-        build_clip_rows("walk", walk, labels, {"injury": np.zeros((300, 3))}, terrain, **OPTIONS)
+def test_what_does_not_belong_together_is_refused(walk, labels, terrain):
+    other = {"cycles": np.array([[60, 100], [100, 130], [200, 241]])}
+    for changed, severity, message in (
+        ({"phase": np.zeros(299)}, None, r"phase has shape \(299,\).* expected \(300\)"),
+        (other, None, "other cycles"),
+        ({}, np.zeros((300, 3)), r"injury has shape \(300, 3\).* expected \(300, 2\)"),
+    ):
+        with pytest.raises(InputError, match=f"^walk: .*{message}"):
+            build(walk, {**labels, **changed}, terrain, severity)
     for cycle, frame in (([0, 40], 0), ([260, 299], 299)):
-        near = {**labels, "cycles": np.array([cycle])}
-        ground = flat_terrain(near["cycles"], np.zeros(1))
         with pytest.raises(InputError, match=f"walk, frame {frame}: the clip has no frame before or after"):
-            build_clip_rows("walk", walk, near, {"injury": np.zeros((300, 2))}, ground, **OPTIONS)
+            build(walk, {**labels, "cycles": np.array([cycle])})
 
 
 def test_beyond_the_clip_the_root_continues_straight_with_the_same_gait(walk, labels):
     """Rows near an end equal those of a longer clip that really continues like this."""
     ends = {**labels, "cycles": np.array([[1, 40], [260, 298]])}
     still = replace(walk, rotations=np.tile(walk.rotations[:1], (300, 1, 1)))
-    once = build_clip_rows(
-        "a", still, ends, {"injury": np.zeros((300, 2))}, flat_terrain(ends["cycles"], np.zeros(2)), **OPTIONS
-    )
+    once = build(still, ends)
     n = np.arange(-70, 370)
     longer = replace(
         still,
@@ -280,13 +252,6 @@ def test_beyond_the_clip_the_root_continues_straight_with_the_same_gait(walk, la
     )
     held = {name: values[np.clip(n, 0, 299)] for name, values in labels.items() if len(values) == 300}
     held["cycles"] = ends["cycles"] + 70
-    twice = build_clip_rows(
-        "a",
-        longer,
-        held,
-        {"injury": np.zeros((440, 2))},
-        flat_terrain(held["cycles"], np.zeros(2)),
-        **OPTIONS,
-    )
+    twice = build(longer, held)
     np.testing.assert_allclose(once.x, twice.x, atol=1e-4)
     np.testing.assert_allclose(once.y, twice.y, atol=1e-4)

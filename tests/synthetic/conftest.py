@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-import yaml
 
 from hobble.core.skeleton import Skeleton
 from hobble.motion.read import decode_channels, read_bvh
@@ -47,22 +46,15 @@ class Files:
     @cached_property
     def footsteps(self) -> Array:
         """(N, 2) 1-based frames of the file: right lands, left lands."""
-        return np.array(
-            [[int(x) for x in line.split()[:2]] for line in self.text("_footsteps.txt").splitlines()]
-        )
+        return np.loadtxt(self.folder / f"{self.name}_footsteps.txt", int)
 
     def landings(self, side: str) -> Array:
         return (self.footsteps[:, 0 if side == "Right" else 1]) // 2
 
     @cached_property
     def facing(self) -> Array:
-        across = (
-            self.joint("LeftArm")
-            - self.joint("RightArm")
-            + self.joint("LeftUpLeg")
-            - self.joint("RightUpLeg")
-        )
-        ahead = np.cross(across, [0.0, 1.0, 0.0])
+        arms, hips = (self.joint(f"Left{part}") - self.joint(f"Right{part}") for part in ("Arm", "UpLeg"))
+        ahead = np.cross(arms + hips, [0.0, 1.0, 0.0])
         return ahead / np.linalg.norm(ahead, axis=1, keepdims=True)
 
     def ahead(self, vectors: Array) -> Array:
@@ -100,28 +92,15 @@ class Files:
 
 @pytest.fixture(scope="session")
 def written(tmp_path_factory: pytest.TempPathFactory, holden31: Skeleton) -> Callable[..., Files]:
-    """Writes a clip once a session: `written(name, recipe, frames, fps, seed)`."""
+    """Writes a clip once a session: `written(name, recipe, frames)`."""
     folder = tmp_path_factory.mktemp("synthetic")
 
     @functools.cache
-    def write(
-        name: str,
-        recipe: str | None = None,
-        frames: int = 600,
-        fps: int = 120,
-        seed: int = 1,
-    ) -> Files:
-        here = folder / f"{fps}-{seed}-{frames}-{recipe}"
+    def write(name: str, recipe: str, frames: int = 600) -> Files:
+        here = folder / f"{frames}-{recipe}"
         paths: dict[str, Any] = {"bvh": here / f"{name}.bvh"}
         paths |= {ending: here / f"{name}_{ending}.txt" for ending in ("footsteps", "gait")}
-        write_clip(name, holden31.to_dict(), frames, recipe, Synthetic(fps=fps, seed=seed), **paths)
+        write_clip(name, holden31.to_dict(), frames, recipe, Synthetic(), **paths)
         return Files(here, name)
 
     return write
-
-
-@pytest.fixture(scope="session")
-def dataset(root: Path) -> dict[str, Any]:
-    """config/datasets/synthetic.yaml."""
-    data: dict[str, Any] = yaml.safe_load((root / "config/datasets/synthetic.yaml").read_text())
-    return data

@@ -1,8 +1,6 @@
 """A figure with feet at exactly given positions, and patches of every generated kind."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -28,6 +26,7 @@ PLACES = {  # positions of the joints relative to the root, and their roles
     "right_heel": (-9, -86, 0),
     "right_toe": (-9, -90.5, 13),
 }
+Labelled = tuple[Clip, dict[str, np.ndarray]]
 Height = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
 
@@ -51,13 +50,7 @@ def figure(feet: np.ndarray, root: np.ndarray) -> Clip:
     return Clip("figure", skeleton, 60.0, rotations, root, translations)
 
 
-@dataclass(frozen=True)
-class Walk:
-    clip: Clip
-    labels: dict[str, np.ndarray]
-
-
-def walk(ground: Height, frames: int = 420, speed: float = 2.2, period: int = 64, seed: int = 0) -> Walk:
+def walk(ground: Height, frames: int = 420, speed: float = 2.2, period: int = 64, seed: int = 0) -> Labelled:
     """A figure that walks along +Z over `ground`. Feet are exactly on it in stance and above it in swing."""
     rng = np.random.default_rng(seed)
     stride, feet = speed * period, np.zeros((frames, 4, 3))
@@ -80,7 +73,7 @@ def walk(ground: Height, frames: int = 420, speed: float = 2.2, period: int = 64
     z = np.arange(frames) * speed
     root = np.stack([np.zeros(frames), 93 + ground(np.zeros(frames), z), z], axis=-1)
     cycles = np.array([[s, s + period] for s in range(64, frames - 61 - period, period)])
-    return Walk(figure(feet, root), {"contacts": contacts, "cycles": cycles})
+    return figure(feet, root), {"contacts": contacts, "cycles": cycles}
 
 
 def some_patches(count: int = 300, kinds: tuple[str, ...] = KINDS, seed: int = 1) -> Patches:
@@ -92,9 +85,3 @@ def some_patches(count: int = 300, kinds: tuple[str, ...] = KINDS, seed: int = 1
 @pytest.fixture(scope="session")
 def patches() -> Patches:
     return some_patches()
-
-
-@pytest.fixture(scope="session")
-def made() -> SimpleNamespace:
-    """The functions of this file, for tests to call."""
-    return SimpleNamespace(walk=walk, figure=figure, patches=some_patches, options=options, database=database)

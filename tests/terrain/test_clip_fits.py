@@ -25,6 +25,8 @@ from hobble.terrain.cycle_ground import (
 from hobble.terrain.options import FitOptions, Terrain
 from hobble.terrain.patches import Patches
 
+from .conftest import database, figure, options, some_patches, walk
+
 GROUNDS = {
     "level": lambda x, z: np.zeros_like(z),
     "slope": lambda x, z: 0.2 * z + 0.05 * x,
@@ -35,23 +37,19 @@ GROUNDS = {
 
 @pytest.mark.parametrize("kind", ["rocky", "jumpy", "beam"])
 @pytest.mark.parametrize("name", GROUNDS)
-def test_fitted_ground_meets_the_feet_and_is_never_above_them(
-    made: SimpleNamespace, patches: Patches, name: str, kind: str
-) -> None:
-    walk = made.walk(GROUNDS[name])
-    fits = clip_fits(walk.clip, walk.labels, patches, kind, made.options(), made.database())
-    assert fits.patch.shape == (len(walk.labels["cycles"]), 10)
+def test_fitted_ground_meets_the_feet_and_is_never_above_them(patches: Patches, name: str, kind: str) -> None:
+    motion, labels = walk(GROUNDS[name])
+    fits = clip_fits(motion, labels, patches, kind, options(), database())
+    assert fits.patch.shape == (len(labels["cycles"]), 10)
     assert fits.foot_error[..., 0].max() < 1
     assert fits.foot_below.max() <= 1
     assert np.all(np.diff(fits.error, axis=1) >= 0)
 
 
-def test_heights_of_rows_are_those_of_the_fits_of_their_cycles(
-    made: SimpleNamespace, patches: Patches
-) -> None:
-    walk = made.walk(GROUNDS["slope"])
-    fits = clip_fits(walk.clip, walk.labels, patches, "rocky", made.options(), made.database())
-    cycles = walk.labels["cycles"]
+def test_heights_of_rows_are_those_of_the_fits_of_their_cycles(patches: Patches) -> None:
+    motion, labels = walk(GROUNDS["slope"])
+    fits = clip_fits(motion, labels, patches, "rocky", options(), database())
+    cycles = labels["cycles"]
     assert fits.frame.tolist() == [f for a, b in cycles for f in range(a, b + 1)]
     assert fits.cycle.tolist() == [c for c, (a, b) in enumerate(cycles) for _ in range(a, b + 1)]
     assert fits.fits.tolist() == [10] * len(fits.frame)
@@ -83,24 +81,24 @@ def test_heights_are_ordered_left_centre_right_from_past_to_future() -> None:
             assert np.allclose(heights[row, 1, side], 7 + at[:, 1])
 
 
-def test_heights_of_joints_above_their_soles(made: SimpleNamespace, holden31: Skeleton) -> None:
-    walk = made.walk(GROUNDS["level"])
-    contacts, frames = walk.labels["contacts"], np.arange(60, 360)
-    flat = find_soles(walk.clip, contacts, frames, True, FitOptions())
+def test_heights_of_joints_above_their_soles(holden31: Skeleton) -> None:
+    motion, labels = walk(GROUNDS["level"])
+    contacts, frames = labels["contacts"], np.arange(60, 360)
+    flat = find_soles(motion, contacts, frames, True, FitOptions())
     assert (flat.heel_height, flat.toe_height) == (pytest.approx(7.0), pytest.approx(2.5))
     assert np.abs(flat.soles[contacts][:, 1]).max() < 1e-9
-    uneven = find_soles(walk.clip, contacts, frames, False, FitOptions())
+    uneven = find_soles(motion, contacts, frames, False, FitOptions())
     assert (uneven.heel_height, uneven.toe_height) == (8.5, 4.0)
-    given = find_soles(walk.clip, contacts, frames, True, FitOptions(heel_height=5.0, toe_height=4.5))
-    expected = walk.clip.positions[:, -4:, 1] - np.where(IS_HEEL, 5.0, 4.5)
+    given = find_soles(motion, contacts, frames, True, FitOptions(heel_height=5.0, toe_height=4.5))
+    expected = motion.positions[:, -4:, 1] - np.where(IS_HEEL, 5.0, 4.5)
     assert np.allclose(given.soles[..., 1], expected)
     assert heel_above_toe(holden31) == pytest.approx(4.5)
 
 
 @pytest.mark.shared
-def test_real_clips_stand_on_the_fitted_ground(shared: Path, root: Path, made: SimpleNamespace) -> None:
+def test_real_clips_stand_on_the_fitted_ground(shared: Path, root: Path) -> None:
     """Uneven ground, a limp, and the original's own flat clip, whose ground stays at zero."""
-    patches = made.patches(2_000)
+    patches = some_patches(2_000)
     skeletons, original = root / "config/skeletons", "pfnn/LocomotionFlat09_000"
     for file, kind in (
         ("cmu/03_04", "rocky"),
@@ -111,7 +109,7 @@ def test_real_clips_stand_on_the_fitted_ground(shared: Path, root: Path, made: S
         bvh, figure = shared / f"mocap/{file}.bvh", skeletons / "holden31.yaml"
         clip, report = make_clip(bvh, figure, skeletons, bvh.stem, "holden31", ClipMotion())
         labels, _ = label_clip(clip, [], report, "walk", kind, LabelOptions())
-        fits = clip_fits(clip, vars(labels), patches, kind, Terrain(), made.database())
+        fits = clip_fits(clip, vars(labels), patches, kind, Terrain(), database())
         assert len(fits.frame) > 60, file
         assert fits.foot_error[..., 0].max() < 1, file
         assert fits.foot_below.max() <= 1, file
@@ -121,47 +119,35 @@ def test_real_clips_stand_on_the_fitted_ground(shared: Path, root: Path, made: S
             assert np.abs(fits.heights).max() < 3.5
 
 
-def test_flat_ground_is_zero_and_one_fit(made: SimpleNamespace, patches: Patches) -> None:
-    walk = made.walk(GROUNDS["level"])
-    fits = clip_fits(walk.clip, walk.labels, patches, "flat", made.options(), made.database())
-    assert np.all(fits.fits == 1)
-    assert fits.heights.shape == (len(fits.frame), 36)
-    assert np.all(fits.heights == 0)
-    assert np.all(fits.patch == -1)
-    assert fits.foot_error.shape == (len(walk.labels["cycles"]), 10, 2)
-    assert fits.foot_error.max() < 0.01
-
-
 def test_an_uneven_floor_is_adapted_and_a_foot_below_a_flat_one_makes_only_a_local_pit(
-    made: SimpleNamespace, patches: Patches
+    patches: Patches,
 ) -> None:
-    walk = made.walk(GROUNDS["waves"])
-    fits = clip_fits(walk.clip, walk.labels, patches, "flat", made.options(), made.database())
+    motion, labels = walk(GROUNDS["waves"])
+    fits = clip_fits(motion, labels, patches, "flat", options(), database())
     assert np.all(fits.fits == 1)
     assert np.any(fits.heights != 0)
     assert fits.foot_error[..., 0].max() < 1
     assert fits.foot_below.max() <= 1
-    walk = made.walk(GROUNDS["level"])
-    frame = np.flatnonzero(~walk.labels["contacts"][:, 1] & (np.arange(420) > 100))[5]
-    feet = walk.clip.positions[:, -4:].copy()
+    motion, labels = walk(GROUNDS["level"])
+    frame = np.flatnonzero(~labels["contacts"][:, 1] & (np.arange(420) > 100))[5]
+    feet = motion.positions[:, -4:].copy()
     feet[frame, 1, 1] = 2.5 - 4
-    clip = made.figure(feet, walk.clip.root)
-    fits = clip_fits(clip, walk.labels, patches, "flat", made.options(), made.database())
+    clip = figure(feet, motion.root)
+    fits = clip_fits(clip, labels, patches, "flat", options(), database())
     assert np.all(fits.heights == 0)
+    assert np.all(fits.patch == -1)
     assert fits.foot_error.max() < 0.01
     assert 0 < fits.foot_below.max() <= 1
-    options = made.options(deepest=None)
-    as_it_is = clip_fits(clip, walk.labels, patches, "flat", options, made.database())
+    changed = options(deepest=None)
+    as_it_is = clip_fits(clip, labels, patches, "flat", changed, database())
     assert as_it_is.foot_below.max() == pytest.approx(4)
 
 
-def test_flat_ground_can_be_at_the_height_of_the_feet_as_in_the_original(
-    made: SimpleNamespace, patches: Patches
-) -> None:
-    walk = made.walk(lambda x, z: np.full_like(z, 3.0))
+def test_flat_ground_can_be_at_the_height_of_the_feet_as_in_the_original(patches: Patches) -> None:
+    motion, labels = walk(lambda x, z: np.full_like(z, 3.0))
     for level, expected in (("zero", 0.0), ("feet", 3.0)):
-        options = made.options(flat_level=level, deepest=None)
-        fits = clip_fits(walk.clip, walk.labels, patches, "flat", options, made.database())
+        changed = options(flat_level=level, deepest=None)
+        fits = clip_fits(motion, labels, patches, "flat", changed, database())
         assert np.allclose(fits.heights, expected, atol=1e-5)
 
 

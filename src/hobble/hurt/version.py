@@ -98,10 +98,8 @@ def _make_deck(skeleton: Skeleton, options: Hurt) -> list[int]:
     """The cards of the data set: indices of links. The cards of a link are spread evenly over the deck."""
     names = list(skeleton.link_names)
     if unknown := [link for link in options.links if link not in names]:
-        raise HobbleError(
-            f"hurt.links: skeleton {skeleton.name} has no link {', '.join(unknown)}. "
-            f"Its links are {', '.join(names)}."
-        )
+        there = f"Its links are {', '.join(names)}."
+        raise HobbleError(f"hurt.links: skeleton {skeleton.name} has no link {', '.join(unknown)}. {there}")
     rng = np.random.default_rng(options.seed)
     places: list[tuple[float, int]] = []  # place in the deck, 0 to 1, and link
     for i in (names.index(link) for link in options.links or names):
@@ -139,18 +137,9 @@ def hurt_version(
     of the data set, from 0. ground: "flat", or another kind of ground.
     """
     severity = schedule_severities(clip.skeleton, len(clip), clip.fps, options, name, version_number)
-    knots, guarding = schedule_guarding(len(clip), clip.fps, options, name)
-    flat = ground == "flat"
-    hurt = hurt_clip(
-        clip,
-        labels,
-        severity,
-        name,
-        flat=flat,
-        zero=report.phase_zero,
-        margins=report.margins,
-        guarding=np.interp(np.arange(len(clip)), knots, guarding),
-    )
+    knots, values = schedule_guarding(len(clip), clip.fps, options, name)
+    flat, guarding = ground == "flat", np.interp(np.arange(len(clip)), knots, values)
+    hurt = hurt_clip(clip, labels, severity, name, flat, report.phase_zero, report.margins, guarding)
     frames = len(hurt.clip)
     unused = np.zeros(frames, bool)
     if not options.in_between:
@@ -159,7 +148,7 @@ def hurt_version(
         unused = (away > SEVERITY_TOLERANCE).any(axis=1)
     if len(clip) >= UNCUT_SECONDS * clip.fps:
         unused |= np.arange(frames) >= options.longest * len(clip)
-    course = [np.searchsorted(hurt.source_frames, knots).tolist(), guarding.round(3).tolist()]
+    course = [np.searchsorted(hurt.source_frames, knots).tolist(), values.round(3).tolist()]
     return *leave_out(hurt, unused, replace(report, clip=name)), course
 
 
