@@ -7,7 +7,7 @@ import snakemake_logger_plugin_hobble
 from hobble.core.errors import HobbleError, keep_traceback
 from hobble.workflow import lifetime
 from hobble.workflow.demands import sentences_about_plan
-from hobble.workflow.targets import open_project
+from hobble.workflow.project import open_project
 
 lifetime.ensure_user_name()
 try:

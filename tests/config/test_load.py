@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from hobble.config.load_configuration import Catalogue, merge, read_layers, read_yaml, validate
+from hobble.config.load_configuration import Catalogue, merge, read_yaml, validate
 from hobble.config.models import Configuration, Dataset, SkeletonFile
 from hobble.core.errors import HobbleError
 
@@ -28,11 +28,6 @@ def test_extends_keeps_the_keys_that_the_child_does_not_set(folder: Path) -> Non
     assert (model.training.passes, model.training.batch) == (3, 16)
 
 
-def test_command_line_overrides_apply_to_every_configuration(folder: Path) -> None:
-    catalogue = Catalogue(folder, {"training": {"passes": 7}})
-    assert [catalogue.configuration(n).training.passes for n in ("base", "child")] == [7, 7]
-
-
 def test_a_training_section_can_be_given_by_name(folder: Path) -> None:
     """`training: NAME` stands for the whole section, in files and on the command line."""
     (folder / "quick.yaml").write_text("extends: base\ntraining: {batch: 256}\n")
@@ -46,12 +41,15 @@ def test_a_training_section_can_be_given_by_name(folder: Path) -> None:
     assert named.configuration("like").channels == ("injury",)
 
 
-def test_a_missing_training_is_reported(folder: Path) -> None:
+def test_a_missing_training_and_loops_are_reported(folder: Path) -> None:
     with pytest.raises(HobbleError, match=r"slow\.yaml: no such file\. There are: base, child"):
         Catalogue(folder, {"training": "slow"}).configuration("base")
     (folder / "like.yaml").write_text("training: like\n")
     with pytest.raises(HobbleError, match="`training: like` refers to itself"):
         Catalogue(folder).configuration("like")
+    (folder / "base.yaml").write_text("extends: child\n")
+    with pytest.raises(HobbleError, match=r"child\.yaml: extends itself through child -> base"):
+        Catalogue(folder).configuration("child")
 
 
 @pytest.mark.parametrize("text", ["held_out: [02_02]", "held_out: [on]", "clips: {02_01: {gait: walk}}"])
@@ -60,12 +58,6 @@ def test_a_name_that_yaml_reads_as_a_number_has_to_be_quoted(tmp_path: Path, tex
     (tmp_path / "datasets/mine.yaml").write_text(f"skeleton: s\nfolder: mine\n{text}\n")
     with pytest.raises(HobbleError, match=r"not (130|True|129)\. Put the name in quotes"):
         Catalogue(tmp_path).dataset("mine")
-
-
-def test_a_loop_of_extends_is_reported(folder: Path) -> None:
-    (folder / "base.yaml").write_text("extends: child\n")
-    with pytest.raises(HobbleError, match=r"child\.yaml: extends itself through child -> base"):
-        read_layers(folder, "child")
 
 
 @pytest.mark.parametrize(

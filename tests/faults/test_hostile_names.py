@@ -13,8 +13,7 @@ from hobble.config.load_configuration import Catalogue
 from hobble.core.errors import HobbleError, InputError
 from hobble.core.files import write_text
 from hobble.motion.skeleton_file import load_skeleton
-from hobble.workflow.project import Project
-from hobble.workflow.targets import check_targets
+from hobble.workflow.project import Project, check_targets
 
 from .conftest import SKELETON, outcome, refused, write
 from .throws import become_nobody
@@ -100,18 +99,7 @@ def test_unsafe_clip_names_are_refused_with_their_folder(catalogue: Path, tmp_pa
     write(catalogue / "datasets/mine.yaml", "skeleton: holden31\nfolder: mine\n")
     folder = tmp_path / "mocap/mine"
     folder.mkdir(parents=True)
-    unsafe = (
-        "<script>",
-        "{clip}",
-        "{0}",
-        " walk",
-        "walk ",
-        "a\nb",
-        "\x1b[31m",
-        "a\\b",
-        "\u202egpj",
-        "é" * 101,
-    )
+    unsafe = ("<script>", "{clip}", " walk", "walk ", "a\nb", "\x1b[31m", "a\\b", "\u202egpj", "é" * 101)
     for name in unsafe:
         path = write(folder / f"{name}.bvh", "HIERARCHY")
         with pytest.raises(InputError, match="mocap/mine: a clip is called") as refusal:
@@ -141,16 +129,11 @@ def test_no_name_reaches_a_shell(workflow, tiny_bvh: str) -> None:
     assert not list(workflow.folder.rglob("pwned"))
 
 
-CLOSED = (
-    "mocap/mine",
-    "mocap/mine/a_injuries.txt",
-    "config/datasets/mine.yaml",
-    "config/skeletons/holden31.yaml",
-)
+NEEDED = ("mocap/mine", "mocap/mine/a_injuries.txt", "config/datasets/mine.yaml")
 
 
 @pytest.mark.skipif(os.getuid() != 0, reason="not root, so that nothing can be read as somebody else")
-@pytest.mark.parametrize("closed", CLOSED)
+@pytest.mark.parametrize("closed", [*NEEDED, "config/skeletons/holden31.yaml"])
 def test_an_unreadable_file_that_planning_needs_is_named(closed: str) -> None:
     with tempfile.TemporaryDirectory() as folder:  # pytest's own folders are closed for the user `nobody`
         base = Path(folder)

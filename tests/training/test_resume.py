@@ -165,7 +165,7 @@ def test_another_start_network_ignores_the_earlier_checkpoint(go: Run, network: 
     assert torch.equal(to("run", first), one)
     assert not torch.equal(to("run", second), one)
     assert len(list((tmp_path / "run").iterdir())) == 3
-    # `hobble.workflow.targets` refuses other sections and fewer passes, before the run.
+    # `hobble.workflow.project` refuses other sections and fewer passes, before the run.
     with pytest.raises(InputError, match=r"start 1\.npz: holds a network of \d+-24-24-.* not of .*-30-30-"):
         go("other", first, kind=network.model_copy(update={"units": 30}))
 

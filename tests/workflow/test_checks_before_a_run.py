@@ -6,9 +6,8 @@ from pathlib import Path
 import pytest
 
 from hobble.core.errors import HobbleError
-from hobble.workflow import targets
-from hobble.workflow.project import Project
-from hobble.workflow.targets import check_targets
+from hobble.workflow import project as targets
+from hobble.workflow.project import Project, check_targets
 from tests.workflow.small_project import DATASET
 
 IMPOSSIBLE = {

@@ -16,12 +16,6 @@ from hobble.workflow.project import Project
 from tests.workflow.small_project import DATASET
 
 
-def test_a_listed_clip_without_a_file_is_reported(base: Path) -> None:
-    (base / "config/datasets/mine.yaml").write_text(DATASET + "clips: {a: , b: , gone: }\n")
-    with pytest.raises(HobbleError, match=r"gone\.bvh: no such file"):
-        Project(base, {}).dataset("mine").source("gone")
-
-
 def test_clips_are_found_once_in_sub_and_linked_folders_whatever_the_case_of_their_suffix(base: Path) -> None:
     """A linked collection is found once, even if one of its links leads back to it."""
     kept = base / "kept/day 1"

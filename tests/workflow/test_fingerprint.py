@@ -109,12 +109,6 @@ def test_only_code_changes_a_fingerprint(source: Path) -> None:
         assert (mark(source) != before) is ((file, old, new) in CHANGES), (old, new)
 
 
-def test_infrastructure_modules_exist_and_have_a_reason(root: Path) -> None:
-    for name, reason in fp.INFRASTRUCTURE.items():
-        assert list(fp._files_of(name, root / "src"))[1:], name
-        assert reason
-
-
 @pytest.mark.parametrize("measure", all_measures(), ids=lambda measure: measure.name)
 def test_a_measurement_depends_neither_on_the_page_nor_on_other_measurements(
     root: Path, measure: Measure

@@ -7,8 +7,7 @@ import pytest
 
 from hobble.channels import channel
 from hobble.core.errors import HobbleError
-from hobble.workflow.project import RESERVED, Project
-from hobble.workflow.targets import check_targets
+from hobble.workflow.project import RESERVED, Project, check_targets
 from tests.workflow.small_project import DATASET
 
 

@@ -228,31 +228,21 @@ def begin_or_resume(
     """
     state, path = new_state(database, network, training, processes), checkpoints
     if processes.is_first:
-        path = _restore(state, training, recipe, checkpoints, start)
+        start_arrays = None if start is None else load_npz(start)
+        state.recipe = run_name(recipe, start_arrays)
+        data, path = start_arrays, checkpoints / state.recipe / "checkpoint.npz"
+        if path.exists():
+            own = load_npz(path)
+            check_arrays(path, own, {"sections": DECLARED["sections"]}, fix=DELETE_IT)
+            data = own if int(own["sections"]) <= training.all_sections else data
+        if data is not None:
+            unpack(data, state, Path(data.path))
+            section = f"section {state.sections_done} of {training.all_sections}"
+            log.info("resuming from %s, after %s", data.path, section)
     numbers = (state.adam.steps, state.sections_done, state.samples, state.half)
     numbers = processes.take_from_first(state.tensors.values(), numbers)
     state.adam.steps, state.sections_done, state.samples, state.half = numbers
     return state, path
-
-
-def _restore(state: State, training: Training, recipe: str, checkpoints: Path, start: Path | None) -> Path:
-    """Fill `state` from the run's own checkpoint or from `start`. Without both, leave it new.
-
-    For the arguments see `begin_or_resume`. Returns the path of the run's own checkpoint.
-    """
-    start_arrays = None if start is None else load_npz(start)
-    state.recipe = run_name(recipe, start_arrays)
-    own_path = checkpoints / state.recipe / "checkpoint.npz"
-    data = start_arrays
-    if own_path.exists():
-        own = load_npz(own_path)
-        check_arrays(own_path, own, {"sections": DECLARED["sections"]}, fix=DELETE_IT)
-        data = own if int(own["sections"]) <= training.all_sections else data
-    if data is not None:
-        unpack(data, state, Path(data.path))
-        section = f"section {state.sections_done} of {training.all_sections}"
-        log.info("resuming from %s, after %s", data.path, section)
-    return own_path
 
 
 def new_state(

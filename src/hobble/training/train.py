@@ -131,7 +131,6 @@ def _run(
         if symmetry:
             symmetry.enforce()
         train_mse = watch.mean()
-        processes.check_same(state.network.flat)
         state.sections_done, state.samples = index + 1, state.samples + watch.samples
         if recorder:
             recorder.end_section(where, [pass_index + 1, section + 1], train_mse)
@@ -188,11 +187,12 @@ def write_weights(
 ) -> None:
     """Write the arrays of the network, of the standardisation and of `TrainingFacts`, and `meta`.
 
-    configuration: its name. about_training: facts such as the numbers of passes and samples, which are added
-    to `meta`. (`TrainingFacts`, in contrast, are arrays about the training rows.) Equal arguments give a file
-    with equal bytes.
+    `meta` is JSON that says what each column means and how the network was made. configuration: its name.
+    about_training: facts such as the numbers of passes and samples, which are added to `meta`.
+    (`TrainingFacts`, in contrast, are arrays about the training rows.) Equal arguments give a file with equal
+    bytes.
     """
-    statistics = database.statistics
+    statistics, layout = database.statistics, database.layout
     arrays = {
         **network.arrays,
         "Xmean": statistics.x_mean,
@@ -200,34 +200,24 @@ def write_weights(
         "Ymean": statistics.y_mean,
         "Ystd": statistics.y_std,
     }
-    arrays |= TrainingFacts.from_rows(database.layout, database.each_row(TRAIN), statistics).arrays()
-    save_npz(
-        path, **arrays, meta=np.array(network_metadata(network, database, configuration, about_training))
-    )
-
-
-def network_metadata(
-    network: FinishedNetwork, database: Database, configuration: str, about_training: Mapping[str, Any]
-) -> str:
-    """The text of the array `meta`: JSON that says what each column means and how the network was made."""
-    skeleton = Skeleton.from_dict(database.skeleton)
-    channels = [channel(name) for name, _ in database.layout.channels]
-    return json.dumps(
-        {
-            "kind": network.kind,
-            "configuration": configuration,
-            "layout": database.layout.to_dict(),
-            "skeleton": database.skeleton,
-            "gaits": list(GAITS),
-            "contacts": list(CONTACTS),
-            "channels": {c.name: c.columns(skeleton) for c in channels},
-            "exponents": {c.name: c.exponent for c in channels},
-            "limits": database.manifest.limits,
-            "units": "; ".join([UNITS, *(f"{c.value_word} 0 to {c.highest:g}" for c in channels)]),
-            **network.meta,
-            **about_training,
-        }
-    )  # keys are not sorted, because the skeleton's joints must keep the order of the columns
+    arrays |= TrainingFacts.from_rows(layout, database.each_row(TRAIN), statistics).arrays()
+    skeleton, channels = Skeleton.from_dict(database.skeleton), [channel(name) for name, _ in layout.channels]
+    meta = {
+        "kind": network.kind,
+        "configuration": configuration,
+        "layout": layout.to_dict(),
+        "skeleton": database.skeleton,
+        "gaits": list(GAITS),
+        "contacts": list(CONTACTS),
+        "channels": {c.name: c.columns(skeleton) for c in channels},
+        "exponents": {c.name: c.exponent for c in channels},
+        "limits": database.manifest.limits,
+        "units": "; ".join([UNITS, *(f"{c.value_word} 0 to {c.highest:g}" for c in channels)]),
+        **network.meta,
+        **about_training,
+    }
+    # Keys are not sorted, because the skeleton's joints must keep the order of the columns.
+    save_npz(path, **arrays, meta=np.array(json.dumps(meta)))
 
 
 def run(
