@@ -36,9 +36,7 @@ NOT_SHOWN = re.compile(
     r"^(WorkflowError:\s*)?At least one job did not complete|were not present when the DAG was created"
 )
 # What Snakemake puts around a message of the Snakefile: the place in the code. Users do not need it.
-PLACE = re.compile(
-    r'^WorkflowError in file ".*Snakefile", line \d+:\n|\n  File ".*Snakefile", line \d+, in <module>'
-)
+PLACE = re.compile(r'^WorkflowError in file ".*", line \d+:\n|\n  File ".*", line \d+, in <module>')
 # Snakemake's messages that are shown although they are no warnings.
 SHOWN_MESSAGES = re.compile(r"^Nothing to be done|^This was a dry-run|^Unlocking|^Touching|^Error")
 # In the order in which data passes through them.

@@ -22,8 +22,6 @@ Model = TypeVar("Model", bound=BaseModel)
 # Names that cannot lead out of their folder and are not too long for a file name.
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,99}")
 MOST_PROBLEMS = 20  # a message lists at most this many problems of a configuration, data set or skeleton
-# The types that YAML gives to on, 02_01, 1.5 and 2020-01-01 without quotes.
-NOT_STRINGS = (bool, int, float, date)
 QUOTES_HINT = 'Put the name in quotes, as in "02_01"; otherwise YAML reads it as a number or a date.'
 NAME_HINT = "Names may have letters, digits, dots, dashes and underscores, 100 at most."
 
@@ -119,14 +117,13 @@ def _problem(item: Any, model: type[BaseModel]) -> str:
         allowed = ", ".join(_keys_at(model, item["loc"][:-1])) or "none"
         return f"{key}: there is no such key. Allowed here: {allowed}."
     message = item["msg"].removeprefix("Value error, ")
-    about_section = isinstance(item["input"], Mapping)
     # A message about a whole section does not end with `not <value>`, because the section would be too long.
-    if item["type"] == "value_error" and about_section:
+    if item["type"] == "value_error" and isinstance(item["input"], Mapping):
         return f"{key}: {message}." if item["loc"] else f"{message}."
     text = f"{key}: {message[0].lower()}{message[1:]}, not {item['input']!r:.80}."
-    if item["type"] == "string_type" and isinstance(item["input"], NOT_STRINGS):
-        text += f" {QUOTES_HINT}"
-    return text
+    # YAML reads on, 02_01, 1.5 and 2020-01-01 without quotes as other types.
+    is_unquoted = item["type"] == "string_type" and isinstance(item["input"], bool | int | float | date)
+    return f"{text} {QUOTES_HINT}" if is_unquoted else text
 
 
 def _keys_at(model: Any, location: tuple[Any, ...]) -> list[str]:

@@ -216,9 +216,8 @@ class Manifest:
         values["skeleton"] = json.loads(values["skeleton"])
         manifest = read_declared(file, "the manifest", cls, values, HINT)
         read_declared(file, "clips", list[ClipEntry], manifest.clips, HINT)
-        if {split: manifest.row_count(split) for split in SPLITS} != {
-            split: sum(chunk.rows for chunk in chunks) for split, chunks in manifest.chunks.items()
-        }:
+        stored = {split: sum(chunk.rows for chunk in chunks) for split, chunks in manifest.chunks.items()}
+        if stored != {split: manifest.row_count(split) for split in SPLITS}:
             raise InputError(file, "its clips have other rows than its chunks", fix=HINT)
         return manifest
 

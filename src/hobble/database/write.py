@@ -222,11 +222,9 @@ def write_chunks(
             ground = fits[int(ends[start] - part["count"][0]) : int(ends[start + len(part) - 1])]
             raw = part["values"][:, :columns], part["values"][:, columns:], ground
             tables = standardise_rows(layout, statistics, *raw, part["count"])
-            arrays = {
-                name: to_stored_type(table, manifest.dtype)
-                for name, table in zip(("x", "y", "fits"), tables, strict=True)
-            }
-            arrays |= {name: part[name].copy() for name in ("count", "clip", "frame", "phase")}
+            x, y, lifted = (to_stored_type(table, manifest.dtype) for table in tables)
+            index = {name: part[name].copy() for name in ("count", "clip", "frame", "phase")}
+            arrays = {"x": x, "y": y, "fits": lifted, **index}
             yield write_chunk(folder, f"{split}/{number:05d}.safetensors", arrays)
             number += 1
 

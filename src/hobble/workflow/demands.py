@@ -126,8 +126,7 @@ def training_threads(configuration: NamedConfiguration) -> int:
 
     With GPUs there are 2 threads. SLURM counts threads per GPU, so there each GPU gets 2.
     """
-    machines = machines_of(configuration)
-    return 2 if machines.gpus else max(2, machines.processes)
+    return max(2, machines_of(configuration).processes)
 
 
 def gpus(configuration: NamedConfiguration) -> int:
