@@ -27,8 +27,11 @@ def rows(network) -> ClipRows:
 
 
 def test_truth_prediction_and_error_of_every_frame(network, rows: ClipRows) -> None:
-    character = ProceduralAnimation(network)
-    found, layout = character.compare(rows), network.layout
+    unreal = Axes("left", "Z", "m")
+    found, theirs = (ProceduralAnimation(network, axes=axes).compare(rows) for axes in (Axes(), unreal))
+    x, y, z = np.moveaxis(found.predicted.positions, -1, 0)
+    np.testing.assert_allclose(theirs.predicted.positions, np.stack([z, -x, y], axis=-1) / 100, atol=1e-9)
+    layout = network.layout
     every = np.arange(len(rows))
     pairs = compose_pairs(rows, layout, every, every)
     predicted = network.predict(pairs.x, pairs.p)
@@ -51,12 +54,7 @@ def test_truth_prediction_and_error_of_every_frame(network, rows: ClipRows) -> N
     assert root[:, 0].mean() == pytest.approx(120 * 2 / (2 * np.pi), rel=0.02)
 
 
-def test_it_is_in_the_callers_axes_and_refuses_other_rows(network, rows: ClipRows) -> None:
-    own, other = (
-        ProceduralAnimation(network, axes=a).compare(rows) for a in (Axes(), Axes("left", "Z", "m"))
-    )
-    x, y, z = np.moveaxis(own.predicted.positions, -1, 0)
-    np.testing.assert_allclose(other.predicted.positions, np.stack([z, -x, y], axis=-1) / 100, atol=1e-9)
-    fewer = type(network.layout)(30)
+def test_it_refuses_other_rows(network, rows: ClipRows) -> None:
+    fewer = type(rows)(**{**vars(rows), "layout": type(network.layout)(30)})
     with pytest.raises(ValueError, match="not those that the network has learnt"):
-        ProceduralAnimation(network).compare(type(rows)(**{**vars(rows), "layout": fewer}))
+        ProceduralAnimation(network).compare(fewer)

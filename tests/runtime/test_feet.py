@@ -161,18 +161,6 @@ def test_the_heel_of_a_held_foot_rises_before_its_leg_is_straight(holden31: Skel
     assert without > lengths[-1] + 0.005
 
 
-def test_feet_are_lifted_out_of_the_ground(holden31: Skeleton) -> None:
-    feet = Feet(holden31)
-    toe, heel = holden31.role("left_toe"), holden31.role("left_heel")
-    ground = feet.base[0][toe, 1] + 6.0
-    for _ in range(20):
-        position = feet(np.zeros(3), 0.0, ground=ground)
-    assert position[toe, 1] >= ground + 4.0 - 1e-3
-    assert position[heel, 1] >= ground + 5.0 - 1e-3
-    moved = position - feet.base[0]
-    np.testing.assert_allclose(moved[toe], moved[heel], atol=1e-9)
-
-
 def test_standing_feet_raise_and_lower_the_body(holden31: Skeleton) -> None:
     """The foot in contact decides how far the body is raised or lowered; the hips stay within their range."""
     base, _ = crouched(holden31)

@@ -54,22 +54,12 @@ def test_bvh_round_trip(tmp_path: Path, holden31) -> None:
 
 
 def test_a_walk_is_cut_where_it_repeats() -> None:
-    time = np.arange(generated.SETTLED + 60 + generated.LONGEST + generated.BLEND)
+    time = np.arange(generated.SETTLED + 60 + generated.LENGTHS[1] + generated.BLEND)
     swing = np.stack([0 * time, 90 + np.sin(2 * np.pi * time / 67), 2.0 * time], axis=1)
     leg = swing + np.stack([0 * time, -50 + 0 * time, 20 * np.sin(2 * np.pi * time / 67)], axis=1)
     first, last, gap = generated.find_cut(np.stack([swing, leg], axis=1))
     assert (last - first) % 67 == 0
     assert gap < 1e-6
-
-
-def test_a_loop_goes_ahead_from_the_origin() -> None:
-    time = np.arange(60)
-    root = np.stack([500 - 2.0 * time, 90 + 0 * time, 3 * np.sin(2 * np.pi * time / 60)], axis=1)
-    turned = np.tile([1.0, 0, 0, 0], (60, 1, 1))
-    walk = generated.RepeatedWalk(root[:, None], turned, np.array([-120.0, 0, 0]), 0.0).ahead()
-    assert walk.travel == pytest.approx([0, 0, 120])
-    beside = walk.positions[:, 0] - np.arange(60)[:, None] / 60 * walk.travel
-    assert beside.mean(axis=0) == pytest.approx([0, 90, 0])
 
 
 def test_scenarios_and_loops_are_written(tmp_path: Path, hurtable, monkeypatch: pytest.MonkeyPatch) -> None:

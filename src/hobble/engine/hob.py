@@ -104,7 +104,7 @@ def _body_sections(network: Network) -> Sections:
     skeleton, layout = network.skeleton, network.layout
     assert skeleton is not None
     legs = leg_joints(skeleton)
-    state = start_characters(network, 1, np.zeros((1, 2)), np.zeros(1))
+    state = start_characters(network, 1, np.zeros((1, 2)), np.zeros(1), {})
     starts = {
         "start_path": state.position, "start_facing": state.direction, "start_gait": state.gait,
         "start_joints": state.joint_position, "start_speeds": state.joint_velocity,

@@ -94,12 +94,8 @@ def load_network(path: str | Path, skeleton: Skeleton | str | Path | None = None
         for kind in NETWORK_KINDS:
             if (arrays := options_of_kind(kind).network_class().read_folder(path)) is not None:
                 return network_from_arrays(path, arrays, skeleton)
-        raise InputError(
-            path,
-            "not a network: it holds neither weights.npz nor Xmean.bin, W0_000.bin, ...",
-            fix="Train one (snakemake results/<configuration>/network/weights.npz), "
-            "or pass the folder of a trained network.",
-        )
+        problem = "not a network: it holds neither weights.npz nor Xmean.bin, W0_000.bin, ..."
+        raise InputError(path, problem, fix="Train one, or pass the folder of a trained network.")
     return network_from_arrays(path, load_npz(path), skeleton)
 
 
@@ -117,9 +113,8 @@ def network_from_arrays(
     if meta.skeleton:
         skeleton = skeleton_from_data(path, meta.skeleton, NEEDED_ROLES)
     if skeleton is not None and len(skeleton.joints) != layout.joints:
-        raise InputError(
-            path, f"has {layout.joints} joints, but skeleton {skeleton.name} has {len(skeleton.joints)}"
-        )
+        other = f"skeleton {skeleton.name} has {len(skeleton.joints)}"
+        raise InputError(path, f"has {layout.joints} joints, but {other}")
     labels = {name: meta.channels.get(name, ()) for name, _ in layout.channels}
     for name, columns in layout.channels:
         if len(labels[name]) != columns:
@@ -170,11 +165,8 @@ def _read_layout(path: str | Path, meta: Meta, x_size: int, y_size: int) -> RowL
         known = ", ".join(CHANNEL_NAMES)
         raise InputError(path, f"has the unknown channel {unknown[0]!a:.40}; known channels: {known}")
     if (layout.x_size, layout.y_size) != (x_size, y_size):
-        raise InputError(
-            path,
-            f"{x_size} inputs and {y_size} outputs do not fit {layout}, "
-            f"which has {layout.x_size} inputs and {layout.y_size} outputs",
-        )
+        has = f"which has {layout.x_size} inputs and {layout.y_size} outputs"
+        raise InputError(path, f"{x_size} inputs and {y_size} outputs do not fit {layout}, {has}")
     return layout
 
 
@@ -241,9 +233,8 @@ def read_layers(
     weight, bias = prefixes[0], prefixes[1]
     count = sum(1 for name in arrays if re.fullmatch(rf"{weight}\d{{1,4}}", name))
     if not 0 < count <= MOST_LAYERS:
-        raise InputError(
-            path, f"has {count} layers {weight}0, {weight}1, ...; 1 to {MOST_LAYERS} are allowed"
-        )
+        layers = f"{count} layers {weight}0, {weight}1, ..."
+        raise InputError(path, f"has {layers}; 1 to {MOST_LAYERS} are allowed")
     units: list[int | str] = [inputs, *(f"units of {weight}{i}" for i in range(count - 1)), outputs]
     sets = (set_word,) if set_word else ()
     declared = {}

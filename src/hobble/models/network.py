@@ -115,10 +115,8 @@ class TrainingFacts:
                 nearest, start = float(distance[row]), (x[row], y[row], float(part.p[row]))
         assert start is not None, "a database has rows"
         arrays = (low[0], high[0], low[1], high[1], *start[:2])
-        columns: dict[str, Any] = {
-            key: np.asarray(a, np.float32) for key, a in zip(FACTS.values(), arrays, strict=True)
-        }
-        return cls(**columns, start_phase=start[2], fastest=fastest)
+        values: Any = [*(np.asarray(array, np.float32) for array in arrays), start[2], fastest]
+        return cls(*values)
 
 
 def _raw(layout: RowLayout, part: Any, ground: Array, lift: Array, statistics: Any) -> tuple[Array, Array]:

@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hobble.channels import channel
-from hobble.core.errors import InputError
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 from hobble.models.load import load_network
@@ -21,7 +20,9 @@ from hobble.runtime.bounds import SpeedLimiter
 from hobble.runtime.caller_targets import Axes, CallerTargets, Pose
 from hobble.runtime.character import Character, start_characters
 from hobble.runtime.controller import Controller
+from hobble.runtime.error_calculator import Compared, compare
 from hobble.runtime.ground import as_ground
+from hobble.runtime.layers import Layers
 from hobble.runtime.network_rows import ChannelValues
 from hobble.runtime.trajectory import target_facing
 from hobble.runtime.variation import count_steps, vary_step
@@ -29,8 +30,6 @@ from hobble.runtime.waypoints import Follower, Waypoint
 
 if TYPE_CHECKING:
     from hobble.rows.clip_rows import ClipRows
-    from hobble.runtime.error_calculator import Compared
-    from hobble.runtime.layers import Layers
     from hobble.runtime.retarget import RigDriver
 
 # Largest x or z of a start position, cm (100 km). Farther from the origin, floats are imprecise.
@@ -69,7 +68,8 @@ class ProceduralAnimation:
         facing: Any = None,
     ) -> None:
         if network.skeleton is None:
-            raise ValueError("the network has no skeleton: pass skeleton= when you load it")
+            joints = network.layout.joints
+            raise ValueError(f"the network has no skeleton: pass skeleton=, one with {joints} joints")
         for name, value, least in (
             ("characters", characters, 1),
             ("steering", steering, 0),
@@ -93,11 +93,8 @@ class ProceduralAnimation:
         self._channel_values = ChannelValues(network, scales or {})
         self._limit_speed = limits
         self._variation, self._seeds = variation, seed + np.arange(characters)
-        self._controller_options: dict[str, Any] = {
-            "rates": {name: channel(name).rate for name in network.channels} | dict(rates or {}),
-            "foot_locking": foot_locking,
-            "steering": steering,
-        }
+        all_rates = {name: channel(name).rate for name in network.channels} | dict(rates or {})
+        self._controller_options = all_rates, foot_locking, steering
         self._predicted_by = (mode, storage)
         self.predictor = network.predictor(mode, storage)
         self._waypoints = list(waypoints) if waypoints is not None else None
@@ -137,14 +134,10 @@ class ProceduralAnimation:
             are matched. Other joints follow the joint above them.
         position, facing: see `reset`.
 
-        Raises InputError for a file that is not a usable network, ValueError for an option out of range, and
-        UnknownName for a waypoint's gait that the network does not have.
+        Raises InputError for a file that is not a usable network, ValueError for an option out of range or if
+        there is no skeleton, and UnknownName for a waypoint's gait that the network does not have.
         """
-        network = load_network(path, skeleton)
-        if network.skeleton is None:
-            fix = f"Pass skeleton= with {network.layout.joints} joints, such as a file of config/skeletons."
-            raise InputError(path, "has no skeleton", fix=fix)
-        return cls(network, **options)
+        return cls(load_network(path, skeleton), **options)
 
     def reset(self, position: Any = None, facing: Any = None) -> None:
         """Restart the characters, with all channels at their defaults.
@@ -193,14 +186,12 @@ class ProceduralAnimation:
     def _continue_from(self, state: Character) -> None:
         """Make a new controller, which continues from `state`."""
         self.state = state
-        self._controller = Controller(self.predictor, state, **self._controller_options)
+        self._controller = Controller(self.predictor, state, self._controller_options)
         self._limiter = SpeedLimiter(self.network, self._channel_values.columns, self.characters)
 
     @cached_property
     def layers(self) -> Layers:
         """Functions that put other animation, such as a wave, on top of a pose."""
-        from hobble.runtime.layers import Layers
-
         return Layers(self.skeleton, self._pose_axes)
 
     def compare(self, rows: ClipRows) -> Compared:
@@ -209,8 +200,6 @@ class ProceduralAnimation:
         rows: `hobble.rows.clip_rows.load_clip_rows("database/clips/<clip>.npz")`. The state of the characters
         stays as it is. Raises ValueError for rows of other joints or without the network's channels.
         """
-        from hobble.runtime.error_calculator import compare
-
         return compare(self, rows)
 
     @property

@@ -159,9 +159,9 @@ class CallerTargets:
         """
         target = self.ground_vector("target_velocity", velocity)
         if (fastest := np.hypot(target[:, 0], target[:, 1]).max()) > FASTEST:
+            most = f"It may be {FASTEST:g} cm a frame at most ({FASTEST * 0.6:g} m/s at 60 frames a second)"
             raise ValueError(
-                f"target_velocity is {fastest:.4g} cm a frame, faster than a body can move. It may "
-                f"be {FASTEST:g} cm a frame at most ({FASTEST * 0.6:g} m/s at 60 frames a second)"
+                f"target_velocity is {fastest:.4g} cm a frame, faster than a body can move. {most}"
             )
         return target
 
@@ -207,18 +207,13 @@ class CallerTargets:
         if as_array.dtype.kind in "biuf":  # numbers, so these are shares and not names
             valid = (as_array >= 0) & (as_array <= 1)
             if as_array.shape not in (shares.shape, shares.shape[1:]) or not valid.all():
-                raise ValueError(
-                    f"gait shares have to be {shares.shape[1:]} or {shares.shape} numbers from 0 to 1, not "
-                    f"{as_array.tolist()}; order: {', '.join(self._gaits)}"
-                )
+                what = f"gait shares have to be {shares.shape[1:]} or {shares.shape} numbers from 0 to 1"
+                raise ValueError(f"{what}, not {as_array.tolist()}; order: {', '.join(self._gaits)}")
             shares[:] = as_array
             return shares
         names = [gait] * self.characters if gait is None or isinstance(gait, str) else gait
         if len(names) != self.characters:
-            raise ValueError(
-                f"{len(names)} gaits for {self.characters} characters: give one name for all of them, or one "
-                "name for each"
-            )
+            raise ValueError(f"{len(names)} gaits for {self.characters} characters: give one, or one each")
         shares[:] = 0.0
         for c, name in enumerate(names):
             if name is None:

@@ -77,20 +77,18 @@ class Character:
 
 
 def start_characters(
-    network: Network, count: int, position: Array, yaw: Array, scales: Mapping[str, float] | None = None
+    network: Network, count: int, position: Array, yaw: Array, scales: Mapping[str, float]
 ) -> Character:
     """The states of `count` healthy characters at ground positions (C, 2), facing `yaw` (C,) in radians.
 
-    scales: channel -> number by which its values are divided; default: 1.
+    scales: channel -> number by which its values are divided, 1 for others.
 
     They start in the start frame of the network's file. It is a standing pose, unless the training clips
     hardly have any. If the file has no start frame, they start in the network's mean pose.
     """
     layout, facts = network.layout, network.training_facts
-    scale_of = scales or {}
-    at_rest = [
-        channel(name).default / scale_of.get(name, 1.0) for name, n in layout.channels for _ in range(n)
-    ]
+    sizes = layout.channels
+    at_rest = [channel(name).default / scales.get(name, 1.0) for name, n in sizes for _ in range(n)]
     # A row of network outputs, relative to the root.
     start_row = network.y_mean.astype(float) if facts is None else facts.start_y.astype(float)
     path, path_direction, gait = _start_path(network)
@@ -152,9 +150,5 @@ def _turn_about_y(vectors: Array, sin: Array, cos: Array) -> Array:
     vectors: (N, 2) x and z, or (N, 3) x, y and z. sin, cos: (C, 1) of the angles.
     """
     x, z = vectors[:, 0], vectors[:, -1]
-    components = [
-        x * cos + z * sin,
-        *(np.broadcast_to(y, (len(sin), len(x))) for y in vectors.T[1:-1]),
-        z * cos - x * sin,
-    ]
-    return np.stack(components, axis=-1)
+    heights = (np.broadcast_to(y, (len(sin), len(x))) for y in vectors.T[1:-1])
+    return np.stack([x * cos + z * sin, *heights, z * cos - x * sin], axis=-1)

@@ -98,8 +98,7 @@ def advance(
     position, direction, gait = path
     length = position.shape[1]
     middle = length // 2  # the present frame
-    velocity_column, turn_column, change_column = columns[0], columns[1], columns[2]
-    position_column, direction_column, future, step = columns[3], columns[4], columns[5], columns[6]
+    velocity_column, turn_column, change_column, position_column, direction_column, future, step = columns
     for c in range(y.shape[0]):
         for i in range(middle):
             for k in range(2):
@@ -140,7 +139,7 @@ def advance(
         phase[c] = phase[c] + change - np.floor(phase[c] + change)
 
 
-def advance_columns(layout: RowLayout) -> np.ndarray:
+def advance_columns(layout: RowLayout) -> tuple[int, ...]:
     """The argument `columns` (7,) of `advance`.
 
     These are the first columns in Y of root velocity, turn, phase change, position and direction, then the
@@ -149,7 +148,7 @@ def advance_columns(layout: RowLayout) -> np.ndarray:
     blocks = (
         layout.y_root_velocity, layout.y_turn, layout.y_phase_change, layout.y_position, layout.y_direction
     )  # fmt: skip
-    return np.array([*(b.start for b in blocks), layout.future, layout.step], np.int64)
+    return (*(b.start for b in blocks), layout.future, layout.step)
 
 
 # One frame of a character in six timed steps: prepare, input, insert, predict, output, update.
@@ -174,9 +173,9 @@ Ground = Callable[[Array, Array], Array]  # x, z (N,), cm -> heights (N,), cm
 class Controller:
     """Runs the characters of one network.
 
-    character: their state, changed in place. rates: channel -> largest change of its values per second.
-    foot_locking: hold feet in contact where they landed. steering: gain with which the target velocity is
-    corrected while the character does not reach it; 0: no correction.
+    character: their state, changed in place. options: rates, foot_locking and steering. rates: channel ->
+    largest change of its values per second. foot_locking: hold feet in contact where they landed. steering:
+    gain with which the target velocity is corrected while the character does not reach it; 0: no correction.
 
     After `advance_frame`, these are the pose for the caller: root (C, 3), yaw (C,), pose_position (C, J, 3)
     and pose_rotation (C, J, 4). The attributes x, z and y are the rows of inputs, of
@@ -184,19 +183,13 @@ class Controller:
     """
 
     def __init__(
-        self,
-        predictor: Predictor,
-        character: Character,
-        *,
-        rates: Mapping[str, float],
-        foot_locking: bool,
-        steering: float,
+        self, predictor: Predictor, character: Character, options: tuple[Mapping[str, float], bool, float]
     ) -> None:
-        network = predictor.network
+        network, (rates, self.foot_locking, self.steering) = predictor.network, options
         layout = network.layout
         count = len(character.phase)
         self.predictor, self.character, self.layout = predictor, character, layout
-        self.side, self.foot_locking, self.steering = network.terrain_side, foot_locking, steering
+        self.side = network.terrain_side
         self.seconds = np.zeros(len(STEPS))
         self.x = np.zeros((count, layout.x_size), np.float32)
         self.z = np.zeros_like(self.x)
@@ -224,13 +217,8 @@ class Controller:
         self._y_joints = layout.y_joint_position.start
         assert network.skeleton is not None
         legs = feet.leg_joints(network.skeleton)
-        self._legs = (
-            legs,
-            feet.foot_parts(network.skeleton, legs),
-            feet.sole_heights(network, legs),
-            feet.rest_facing(network.skeleton),
-            self.bounds.fastest,
-        )
+        parts, ahead = feet.foot_parts(network.skeleton, legs), feet.rest_facing(network.skeleton)
+        self._legs = legs, parts, feet.sole_heights(network, legs), ahead, self.bounds.fastest
         self._hips = network.skeleton.role("hips")
         self._hips_range = (*self.bounds.hips, self.bounds.upright)
         # The joints under which the ground is looked up (heels, toes, hips), and the ground heights there.
@@ -348,13 +336,9 @@ def _heights(ground: Ground, x: Array, z: Array) -> Array:
     """
     heights = np.asarray(ground(x, z), float)
     if heights.shape not in ((), x.shape):
-        raise ValueError(
-            f"the terrain returned heights of shape {heights.shape} for {x.size} points; "
-            "it has to return one height for each"
-        )
+        raise ValueError(f"the terrain returned heights of shape {heights.shape} for {x.size} points")
     if not np.isfinite(heights).all():
         raise ValueError("the terrain has heights that are not finite")
-    if np.abs(heights).max() > HIGHEST_GROUND:
-        highest = np.abs(heights).max()
+    if (highest := np.abs(heights).max()) > HIGHEST_GROUND:
         raise ValueError(f"the terrain has a height of {highest:.4g} cm; {HIGHEST_GROUND:g} cm at most")
     return np.broadcast_to(heights, x.shape)

@@ -30,27 +30,27 @@ from hobble.runtime.options import Runtime
 
 FPS = 60.0  # frames a second of the generated motion
 SETTLED = 6 * 60  # frames until the gait has settled; no loop begins earlier
-SHORTEST, LONGEST = 150, 300  # frames: least and greatest length of a loop, unless the caller says otherwise
+LENGTHS = (150, 300)  # frames: least and greatest length of a loop, unless the caller says otherwise
 BLEND = 12  # frames over which the end of a loop is blended into its start
 SPEEDS = {"stand": 0.0, "walk": 2.5, "jog": 7.0, "crouch": 2.0}  # cm a frame, of the gaits that can repeat
 LOOP_FRAMES = (40, 150)  # frames at 60 Hz: least and greatest length of a loop in a glTF file
 HURT = 0.7  # share of a channel's highest value, with which the hurt loops walk
 
-# Velocity (2,), cm a frame; facing (2,), or None to look where the character goes; gait.
-Target = tuple[Array, Array | None, str]
+Values = Mapping[str, Mapping[str, float]]  # channel -> column -> value
 
 
 @dataclass(frozen=True)
 class Scenario:
     """A script of `frames` frames at 60 Hz.
 
-    target: function from the frame's number to the target. swept: channel and column of the value that rises
-    from 0 to the channel's highest during the script; None: all values are 0.
+    target: function from the frame's number to the velocity (2,), cm a frame, the facing (2,), or None to
+    look where the character goes, and the gait. swept: channel and column of the value that rises from 0 to
+    the channel's highest during the script; None: all values are 0.
     """
 
     name: str
     frames: int
-    target: Callable[[int], Target] = field(repr=False)
+    target: Callable[[int], tuple[Array, Array | None, str]] = field(repr=False)
     swept: tuple[str, str] | None = None
 
 
@@ -78,10 +78,9 @@ def scenarios(network: Network) -> list[Scenario]:
 
 
 def swept_columns(network: Network) -> dict[str, tuple[str, str]]:
-    """The scenarios with a swept value: name -> channel and column. Empty without channels or skeleton."""
+    """The scenarios with a swept value: name -> channel and column. Empty without channels."""
     skeleton = network.skeleton
-    if skeleton is None:
-        return {}
+    assert skeleton is not None
     return {
         name: (of_channel, column)
         for of_channel, columns in network.channels.items()
@@ -179,11 +178,7 @@ class RepeatedWalk:
 
 
 def make_loop(
-    network: Network,
-    values: Mapping[str, Mapping[str, float]],
-    runtime: Runtime,
-    gait: str = "walk",
-    lengths: tuple[int, int] = (SHORTEST, LONGEST),
+    network: Network, values: Values, runtime: Runtime, gait: str = "walk", lengths: tuple[int, int] = LENGTHS
 ) -> RepeatedWalk:
     """A loop of the character going straight on, cut out of a longer walk by `find_cut`.
 
@@ -207,7 +202,7 @@ def make_loop(
     return RepeatedWalk(loop_positions, loop_rotations, travel, gap)
 
 
-def find_cut(positions: Array, lengths: tuple[int, int] = (SHORTEST, LONGEST)) -> tuple[int, int, float]:
+def find_cut(positions: Array, lengths: tuple[int, int] = LENGTHS) -> tuple[int, int, float]:
     """Find two frames of a walk, (F, J, 3), between which it can be cut out and repeated.
 
     Their poses and velocities are as similar as possible. Returns the first frame of the loop, the frame

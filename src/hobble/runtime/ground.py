@@ -30,8 +30,7 @@ class Heightmap:
         heights = np.ascontiguousarray(self.heights, float)
         if heights.ndim != 2 or min(heights.shape) < 2 or not np.all(np.isfinite(heights)):
             raise ValueError(
-                "a heightmap has to be a 2D array of finite numbers, at least 2 x 2; this one has the shape "
-                f"{heights.shape} and {np.sum(~np.isfinite(heights))} numbers that are not finite"
+                f"a heightmap has to be a 2D array of finite numbers, at least 2 x 2, not {heights.shape}"
             )
         object.__setattr__(self, "heights", heights)
 
@@ -53,9 +52,8 @@ def as_ground(terrain: Any, axes: Axes) -> Callable[[Array, Array], Array] | Non
     if isinstance(terrain, np.ndarray):
         terrain = Heightmap(terrain)
     if not callable(terrain):
-        raise TypeError(
-            f"terrain has to be a function, a Heightmap, a 2D array or None, not {type(terrain).__name__}"
-        )
+        kind = type(terrain).__name__
+        raise TypeError(f"terrain has to be a function, a Heightmap, a 2D array or None, not {kind}")
     if axes.is_native:  # the caller's axes and unit are Hobble's
         return terrain  # type: ignore[no-any-return]
     if isinstance(terrain, Heightmap) and terrain.cell is None:

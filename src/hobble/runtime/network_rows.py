@@ -43,10 +43,8 @@ class ChannelValues:
     """
 
     def __init__(self, network: Network, scales: Mapping[str, float]) -> None:
-        self.labels = {
-            name: {label: i for i, label in enumerate(column_labels)}
-            for name, column_labels in network.channels.items()
-        }
+        columns = network.channels.items()
+        self.labels = {name: {label: i for i, label in enumerate(own)} for name, own in columns}
         self._network = network
         self._names: dict[str, Mapping[str, str]] = {}  # channel -> other names -> label, once needed
         self.scales = dict(scales)
@@ -70,29 +68,23 @@ class ChannelValues:
         if isinstance(given, Mapping):
             for label, value in given.items():
                 column = labels[self._label(name, label)]
-                if np.shape(value) not in ((), (1,), (characters,)):
-                    shape = np.shape(value)
-                    raise ValueError(
-                        f"{label} has to be one {definition.value_word} for all characters, or an array of "
-                        f"{characters}, one for each; its shape is {shape}"
-                    )
+                if (shape := np.shape(value)) not in ((), (1,), (characters,)):
+                    one = f"{label} has to be one {definition.value_word} for all characters"
+                    raise ValueError(f"{one}, or {characters}, one for each; its shape is {shape}")
                 values[:, column] = value
         else:
             array = np.asarray(given, float)
             if not labels and array.size:
                 raise ValueError(f"{array.size} numbers given for {name}, but {_no_input(name)}")
             if array.shape not in (values.shape, values.shape[1:]):
-                raise ValueError(
-                    f"{name} has to have shape {values.shape[1:]} or {values.shape}, not {array.shape}"
-                )
+                either = f"{values.shape[1:]} or {values.shape}"
+                raise ValueError(f"{name} has to have shape {either}, not {array.shape}")
             values[:] = array
         wrong = ~((values >= 0) & (values <= definition.highest))
         if wrong.any():
             c, k = np.argwhere(wrong)[0]
-            raise ValueError(
-                f"the {definition.value_word} of {list(labels)[k]} is {values[c, k]:g}, but has to be from 0 "
-                f"to {definition.highest:g}"
-            )
+            what = f"the {definition.value_word} of {list(labels)[k]} is {values[c, k]:g}"
+            raise ValueError(f"{what}, but has to be from 0 to {definition.highest:g}")
         return self.columns.get(name, slice(0, 0)), values / self.scales.get(name, 1.0)
 
     def _label(self, name: str, label: str) -> str:
@@ -107,9 +99,8 @@ class ChannelValues:
             return label
         if name not in self._names:
             skeleton, trained = self._network.skeleton, self._network.trained_labels(name)
-            self._names[name] = (
-                channel_display(name, skeleton, list(labels), trained).other_names if skeleton else {}
-            )
+            assert skeleton is not None, "a character has one"
+            self._names[name] = channel_display(name, skeleton, list(labels), trained).other_names
         if label not in self._names[name]:
             raise UnknownName(f"{name} has no", label, labels)
         return self._names[name][label]

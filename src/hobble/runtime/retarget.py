@@ -41,11 +41,10 @@ def load_rig(file: str | Path) -> KnownSkeleton:
     known = match_rig(raw.skeleton, load_rig("holden31"), skeleton_folder())
     body, _ = body_in_file(path, raw, known, "auto")
     rig = replace(raw.skeleton, roles=body.roles(raw.skeleton.joints))
-    unit = likely_unit(leg_length(rig)) if leg_length(rig) > 0 else None
+    length = leg_length(rig)
+    unit = likely_unit(length) if length > 0 else None
     if unit is None:
-        raise InputError(
-            path, f"no unit gives this rig a person's size: its legs are {leg_length(rig):g} long"
-        )
+        raise InputError(path, f"no unit gives this rig a person's size: its legs are {length:g} long")
     rig = replace(rig, offsets=unit * rig.offsets)
     if problem := why_not_standing(body, rest_positions(rig)):
         raise InputError(path, f"its zero pose is no rest pose: {problem}")

@@ -109,7 +109,7 @@ def target_facing(velocity: Any, ahead: Any, direction: Any, strafe: Any, look: 
 def follow_target(target: Target, steering: float, smoothed: Smoothed, path: Trajectory) -> None:
     """Move `smoothed` toward the caller's target, and the gait of the present frame toward the target gait.
 
-    Before that, `_ask_velocity` and `_ask_turn` correct the target. With `steering` 0 there is no correction,
+    Before that, the target is corrected, see `_ask_velocity`. With `steering` 0 there is no correction,
     as in the runtime of Holden et al. (2017).
     """
     target_velocity, target_direction, target_strafe, target_gait = target
@@ -122,7 +122,10 @@ def follow_target(target: Target, steering: float, smoothed: Smoothed, path: Tra
         if steering > 0.0:
             if x * x + z * z >= STILL * STILL:
                 facing = np.arctan2(heading[c, middle, 0], heading[c, middle, 1])
-                goal_yaw += _ask_turn(0.5 * steering, wrap(goal_yaw - facing))
+                turn = wrap(goal_yaw - facing)
+                # Ask for more than the remaining turn, but not for so much that the network turns around.
+                room = max(FURTHEST_TURN - abs(turn), 0.0)
+                goal_yaw += min(max(0.5 * steering * turn, -room), room)
             x, z = _ask_velocity(steering, x, z, position[c], correction[c])
         velocity[c, 0] += TARGET_MIX * (x - velocity[c, 0])
         velocity[c, 1] += TARGET_MIX * (z - velocity[c, 1])
@@ -164,16 +167,6 @@ def _ask_velocity(steering: float, x: float, z: float, position: Any, correction
                 correction[k] = min(max(correction[k], -MOST_CORRECTION), MOST_CORRECTION)
     limit = STEERING_LIMIT * speed / max(np.sqrt(more_x * more_x + more_z * more_z), 1e-6)
     return x + more_x * min(1.0, limit), z + more_z * min(1.0, limit)
-
-
-@njit
-def _ask_turn(gain: float, turn: float) -> float:
-    """Radians to add to the remaining `turn`: `gain` times the turn, or less.
-
-    It is less if the sum would exceed FURTHEST_TURN, and 0 if the turn alone exceeds it.
-    """
-    room = max(FURTHEST_TURN - abs(turn), 0.0)
-    return min(max(gain * turn, -room), room)
 
 
 @njit

@@ -22,12 +22,7 @@ from hobble.core.errors import InputError
 from hobble.core.quat import Array
 from hobble.models.forward import forward
 from hobble.models.load import LARGEST_MEAN, read_arrays, read_layers
-from hobble.models.matching.network import (
-    MOST_WEIGHT,
-    OFFSETS_PER_JOINT,
-    Playing,
-    Transitions,
-)
+from hobble.models.matching.network import MOST_WEIGHT, OFFSETS_PER_JOINT, Playing, Transitions
 from hobble.models.network import LEARNED, Predictor, inverse_or_0, standardise_inputs
 from hobble.models.onnx_file import Graph, Node, OnnxNetwork, add_layers
 from hobble.models.predict import Stack

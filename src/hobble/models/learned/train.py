@@ -22,7 +22,7 @@ from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 from hobble.models.matching.build import findable_rows
 from hobble.models.model import FinishedNetwork
-from hobble.rows.layout import RowLayout
+from hobble.rows.layout import CONTACTS, RowLayout
 
 log = logging.getLogger("hobble.training")
 
@@ -36,7 +36,6 @@ LEAST_STD = 1e-4  # of a column; the standardised values of one that varies less
 # vectors, and their change, which makes them smooth enough for the stepper.
 CHANGE, LATENT_SIZE, LATENT_CHANGE = 10.0, 0.001, 0.01
 FOOT_WEIGHT = 3.0  # of the errors of heels and toes, whose sliding is seen first
-FOOT_JOINTS = ("left_heel", "left_toe", "right_heel", "right_toe")  # roles
 REPORTS = 5  # lines in the log for each training
 
 Options = Any  # `hobble.models.learned.LearnedOptions`, whose module imports this one
@@ -49,7 +48,7 @@ def train(options: Options, tables: Tables, layout: RowLayout, skeleton: Skeleto
     mean, std = tables["features"].mean(axis=0), tables["features"].std(axis=0)
     std[std < LEAST_STD] = 0.0
     features = torch.from_numpy((tables["features"] - mean) / np.where(std > 0, std, np.inf))
-    feet = [skeleton.role(role) for role in FOOT_JOINTS]
+    feet = [skeleton.role(role) for role in CONTACTS]
     decompressor, latent = _train_decompressor(options, tables, layout, feet, features)
     state = torch.cat([features, latent], dim=1)
     stepper = _train_stepper(options, tables, state)

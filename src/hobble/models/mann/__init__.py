@@ -20,7 +20,7 @@ from hobble.models.blend import BlendedNetwork, BlendedOptions, TrainableBlend
 from hobble.models.forward import forward, softmax
 from hobble.models.load import read_arrays, read_layers
 from hobble.models.network import GATED
-from hobble.rows.layout import GAITS, RowLayout
+from hobble.rows.layout import CONTACTS, GAITS, RowLayout
 
 if TYPE_CHECKING:
     from torch import Tensor
@@ -28,9 +28,8 @@ if TYPE_CHECKING:
     from hobble.models.onnx_file import Graph, Node
     from hobble.models.predict import Shares
 
-FEET = ("left_heel", "left_toe", "right_heel", "right_toe")  # roles of the joints
 GOAL_INPUTS = 2 * len(GAITS) + 2  # number of `goal_columns`
-GATE_INPUTS = 3 * len(FEET) + GOAL_INPUTS  # number of the columns that the gate gets
+GATE_INPUTS = 3 * len(CONTACTS) + GOAL_INPUTS  # number of the columns that the gate gets
 
 
 def goal_columns(layout: RowLayout) -> tuple[int, ...]:
@@ -67,7 +66,7 @@ class MannOptions(BlendedOptions):
 
     def gate_columns(self, layout: RowLayout, skeleton: Skeleton) -> tuple[int, ...]:
         """The columns of X that the gate gets: the velocities of heels and toes, and `goal_columns`."""
-        feet = [3 * skeleton.role(role) + axis for role in FEET for axis in range(3)]
+        feet = [3 * skeleton.role(role) + axis for role in CONTACTS for axis in range(3)]
         return *(layout.x_joint_velocity.start + column for column in feet), *goal_columns(layout)
 
 

@@ -62,9 +62,8 @@ def read_tables(
     parts = []
     for path in clips:
         rows = load_clip_rows(path)
-        if rows.layout.with_channels(()) != layout.with_channels(()) or not set(layout.channels) <= set(
-            rows.layout.channels
-        ):
+        known, bare = set(rows.layout.channels), rows.layout.with_channels(())
+        if bare != layout.with_channels(()) or not set(layout.channels) <= known:
             raise InputError(path, f"its columns ({rows.layout}) do not fit the database ({layout})")
         kept, remaining = find_runs(rows)
         x, y = on_mean_ground(rows, layout)
