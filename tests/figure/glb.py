@@ -24,6 +24,5 @@ class Glb:
         accessor = self.document["accessors"][moved["samplers"][sampler]["output"]]
         view = self.document["bufferViews"][accessor["bufferView"]]
         size = {"VEC3": 3, "VEC4": 4}[accessor["type"]]
-        return np.frombuffer(self._numbers, "<f4", accessor["count"] * size, view["byteOffset"]).reshape(
-            -1, size
-        )
+        values = np.frombuffer(self._numbers, "<f4", accessor["count"] * size, view["byteOffset"])
+        return values.reshape(-1, size)

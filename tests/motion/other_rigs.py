@@ -14,7 +14,7 @@ import numpy as np
 from hobble.core import quat
 from hobble.core.bvh import write_bvh
 from hobble.core.clip import Clip
-from tests.motion.scramble import SYLLABLES, Rig, Scramble, as_clip, from_world
+from tests.motion.scramble import SYLLABLES, Rig, Scramble, as_clip
 
 SIDES = {"L": "Left", "R": "Right"}
 
@@ -99,15 +99,6 @@ def rigged(clip: Clip, text: str, **how: Any) -> tuple[Clip, dict[str, str]]:
         rig.add(name, -1 if parent == "-" else rig.names.index(parent), place, turn)
     plain = {"rest": "own", "unit": "cm", "rate": 60.0, "z_up": False, "left_handed": False, "six": False}
     return as_clip(rig, clip, replace(Scramble.drawn(3), **plain | how), np.random.default_rng(5)), names
-
-
-def rezeroed(clip: Clip, joints: tuple[str, ...], turn: np.ndarray) -> Clip:
-    """The same motion on a rig whose joints with these first letters are turned in the zero pose."""
-    turned, places = clip.global_rotations.copy(), clip.positions
-    for j, name in enumerate(clip.skeleton.joints):
-        if name.startswith(joints):
-            turned[:, j] = quat.mul(turned[:, j], turn)
-    return from_world(clip.skeleton, clip.fps, places, turned)
 
 
 def both(

@@ -160,13 +160,9 @@ def test_a_captured_walk_tilted_to_the_side_is_refused(shared, make, name, degre
     assert found == pytest.approx(8.0, abs=2.5)
 
 
-def leaning_aside(clip):
-    rotations, spine = clip.rotations.copy(), clip.skeleton.role("spine")
-    rotations[:, spine] = quat.mul(quat.from_axis_angle(Z, 0.35), rotations[:, spine])
-    return replace(clip, rotations=rotations)
-
-
 # The made-up walk balances 5 degrees forward of its feet, so on 8 degrees down it would look tilted.
-@pytest.mark.parametrize("change", [lambda c: sloped(c, -14.0), lambda c: sloped(c, 8.0), leaning_aside])
-def test_a_slope_or_a_trunk_that_leans_aside_is_no_tilt(walk, change):
-    assert world_tilt(change(walk)) is None
+def test_a_slope_or_a_trunk_that_leans_aside_is_no_tilt(walk):
+    rotations, spine = walk.rotations.copy(), walk.skeleton.role("spine")
+    rotations[:, spine] = quat.mul(quat.from_axis_angle(Z, 0.35), rotations[:, spine])
+    for clip in (sloped(walk, -14.0), sloped(walk, 8.0), replace(walk, rotations=rotations)):
+        assert world_tilt(clip) is None

@@ -9,6 +9,7 @@ from hobble.core import quat
 from hobble.core.bvh import write_bvh
 from hobble.core.clip import Clip
 from hobble.core.errors import InputError
+from hobble.core.skeleton import Skeleton
 from hobble.motion.axes import degrees_between
 from tests.motion.other_rigs import PLAIN, both, rigged
 from tests.motion.scramble import X, compare, source_of
@@ -29,7 +30,7 @@ def test_a_clip_too_short_to_show_its_feet_is_refused_or_accepted(shared, tmp_pa
 @pytest.fixture(scope="module")
 def standing(holden31) -> Clip:
     """Five seconds on both feet."""
-    still = np.broadcast_to(quat.IDENTITY, (300, len(holden31.joints), 4)).copy()
+    still = np.tile(quat.IDENTITY, (300, len(holden31.joints), 1))
     return Clip("stands", holden31, 60.0, still, np.tile([0.0, 95.5, 0.0], (300, 1)))
 
 
@@ -71,19 +72,14 @@ def without_toes(clip: Clip, site: tuple[float, float, float] | None) -> Clip:
     """The clip on a rig without balls of the feet, with end sites of the ankles (cm) or without."""
     rig = clip.skeleton
     keep = [j for j, name in enumerate(rig.joints) if "Toe" not in name]
-    legs = replace(
-        rig,
-        joints=tuple(rig.joints[j] for j in keep),
-        parents=(-1, *(keep.index(rig.parents[j]) for j in keep[1:])),
-        offsets=rig.offsets[keep],
-        end_sites={} if site is None else {"LeftFoot": site, "RightFoot": site},
-    )
+    parents = (-1, *(keep.index(rig.parents[j]) for j in keep[1:]))
+    ends = {} if site is None else {"LeftFoot": site, "RightFoot": site}
+    legs = Skeleton("legs", tuple(rig.joints[j] for j in keep), parents, rig.offsets[keep], end_sites=ends)
     return replace(clip, skeleton=legs, rotations=clip.rotations[:, keep])
 
 
-@pytest.mark.parametrize("site", [(0.0, -6.0, 0.0), (0.1, -6.0, 0.0)])
-def test_a_foot_points_ahead_even_if_its_end_site_lies_under_the_ankle(walk, bvh, make, site):
-    made, _ = make(bvh(without_toes(walk, site)))
+def test_a_foot_points_ahead_even_if_its_end_site_lies_under_the_ankle(walk, bvh, make):
+    made, _ = make(bvh(without_toes(walk, (0.1, -6.0, 0.0))))
     clips = made, walk.part(slice(None, None, 2))
     assert degrees_between(*(c.at_roles()["left_toe"] - c.at_roles()["left_heel"] for c in clips)).max() < 8
 
