@@ -91,7 +91,7 @@ def plain_heights(patches: Patches, p: int, points: np.ndarray) -> np.ndarray:
     """One patch at points (N, 2), in float64, by scipy."""
     m = patches.which[p]
     rows, columns = patches.shapes[m]
-    cells = patches.heights[patches.starts[m] :][: rows * columns].reshape(rows, columns).astype(float)
+    cells = patches.heights[patches.maps[1][m] :][: rows * columns].reshape(rows, columns).astype(float)
     at = patches.affine[p].astype(float) @ np.column_stack([points, np.ones(len(points))]).T
     return map_coordinates(cells, at, order=1) - patches.mean[p]
 

@@ -26,15 +26,14 @@ FEWEST_PASSING = 1 / 1_000  # drawing from a map fails if a smaller share of its
 class Patches:
     """P views of M heightmaps.
 
-    heights: all maps one after another, row by row, cm, float32. starts: (M,) index of each map's first cell.
-    shapes: (M, 2) rows and columns. which: (P,) index of each view's map.
-    affine: (P, 2, 3) such that row, column of the map = affine (u, v, 1), where (u, v) is a cell counted from
-    the middle of the patch, u along the world's x and v along z. mean: (P,) mean height of each view, cm; it
-    is subtracted. cell: width of a patch's cell, cm. size: width of a patch, cells.
+    heights: all maps one after another, row by row, cm, float32. shapes: (M, 2) rows and columns.
+    which: (P,) index of each view's map. affine: (P, 2, 3) such that row, column of the map = affine
+    (u, v, 1), where (u, v) is a cell counted from the middle of the patch, u along the world's x and v along
+    z. mean: (P,) mean height of each view, cm; it is subtracted. cell: width of a patch's cell, cm. size: width
+    of a patch, cells.
     """
 
     heights: Array = field(repr=False)
-    starts: np.ndarray = field(repr=False)
     shapes: np.ndarray
     which: np.ndarray = field(repr=False)
     affine: Array = field(repr=False)
@@ -47,8 +46,9 @@ class Patches:
 
     @property
     def maps(self) -> tuple[np.ndarray, ...]:
-        """The arrays of all heightmaps, in the order in which the compiled loops take them."""
-        return self.heights, self.starts, self.shapes
+        """Heights, index of each map's first cell (M,), and shapes, as the compiled loops take them."""
+        sizes = np.prod(self.shapes, axis=1)
+        return self.heights, np.cumsum(sizes) - sizes, self.shapes
 
     def cells(self, points: Array, centre: Array) -> Array:
         """World points (N, 2), x and z in cm, as cells from the middle of a patch at `centre` (2,).
@@ -84,11 +84,9 @@ def draw_patches(
         _draw_views(heightmap, views, cell, size, highest, np.random.default_rng([seed, i]))
         for i, (heightmap, views) in enumerate(zip(maps, counts, strict=True))
     ]
-    shapes = np.array([m.heights.shape for m in maps], np.int64)
     return Patches(
         heights=np.concatenate([np.nan_to_num(m.heights).astype(np.float32).ravel() for m in maps]),
-        starts=_first_cells(shapes),
-        shapes=shapes,
+        shapes=np.array([m.heights.shape for m in maps], np.int64),
         which=np.repeat(np.arange(len(maps), dtype=np.int32), counts),
         affine=np.concatenate([affine for affine, _ in drawn]),
         mean=np.concatenate([mean for _, mean in drawn]),
@@ -156,7 +154,7 @@ def load_patches(path: str | Path) -> Patches:
     if at.min(initial=0) < -0.01 or np.any(at > shapes[which][..., None] - 0.99):
         raise InputError(path, "a view reaches beyond its heightmap", fix=DELETE_IT)
     arrays = {name: data[name] for name in DECLARED if name not in ("cell", "size", "shapes")}
-    return Patches(starts=_first_cells(shapes), shapes=shapes, cell=float(data["cell"]), size=size, **arrays)
+    return Patches(shapes=shapes, cell=float(data["cell"]), size=size, **arrays)
 
 
 def _with_holes_marked(heightmap: TerrainMap, cell: float) -> Array:
@@ -171,15 +169,6 @@ def _with_holes_marked(heightmap: TerrainMap, cell: float) -> Array:
 
     reach = 1 + int(np.ceil(cell / heightmap.cell))
     return np.where(maximum_filter(holes, 2 * reach + 1), HOLE_HEIGHT, heightmap.heights)
-
-
-def _first_cells(shapes: np.ndarray) -> np.ndarray:
-    """(M,) index of the first cell of each map, if all maps are one after another in one array.
-
-    shapes: (M, 2) rows and columns of the maps.
-    """
-    sizes = np.prod(shapes, axis=1)
-    return np.cumsum(sizes) - sizes
 
 
 def _random_views(rng: np.random.Generator, heightmap: TerrainMap, cell: float, size: int) -> Array:
