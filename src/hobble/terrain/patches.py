@@ -29,8 +29,8 @@ class Patches:
     heights: all maps one after another, row by row, cm, float32. shapes: (M, 2) rows and columns.
     which: (P,) index of each view's map. affine: (P, 2, 3) such that row, column of the map = affine
     (u, v, 1), where (u, v) is a cell counted from the middle of the patch, u along the world's x and v along
-    z. mean: (P,) mean height of each view, cm; it is subtracted. cell: width of a patch's cell, cm. size: width
-    of a patch, cells.
+    z. mean: (P,) mean height of each view, cm; it is subtracted. cell: width of a patch's cell, cm. size: its
+    width, cells.
     """
 
     heights: Array = field(repr=False)
