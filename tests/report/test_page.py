@@ -9,7 +9,6 @@ from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 
 from hobble.core.errors import HobbleError
@@ -17,7 +16,7 @@ from hobble.measures.measure import all_measures
 from hobble.models.network import Network
 from hobble.report import sections, templates
 from hobble.report.bundle import bundle_page_scripts, install_npm_packages
-from hobble.report.character import TURN, UNIT, packed_comparisons, packed_motion
+from hobble.report.character import packed_comparisons
 from hobble.report.gather import ReportMaterial
 from hobble.report.page import render_report
 from hobble.report.parts import embedded
@@ -95,10 +94,6 @@ def test_a_network_without_channels_has_a_page_and_measurements_without_results_
     nothing = {one.name: {"applies": False, "reason": "no such input"} for one in all_measures()}
     ids = {e["id"] for e in Outline(render_report(replace(material, measurements=nothing))).all("section")}
     assert ids == SECTIONS - {"play", "gallery", "engine", "accuracy", "injury", "speed"}
-
-
-def test_commands_in_findings_are_code() -> None:
-    assert templates.with_code("<b> `hobble x`") == "&lt;b&gt; <code>hobble x</code>"
 
 
 def test_scripts_that_would_end_their_element_are_refused(material: ReportMaterial) -> None:
@@ -204,15 +199,3 @@ def test_without_the_registry_the_message_says_so(tmp_path: Path, monkeypatch: p
     monkeypatch.setenv("npm_config_fetch_retries", "0")
     with pytest.raises(HobbleError, match=r"could not download .* from the npm registry"):
         install_npm_packages(tmp_path / "page")
-
-
-def test_motion_is_packed_within_a_tenth_of_a_millimetre() -> None:
-    rng = np.random.default_rng(0)
-    world = rng.uniform(-90, 90, (7, 5, 3)) + rng.uniform(-4000, 4000, (7, 1, 3))
-    turns = rng.uniform(-1, 1, (7, 5, 4))
-    packed = {key: base64.b64decode(text) for key, text in packed_motion(world, turns, [0, 2, 4]).items()}
-    root = np.frombuffer(packed["root"], "<f4").reshape(7, 1, 3)
-    pose = np.frombuffer(packed["pose"], "<i2").reshape(7, 3, 3)
-    assert np.abs(root + pose * UNIT - world[:, ::2]).max() < 0.01
-    turn = np.frombuffer(packed["turn"], "<i2").reshape(7, 3, 4) / TURN
-    assert np.abs(turn - turns[:, ::2]).max() < 1e-4

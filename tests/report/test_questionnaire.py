@@ -8,7 +8,6 @@ from typing import Any
 
 import pytest
 
-from hobble.core.errors import HobbleError
 from hobble.core.files import read_json
 from hobble.measures import films
 from hobble.measures.films import FILMS, part_links, write_questionnaire
@@ -126,11 +125,3 @@ def test_the_link_that_was_hurt_in_training_is_hurt(network: Network) -> None:
     mean[network.layout.x_channel("injury")] = [link == "LeftHand-LeftFingerBase" for link in links]
     taught = part_links(replace(network, x_mean=mean), ["left forearm"])
     assert taught == ["LeftForeArm-LeftHand"], "a finger is no forearm"
-
-
-def test_a_network_that_is_not_told_what_hurts_says_which_is(
-    network: Network, runtime: Runtime, tmp_path: Path
-) -> None:
-    with pytest.raises(HobbleError, match="no injury channel"):
-        write_questionnaire(replace(network, channels={}), tmp_path / "out", runtime, "plain")
-    assert not (tmp_path / "out").exists()

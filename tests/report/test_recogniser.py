@@ -117,20 +117,18 @@ def test_the_panel_shows_the_recognised_limp(
 ) -> None:
     """The recogniser in Play uses three seconds, and asks the user to walk if there is no cycle."""
     healthy = profile_of_walk(measure_cycles(holden31, walks["even"], 60))
-    recogniser = packed_statistics() | {
-        "healthy": [healthy[name] for name in PROFILE_IN_C],
-        "joints": measured_joints(holden31),
-    }
-    said = {}
-    for name in ("even", "on the spot"):
-        frames = walks[name].reshape(len(walks[name]), -1).tolist()
-        said[name] = tab.run(f"""(() => {{
-          const spec = {{ ...Hobble.material.playable.test, recogniser: {json.dumps(recogniser)} }};
-          const watch = Hobble.watch(spec);
-          {json.dumps(frames)}.forEach((places) => watch.add(places));
+    learnt = {"healthy": [healthy[name] for name in PROFILE_IN_C], "joints": measured_joints(holden31)}
+    even, on_the_spot = (
+        tab.run(f"""(() => {{
+          const frames = {json.dumps(walks[name].reshape(len(walks[name]), -1).tolist())};
+          const recogniser = {json.dumps(packed_statistics() | learnt)};
+          const watch = Hobble.watch({{ ...Hobble.material.playable.test, recogniser }});
+          frames.forEach((places) => watch.add(places));
           return watch.say();
         }})()""")
+        for name in ("even", "on the spot")
+    )
     last = grade_walk(profile_of_walk(measure_cycles(holden31, walks["even"][-180:], 60)), healthy)
-    assert said["even"]["text"] == "nothing hurts"
-    assert said["even"]["share"] == pytest.approx(last.probabilities["normal"], abs=1e-4)
-    assert said["on the spot"] == {"text": "no answer: walk straight ahead"}
+    assert even["text"] == "nothing hurts"
+    assert even["share"] == pytest.approx(last.probabilities["normal"], abs=1e-4)
+    assert on_the_spot == {"text": "no answer: walk straight ahead"}
