@@ -43,14 +43,14 @@ def test_sections_are_joined_escaped_and_their_charts_and_long_tables_found() ->
     columns = [Column("clip"), Column.number("error")]
     guest = PageSection("errors", [SectionPart(20, chart("b")), SectionPart(5, None)])
     parts = [SectionPart(30, Table("long", columns, rows)), SectionPart(10, Paragraph("<b>"))]
-    owner = PageSection("errors", parts, title="<S>", order=10, nav="E", long=True)
+    owner = PageSection("errors", parts, title="<S>", order=10, nav="E")
     pair, family = ChartGroup([chart("a"), None]), ChartGroup([chart("c"), chart("d")], "f", "F")
     alone = PageSection("laps", [SectionPart(0, pair), SectionPart(1, family)], order=5)
     short = PageSection("laps", [SectionPart(2, Table("short", columns, rows[:10]))])
     nothing = PageSection("none", [SectionPart(0, None)], title="None")
     first, second = joined = join_sections([guest, nothing, owner, alone, short])
     assert (first.name, first.title, first.nav) == ("laps", "Laps", "Laps")
-    assert (second.title, second.nav, second.order, second.long) == ("<S>", "E", 10, True)
+    assert (second.title, second.nav, second.order) == ("<S>", "E", 10)
     assert [part.content.kind for part in second.parts if part.content] == ["words", "chart", "table"]
     drawn = drawn_by_script(part for section in joined for part in section.parts)
     assert set(drawn["charts"]) == set("abcd")

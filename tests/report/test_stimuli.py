@@ -57,7 +57,7 @@ def test_the_body_stands_where_the_camera_says_and_its_injured_part_is_coloured(
 
 
 def test_films_without_a_visible_injury_get_a_warning() -> None:
-    assert stimuli.film_warnings([("left-foot", 1.5, [])]) == []
+    assert list(stimuli.film_warnings([("left-foot", 1.5, [])])) == []
     same, never = stimuli.film_warnings(
         [("left-foot", 1.5, []), ("left-arm", 0.0, ["B"]), ("weak", 0.05, []), ("both", 1.5, ["C"])]
     )

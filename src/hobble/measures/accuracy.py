@@ -77,7 +77,7 @@ def section(found: Json, material: ReportMaterial) -> PageSection:
         SectionPart(60, of_clips),
         SectionPart(90, parts.TemplatePart("captured.html.j2")),
     ]
-    return PageSection("accuracy", shown, title="Accuracy", order=10, long=True)
+    return PageSection("accuracy", shown, title="Accuracy", order=10)
 
 
 def _measured(found: Json) -> list[dict[str, Any]]:
@@ -216,7 +216,7 @@ def compared_section(compared: Compared) -> PageSection:
     """The spread of the errors, those of roll-outs, and errors of single clips."""
     charts = error_boxes(compared), compared_roll_outs(compared), clip_lines(compared)
     shown = [SectionPart(10 * place, each) for place, each in enumerate(charts, 1)]
-    return PageSection("accuracy", shown, title="Accuracy", order=10, long=True)
+    return PageSection("accuracy", shown, title="Accuracy", order=10)
 
 
 def compared_values(compared: Compared) -> Iterator[parts.ComparedValue]:

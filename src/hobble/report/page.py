@@ -94,7 +94,15 @@ def key_figures(material: ReportMaterial) -> list[parts.KeyFigure]:
         note = f"{len(material.motion)} clips, {_held_out_count(material)} of them held out"
         value, _, unit = parts.format_duration(seconds).partition(" ")
         figures.append(parts.KeyFigure("Motion data", value, unit, note, order=30))
-    figures.append(_network_figure(material.network))
+    network, note = material.network, "numbers in its tables"
+    # A PFNN has a set of weights at each control point, and `parameters` counts one of these sets. For other
+    # networks it counts all parameters. Motion matching has no layers, so its `sizes` are empty.
+    if network["sizes"]:
+        which = " at each control point" if "control points" in network["described"] else ""
+        note = f"parameters{which}; layers of {'–'.join(map(str, network['sizes']))}"
+    note += f"; {parts.format_bytes(network['bytes'])} on disk"
+    millions = parts.format_number(network["parameters"] / 1e6)
+    figures.append(parts.KeyFigure("Network", millions, "M", note, order=40))
     if total := material.pipeline.get("total_seconds"):
         value, _, unit = parts.format_duration(total).partition(" ")
         note = (
@@ -103,20 +111,6 @@ def key_figures(material: ReportMaterial) -> list[parts.KeyFigure]:
         )
         figures.append(parts.KeyFigure("Whole pipeline", value, unit, note, order=50))
     return sorted(figures, key=lambda figure: figure.order)
-
-
-def _network_figure(network: Mapping[str, Any]) -> parts.KeyFigure:
-    """Number of parameters, layers and size on disk. network: from `gather.describe_network`."""
-    # A PFNN has a set of weights at each control point, and `parameters` counts one of these sets. For other
-    # networks it counts all parameters. Motion matching has no layers, so its `sizes` are empty.
-    note = "numbers in its tables"
-    if network["sizes"]:
-        which = " at each control point" if "phase-functioned" in network["described"] else ""
-        note = f"parameters{which}; layers of {'–'.join(map(str, network['sizes']))}"
-    note += f"; {parts.format_bytes(network['bytes'])} on disk"
-    return parts.KeyFigure(
-        "Network", parts.format_number(network["parameters"] / 1e6, 3), "M", note, order=40
-    )
 
 
 def hints(material: ReportMaterial, both: Mapping[str, Array] | None = None) -> list[parts.Hint]:
@@ -248,7 +242,7 @@ def compared_sections(compared: parts.Compared) -> Iterator[parts.PageSection]:
     read = parts.Paragraph(parts.words("published.read"))
     yield own.own_section("training", training_curves(compared))
     yield own.own_section("costs", parts.ChartGroup(costs))
-    yield own.own_section("published", read, published_table(compared), long=True)
+    yield own.own_section("published", read, published_table(compared))
     yield own.own_section("origin", parts.TemplatePart("origin.html.j2"))
 
 

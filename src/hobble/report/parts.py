@@ -339,8 +339,8 @@ class PageSection:
     """A section of a page. `join_sections` joins sections with the same `name` into one.
 
     title: the heading; only one of the joined sections needs it. order: a number; sections are sorted by it.
-    nav: a shorter title for the list of contents; by default the title. long: whether printing may break the
-    section between pages. note: a line under the heading, which is read before the section is opened.
+    nav: a shorter title for the list of contents; by default the title. note: a line under the heading, which
+    is read before the section is opened.
     """
 
     name: str
@@ -348,7 +348,6 @@ class PageSection:
     title: str = ""
     order: int = 50
     nav: str = ""
-    long: bool = False
     note: str = ""
 
 

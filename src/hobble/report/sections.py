@@ -65,7 +65,6 @@ def own_sections(material: ReportMaterial, counted: Mapping[str, Any]) -> Iterat
         *channel_charts(counted, shown_names(material.network["skeleton"])),
         remarks_table(material),
         clip_table(material),
-        long=True,
     )
     about = parts.words("terrain.table" if fits.rows else "terrain.flat")
     yield own_section("terrain", parts.Paragraph(about), fits)
@@ -79,7 +78,7 @@ def own_sections(material: ReportMaterial, counted: Mapping[str, Any]) -> Iterat
     yield own_section("origin", parts.TemplatePart("origin.html.j2"))
 
 
-def own_section(name: str, *contents: parts.Content | None, long: bool = False) -> parts.PageSection:
+def own_section(name: str, *contents: parts.Content | None) -> parts.PageSection:
     """A section after those of the measurements, with title and note from captions.yaml."""
     content = [parts.SectionPart(i, each, open=name in UNFOLDED) for i, each in enumerate(contents)]
     return parts.PageSection(
@@ -87,7 +86,6 @@ def own_section(name: str, *contents: parts.Content | None, long: bool = False) 
         content,
         parts.words(f"sections.{name}.title"),
         order=90,
-        long=long,
         note=parts.words(f"sections.{name}.note"),
     )
 

@@ -3,7 +3,7 @@
 They are stimuli for a questionnaire, or pictures for a README.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -107,7 +107,7 @@ def loop_distance(loop: RepeatedWalk, other: RepeatedWalk) -> float:
     return float(np.mean([np.linalg.norm(other_poses - pose, axis=-1).mean(axis=1).min() for pose in poses]))
 
 
-def film_warnings(films: Iterable[tuple[str, float, Sequence[str]]]) -> list[str]:
+def film_warnings(films: Iterable[tuple[str, float, Sequence[str]]]) -> Iterator[str]:
     """Warnings about films that look like the neutral walk or have values without effect.
 
     films: of each, its name, its distance from the neutral walk in cm, and the columns above 0 in it that
@@ -116,11 +116,10 @@ def film_warnings(films: Iterable[tuple[str, float, Sequence[str]]]) -> list[str
     films = list(films)
     same = ", ".join(name for name, distance, _ in films if distance < VISIBLE)
     never = ", ".join(sorted({column for *_, untrained in films for column in untrained}))
-    found = {
-        f"{same}: they look like the neutral walk (less than {VISIBLE} cm from it). Leave them out.": same,
-        f"Never above 0 in training: {never}. Train on clips with such values.": never,
-    }
-    return [warning for warning, about in found.items() if about]
+    if same:
+        yield f"{same}: they look like the neutral walk (less than {VISIBLE} cm from it). Leave them out."
+    if never:
+        yield f"Never above 0 in training: {never}. Train on clips with such values."
 
 
 def draw_loop(renderer: BodyRenderer, loop: RepeatedWalk, values: Array | None, size: int) -> list[Picture]:
