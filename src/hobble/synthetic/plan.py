@@ -11,7 +11,6 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
-from scipy.ndimage import gaussian_filter1d
 
 from hobble.core.errors import HobbleError
 from hobble.core.quat import Array
@@ -166,6 +165,8 @@ class PlannedPath:
 
 def plan_path(segments: Sequence[Segment], frames: int, fps: float) -> PlannedPath:
     """The path of a plan (a list of segments) for a clip of `frames` frames, with padding at both ends."""
+    from scipy.ndimage import gaussian_filter1d  # here, because planning need not load SciPy
+
     first = round(4 * fps)  # four seconds of padding on each side
     total = frames + 2 * first
     segment = _segment_of_frame(segments, frames, fps)

@@ -3,7 +3,6 @@
 from typing import NamedTuple
 
 import numpy as np
-from scipy.ndimage import gaussian_filter1d
 
 from hobble.core import quat
 from hobble.core.quat import Array
@@ -75,6 +74,8 @@ def pose_figure(
 
 def _noise(rng: np.random.Generator, frames: int, fps: float, count: int) -> Array:
     """(F, count) slow random curves with variance 1."""
+    from scipy.ndimage import gaussian_filter1d  # here, because planning need not load SciPy
+
     white = rng.normal(size=(frames, count))
     smooth = gaussian_filter1d(white, 0.45 * fps, axis=0, mode="wrap")
     return smooth / smooth.std(axis=0)
@@ -100,6 +101,8 @@ def _hip_positions(walk: _Walk, feet: tuple[FootPoses, FootPoses], ground: Groun
 
     hips: (F, 4) rotations of the pelvis.
     """
+    from scipy.ndimage import gaussian_filter1d  # here, because planning need not load SciPy
+
     path, style, noise, flat_ground = walk.path, walk.style, walk.noise, ground is flat
     left, right = (walk.mid_stance(side) for side in (LEFT, RIGHT))
     sway = style.sway * (walk.wave(left) - walk.wave(right)) / 2
