@@ -609,7 +609,7 @@ typedef struct {
 
 struct hobble {
     model model;
-    int characters, memory_size;
+    int characters, memory_size, wide; /* wide: see `multiply` */
     const char **names;
     character *state, *saved_state; /* saved: as before the frame, in case the ground is refused */
     double *numbers, *saved_numbers;
@@ -633,27 +633,26 @@ struct hobble {
    same input are neighbours. Each output is one running sum over the inputs. A tile is a group of rows and
    panels whose sums stay in registers. */
 
-enum { DEPTH = 256, AHEAD_IN_MEMORY = 48, TILE_ROWS = 6 };
+enum { DEPTH = 128, AHEAD_IN_MEMORY = 48, TILE_ROWS = 6, TILE_PANELS = 4 };
 
+/* Three operations on WIDTH numbers: copy them, add an input's products with WIDTH weights, and convert WIDTH
+   weights. wide: with one vector of AVX-512, which changes no bit. */
 #if defined(__GNUC__) || defined(__clang__)
 #define ALWAYS_INLINE static inline __attribute__((always_inline))
-#ifdef __AVX512F__
-#define PIECE 16 /* numbers in a vector, and vectors in a panel's row */
-#else
-#define PIECE 8
-#endif
-#define PIECES (WIDTH / PIECE)
-typedef float vector __attribute__((vector_size(4 * PIECE), aligned(4), may_alias));
+#define FETCH(place) __builtin_prefetch(place, 0, 3)
 typedef float v4 __attribute__((vector_size(16)));
-typedef int32_t whole __attribute__((vector_size(4 * PIECE), aligned(4), may_alias));
-typedef int16_t half __attribute__((vector_size(2 * PIECE), aligned(2), may_alias));
+typedef float v8 __attribute__((vector_size(32), aligned(4), may_alias));
+typedef float v16 __attribute__((vector_size(64), aligned(4), may_alias));
+typedef int32_t whole __attribute__((vector_size(32), aligned(4), may_alias));
+typedef int16_t half __attribute__((vector_size(16), aligned(2), may_alias));
 
-#ifdef __wasm__
+#if defined(__wasm__)
 #include <wasm_simd128.h>
+#undef FETCH
 #define FETCH(place) ((void)0)
 /* Clang converts a vector of short integers one by one; `asm` hides from it that these integers were short.
  */
-static inline vector floats_of(const int16_t *w) {
+static inline v8 floats_of(const int16_t *w) {
     v128_t low = wasm_i32x4_load16x4(w), high = wasm_i32x4_load16x4(w + 4);
     __asm__("" : "+r"(low), "+r"(high));
     low = wasm_f32x4_convert_i32x4(low);
@@ -661,82 +660,95 @@ static inline vector floats_of(const int16_t *w) {
     return __builtin_shufflevector((v4)low, (v4)high, 0, 1, 2, 3, 4, 5, 6, 7);
 }
 #define FLOATS(w) floats_of(w)
+#elif defined(__AVX2__) /* gcc needs three times as many instructions for a general conversion */
+#include <immintrin.h>
+#define FLOATS(w) _mm256_cvtepi32_ps(_mm256_cvtepi16_epi32(_mm_loadu_si128((const __m128i *)(w))))
 #else
-#define FETCH(place) __builtin_prefetch(place, 0, 3)
-#define FLOATS(w) __builtin_convertvector(__builtin_convertvector(*(const half *)(w), whole), vector)
+#define FLOATS(w) __builtin_convertvector(__builtin_convertvector(*(const half *)(w), whole), v8)
 #endif
 
-/* Adds the products of `depth` inputs with `panels` panels of weights to `rows` rows of sums. rows, panels
-   and storage are constants where this is called. x_step, w_step: from one row of inputs, or panel of
-   weights, to the next. */
-ALWAYS_INLINE void tile(const int rows, const int panels, const int storage, const void *weights,
-                        size_t w_step, const float *x, size_t x_step, int depth, float *sums,
-                        const size_t *slots) {
-    vector sum[TILE_ROWS][4 * PIECES];
+ALWAYS_INLINE void copy(const int wide, float *to, const float *from) {
+    if (wide) *(v16 *)to = *(const v16 *)from;
+    else *(v8 *)to = *(const v8 *)from, *(v8 *)(to + 8) = *(const v8 *)(from + 8);
+}
+
+ALWAYS_INLINE void add(const int wide, float *sums, float input, const float *w) {
+    if (wide) *(v16 *)sums += input * *(const v16 *)w;
+    else *(v8 *)sums += input * *(const v8 *)w, *(v8 *)(sums + 8) += input * *(const v8 *)(w + 8);
+}
+
+ALWAYS_INLINE void unpack(float *to, const int16_t *w) {
+    *(v8 *)to = FLOATS(w), *(v8 *)(to + 8) = FLOATS(w + 8);
+}
+#else /* a compiler without vectors */
+#define ALWAYS_INLINE static
+#define FETCH(place) ((void)0)
+ALWAYS_INLINE void copy(const int wide, float *to, const float *from) {
+    for (int i = 0; i < WIDTH; i++) to[i] = from[i];
+}
+
+ALWAYS_INLINE void add(const int wide, float *sums, float input, const float *w) {
+    for (int i = 0; i < WIDTH; i++) sums[i] += input * w[i];
+}
+
+ALWAYS_INLINE void unpack(float *to, const int16_t *w) {
+    for (int i = 0; i < WIDTH; i++) to[i] = w[i];
+}
+#endif
+
+/* Adds the products of `depth` inputs with `panels` panels of weights to `rows` rows of sums. wide, rows,
+   panels and storage are constants where this is called, so that the compiler keeps the sums in registers.
+   x_step, w_step: from one row of inputs, or panel of weights, to the next. */
+ALWAYS_INLINE void tile(const int wide, const int rows, const int panels, const int storage,
+                        const void *weights, size_t w_step, const float *x, size_t x_step, int depth,
+                        float *sums, const size_t *slots) {
+    float sum[TILE_ROWS][TILE_PANELS * WIDTH], unpacked[WIDTH];
     for (int r = 0; r < rows; r++)
-        for (int p = 0; p < PIECES * panels; p++) sum[r][p] = *(const vector *)(sums + slots[r] + PIECE * p);
-    for (int k = 0; k < depth; k++) {
+        for (int p = 0; p < panels; p++) copy(wide, sum[r] + WIDTH * p, sums + slots[r] + WIDTH * p);
+    for (int k = 0; k < depth; k++)
         for (int p = 0; p < panels; p++) {
             size_t at = w_step * (size_t)p + WIDTH * (size_t)k;
             const int16_t *shorts = (const int16_t *)weights + at;
             const float *floats = (const float *)weights + at;
             if (rows == 1 && storage == INT16) FETCH(shorts + WIDTH * AHEAD_IN_MEMORY);
             if (rows == 1 && storage != INT16) FETCH(floats + WIDTH * AHEAD_IN_MEMORY);
-            vector w[PIECES];
-            for (int q = 0; q < PIECES; q++)
-                w[q] = storage == INT16 ? FLOATS(shorts + PIECE * q) : *(const vector *)(floats + PIECE * q);
-            for (int r = 0; r < rows; r++) {
-                float input = x[x_step * (size_t)r + (size_t)k];
-                for (int q = 0; q < PIECES; q++) sum[r][PIECES * p + q] += input * w[q];
-            }
+            if (storage == INT16) unpack(unpacked, shorts), floats = unpacked;
+            for (int r = 0; r < rows; r++)
+                add(wide, sum[r] + WIDTH * p, x[x_step * (size_t)r + (size_t)k], floats);
         }
-    }
     for (int r = 0; r < rows; r++)
-        for (int p = 0; p < PIECES * panels; p++) *(vector *)(sums + slots[r] + PIECE * p) = sum[r][p];
+        for (int p = 0; p < panels; p++) copy(wide, sums + slots[r] + WIDTH * p, sum[r] + WIDTH * p);
 }
-#else /* a compiler without vectors */
-#define ALWAYS_INLINE static
-ALWAYS_INLINE void tile(const int rows, const int panels, const int storage, const void *weights,
-                        size_t w_step, const float *x, size_t x_step, int depth, float *sums,
-                        const size_t *slots) {
-    for (int p = 0; p < panels; p++)
-        for (int k = 0; k < depth; k++) {
-            size_t at = w_step * (size_t)p + WIDTH * (size_t)k;
-            for (int r = 0; r < rows; r++) {
-                float input = x[x_step * (size_t)r + (size_t)k], *sum = sums + slots[r] + WIDTH * p;
-                if (storage == INT16)
-                    for (int i = 0; i < WIDTH; i++)
-                        sum[i] += input * ((const int16_t *)weights)[at + (size_t)i];
-                else
-                    for (int i = 0; i < WIDTH; i++)
-                        sum[i] += input * ((const float *)weights)[at + (size_t)i];
-            }
-        }
-}
-#endif
 
-/* Calls `tile` with constants, so that the compiler keeps the sums in registers. */
-ALWAYS_INLINE void tile_of(const int storage, int rows, int panels, const void *weights, size_t w_step,
-                           const float *x, size_t x_step, int depth, float *sums, const size_t *slots) {
-#define TILE(R, P) tile(R, P, storage, weights, w_step, x, x_step, depth, sums, slots)
-    switch (8 * rows + panels) {
-        case 8 + 4: TILE(1, 4); break;
-        case 8 + 1: TILE(1, 1); break;
-        case 16 + 2: TILE(2, 2); break;
-        case 16 + 1: TILE(2, 1); break;
-        case 24 + 2: TILE(3, 2); break;
-        case 24 + 1: TILE(3, 1); break;
-        case 32 + 1: TILE(4, 1); break;
-        case 40 + 1: TILE(5, 1); break;
-        default: TILE(6, 1); break;
+/* Calls `tile` with constants. Weights of several rows are floats. One row waits for memory, so it is never
+   wide. */
+ALWAYS_INLINE void tile_of(const int wide, int storage, int rows, int panels, const void *weights,
+                           size_t w_step, const float *x, size_t x_step, int depth, float *sums,
+                           const size_t *slots) {
+#define TILE(R, P, STORAGE) \
+    tile(wide && (R) > 1, R, P, STORAGE, weights, w_step, x, x_step, depth, sums, slots)
+#define TILES(R, P, STORAGE)                        \
+    if ((P) > 1 && panels > 1) TILE(R, P, STORAGE); \
+    else TILE(R, 1, STORAGE);                       \
+    break
+    switch (storage == INT16 ? 0 : rows) {
+        case 0: TILES(1, 4, INT16);
+        case 1: TILES(1, 4, FLOAT32);
+        case 2: TILES(2, 2, FLOAT32);
+        case 3: TILES(3, 2, FLOAT32);
+        case 4: TILES(4, wide ? 2 : 1, FLOAT32);
+        case 5: TILES(5, wide ? 2 : 1, FLOAT32);
+        default: TILES(6, wide ? 2 : 1, FLOAT32);
     }
+#undef TILES
 #undef TILE
 }
 
 /* Adds W x to the sums of each row x of inputs. slots: index in `sums` where each row's sums begin. */
-ALWAYS_INLINE void multiply(const int storage, const void *weights, int panels, int inputs, const float *x,
-                            int rows, float *sums, const size_t *slots) {
-    int tiles = (rows + TILE_ROWS - 1) / TILE_ROWS, together = rows == 1 ? 4 : rows <= 3 ? 2 : 1;
+ALWAYS_INLINE void multiply(const int wide, int storage, const void *weights, int panels, int inputs,
+                            const float *x, int rows, float *sums, const size_t *slots) {
+    float unpacked[2 * DEPTH * WIDTH];
+    int tiles = (rows + TILE_ROWS - 1) / TILE_ROWS, together = rows == 1 ? 4 : rows <= 3 || wide ? 2 : 1;
     /* Inputs are taken in stretches whose weights in a panel stay in the L1 cache. A single row uses each
        weight once. */
     int stretches = rows == 1 ? 1 : (inputs + DEPTH - 1) / DEPTH;
@@ -747,35 +759,68 @@ ALWAYS_INLINE void multiply(const int storage, const void *weights, int panels, 
             count = panel + together <= panels ? together : 1;
             const char *from =
                 (const char *)weights + bytes * WIDTH * ((size_t)panel * (size_t)inputs + (size_t)first);
+            size_t w_step = WIDTH * (size_t)inputs;
+            if (storage == INT16 && rows > 1) {
+                const int16_t *shorts = (const int16_t *)from;
+                for (int p = 0; p < count; p++)
+                    for (int i = 0; i < WIDTH * depth; i += WIDTH)
+                        unpack(unpacked + WIDTH * DEPTH * p + i, shorts + w_step * (size_t)p + i);
+                from = (const char *)unpacked;
+                w_step = WIDTH * DEPTH;
+            }
             for (int t = 0; t < tiles; t++) {
                 int row = rows * t / tiles, own = rows * (t + 1) / tiles - row;
                 size_t at[TILE_ROWS];
                 for (int r = 0; r < own; r++) at[r] = slots[row + r] + WIDTH * (size_t)panel;
-                tile_of(storage, own, count, from, WIDTH * (size_t)inputs,
+                tile_of(wide, rows == 1 ? storage : FLOAT32, own, count, from, w_step,
                         x + (size_t)row * (size_t)inputs + first, (size_t)inputs, depth, sums, at);
             }
         }
     }
 }
 
-static void multiply_floats(const void *weights, int panels, int inputs, const float *x, int rows,
-                            float *sums, const size_t *slots) {
-    multiply(FLOAT32, weights, panels, inputs, x, rows, sums, slots);
+static void multiply_narrow(int storage, const void *weights, int panels, int inputs, const float *x,
+                            int rows, float *sums, const size_t *slots) {
+    multiply(0, storage, weights, panels, inputs, x, rows, sums, slots);
 }
 
-static void multiply_integers(const void *weights, int panels, int inputs, const float *x, int rows,
-                              float *sums, const size_t *slots) {
-    multiply(INT16, weights, panels, inputs, x, rows, sums, slots);
+#if defined(__GNUC__) && defined(__AVX2__) && defined(__FMA__)
+#include <cpuid.h>
+#ifdef __clang__ /* which prefers half of a vector where it is asked to compile for AVX-512 */
+__attribute__((target("avx512f"), min_vector_width(512)))
+#else
+__attribute__((target("avx512f")))
+#endif
+static void
+multiply_wide(int storage, const void *weights, int panels, int inputs, const float *x, int rows, float *sums,
+              const size_t *slots) {
+    multiply(1, storage, weights, panels, inputs, x, rows, sums, slots);
 }
 
-/* e^x for x <= 0, with a relative error of 2e-7, in a form that compilers vectorise: see `_exp_below_0` in
-   predict.py. */
-static inline float exp_below_0(float x) {
-    union {
-        uint32_t bits;
-        float value;
-    } power;
-    x = x > -87.0f ? x : -87.0f;
+/* Whether processor and system have AVX-512. zig has no __builtin_cpu_supports. */
+static int can_be_wide(void) {
+    unsigned a, b, c, d, low, high;
+    __asm__ volatile("xgetbv" : "=a"(low), "=d"(high) : "c"(0));
+    __cpuid_count(7, 0, a, b, c, d);
+    return (low & 0xe0) == 0xe0 && (b & bit_AVX512F);
+}
+#else
+#define multiply_wide multiply_narrow
+static int can_be_wide(void) { return 0; }
+#endif
+
+typedef union {
+    uint32_t bits;
+    float value;
+} number;
+
+/* e^x for x <= 0, with a relative error of 2e-7: see `_exp_below_0` in predict.py. x is limited as bits: gcc
+   would make a branch of a limit in floats, and would not vectorise the loop around it. */
+static inline float exp_below_0(float given) {
+    const number lowest = {.value = -87.0f};
+    number limited = {.value = given}, power;
+    limited.bits = limited.bits < lowest.bits ? limited.bits : lowest.bits;
+    float x = limited.value;
     int n = (int)(x * 1.44269504f - 0.5f); /* rounds, because x is not above 0 */
     float r = (x - (float)n * 0.693359375f) + (float)n * 2.12194440e-4f, p = 1.0f + r * (1.0f / 6);
     p = 1.0f + r * (1.0f / 5) * p;
@@ -789,8 +834,9 @@ static inline float exp_below_0(float x) {
 
 static void elu(float *y, size_t count) {
     for (size_t i = 0; i < count; i++) {
-        float below = exp_below_0(y[i] < 0 ? y[i] : 0) - 1;
-        y[i] = y[i] > 0 ? y[i] : below;
+        number below = {.value = y[i]};
+        below.bits = below.bits >> 31 ? below.bits : 0;
+        y[i] = (y[i] > 0 ? y[i] : 0) + (exp_below_0(below.value) - 1);
     }
 }
 
@@ -798,6 +844,7 @@ static void elu(float *y, size_t count) {
    of each set; a set with the share 0 is not computed. in: (C, inputs) standardised. */
 static void run_stack(const hobble *h, const stack *s, const float *shares, const float *in, float *out) {
     size_t count = (size_t)h->characters, sets = (size_t)s->sets, all = count * h->widest;
+    size_t bytes = s->storage == INT16 ? sizeof(int16_t) : sizeof(float);
     /* inputs, outputs: of a layer. own: the inputs of the characters that use a set; sums: their products
        with it. */
     float *inputs = h->room, *outputs = inputs + all, *own = outputs + all, *sums = own + all;
@@ -820,12 +867,9 @@ static void run_stack(const hobble *h, const stack *s, const float *shares, cons
             memset(sums, 0, (size_t)rows * padded * sizeof *sums);
             uint64_t start = s->weights_at[layer] + k * padded * ins;
             const float *x = rows == (int)count ? inputs : own;
-            if (s->storage == INT16)
-                multiply_integers((const int16_t *)s->weights + start, (int)panels, (int)ins, x, rows, sums,
-                                  h->slots);
-            else
-                multiply_floats((const float *)s->weights + start, (int)panels, (int)ins, x, rows, sums,
-                                h->slots);
+            const char *weights = (const char *)s->weights + start * bytes;
+            (h->wide ? multiply_wide : multiply_narrow)(s->storage, weights, (int)panels, (int)ins, x, rows,
+                                                        sums, h->slots);
             const float *factors = s->factors[layer] + k * outs, *biases = s->biases[layer] + k * outs;
             for (int i = 0; i < rows; i++) {
                 float share = shares[(size_t)h->members[i] * sets + k],
@@ -868,7 +912,10 @@ static void phase_shares(int blended, int points, double phase, float *shares) {
 static void softmax(float *logits, int count) {
     float most = logits[0], total = 0;
     for (int k = 1; k < count; k++) most = logits[k] > most ? logits[k] : most;
-    for (int k = 0; k < count; k++) total += logits[k] = exp_below_0(logits[k] - most);
+    for (int k = 0; k < count; k++) {
+        float below = logits[k] - most;
+        total += logits[k] = exp_below_0(below > -87 ? below : -87); /* it may be no number */
+    }
     for (int k = 0; k < count; k++) {
         float share = logits[k] / total;
         logits[k] = share > NEGLIGIBLE_SHARE ? share : 0;
@@ -1488,9 +1535,12 @@ static void write_inputs(const model *m, const character *c, float *x) {
 
 /* Limits a row to the range of the training data. An unsound number becomes the middle of its range. */
 static void limit_row(float *row, const float *low, const float *high, int count) {
+    int unsound = 0;
+    for (int k = 0; k < count; k++) unsound |= !(fabsf(row[k]) < (float)LARGEST_SOUND);
+    for (int k = 0; k < count && unsound; k++)
+        if (!(fabsf(row[k]) < (float)LARGEST_SOUND)) row[k] = 0.5f * (low[k] + high[k]);
     for (int k = 0; k < count; k++) {
-        float value = fabsf(row[k]) < (float)LARGEST_SOUND ? row[k] : 0.5f * (low[k] + high[k]);
-        value = value > low[k] ? value : low[k];
+        float value = row[k] > low[k] ? row[k] : low[k];
         row[k] = value < high[k] ? value : high[k];
     }
 }
@@ -2033,9 +2083,10 @@ static void vary(const model *m, character *c, goal *target) {
 /* Whether `count` numbers are finite and not too large. */
 static int sound(const void *numbers, size_t count) {
     const double *values = numbers;
-    double total = 0;
-    for (size_t i = 0; i < count; i++) total += fabs(values[i]);
-    return total <= LARGEST_SOUND * (double)count; /* false for a sum that is not finite */
+    double totals[4] = {0}; /* additions to one would wait for each other */
+    for (size_t i = 0; i < count; i++) totals[i % 4] += fabs(values[i]);
+    /* false for a sum that is not finite */
+    return totals[0] + totals[1] + totals[2] + totals[3] <= LARGEST_SOUND * (double)count;
 }
 
 static int sound_character(const hobble *h, const character *c) {
@@ -2320,6 +2371,7 @@ hobble *hobble_create(const void *file, size_t bytes, int characters, void *memo
     arena a = {memory, sizeof *h};
     memset(memory, 0, needed);
     *h = read;
+    h->wide = can_be_wide();
     distribute(h, &a);
     const char *name = h->model.names;
     for (int i = 0; i < name_count(&h->model); i++, name += strlen(name) + 1) h->names[i] = name;
