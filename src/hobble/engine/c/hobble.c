@@ -720,25 +720,27 @@ ALWAYS_INLINE void tile(const int wide, const int rows, const int panels, const 
         for (int p = 0; p < panels; p++) copy(wide, sums + slots[r] + WIDTH * p, sum[r] + WIDTH * p);
 }
 
-/* Calls `tile` with constants. Weights of several rows are floats. One row waits for memory, so it is never
-   wide. */
+/* Calls `tile` with constants. Wide are only tiles that do not wait for memory. */
 ALWAYS_INLINE void tile_of(const int wide, int storage, int rows, int panels, const void *weights,
                            size_t w_step, const float *x, size_t x_step, int depth, float *sums,
                            const size_t *slots) {
 #define TILE(R, P, STORAGE) \
-    tile(wide && (R) > 1, R, P, STORAGE, weights, w_step, x, x_step, depth, sums, slots)
+    tile(wide && (R) > 1 && (STORAGE) == FLOAT32, R, P, STORAGE, weights, w_step, x, x_step, depth, sums, \
+         slots)
 #define TILES(R, P, STORAGE)                        \
     if ((P) > 1 && panels > 1) TILE(R, P, STORAGE); \
     else TILE(R, 1, STORAGE);                       \
     break
-    switch (storage == INT16 ? 0 : rows) {
-        case 0: TILES(1, 4, INT16);
+    switch (storage == INT16 ? -rows : rows) {
+        case -3: TILES(3, 2, INT16);
+        case -2: TILES(2, 2, INT16);
+        case -1: TILES(1, 4, INT16);
         case 1: TILES(1, 4, FLOAT32);
-        case 2: TILES(2, 2, FLOAT32);
-        case 3: TILES(3, 2, FLOAT32);
-        case 4: TILES(4, wide ? 2 : 1, FLOAT32);
-        case 5: TILES(5, wide ? 2 : 1, FLOAT32);
-        default: TILES(6, wide ? 2 : 1, FLOAT32);
+        case 2: TILES(2, wide ? 4 : 2, FLOAT32);
+        case 3: TILES(3, wide ? 4 : 2, FLOAT32);
+        case 4: TILES(4, wide ? 4 : 1, FLOAT32);
+        case 5: TILES(5, wide ? 4 : 1, FLOAT32);
+        default: TILES(6, wide ? 4 : 1, FLOAT32);
     }
 #undef TILES
 #undef TILE
@@ -747,8 +749,10 @@ ALWAYS_INLINE void tile_of(const int wide, int storage, int rows, int panels, co
 /* Adds W x to the sums of each row x of inputs. slots: index in `sums` where each row's sums begin. */
 ALWAYS_INLINE void multiply(const int wide, int storage, const void *weights, int panels, int inputs,
                             const float *x, int rows, float *sums, const size_t *slots) {
-    float unpacked[2 * DEPTH * WIDTH];
-    int tiles = (rows + TILE_ROWS - 1) / TILE_ROWS, together = rows == 1 ? 4 : rows <= 3 || wide ? 2 : 1;
+    float unpacked[TILE_PANELS * DEPTH * WIDTH];
+    int tiles = (rows + TILE_ROWS - 1) / TILE_ROWS, unpacks = storage == INT16 && rows > 3;
+    int many = rows == 1 || (wide && (storage == FLOAT32 || unpacks));
+    int together = many ? TILE_PANELS : rows <= 3 ? 2 : 1;
     /* Inputs are taken in stretches whose weights in a panel stay in the L1 cache. A single row uses each
        weight once. */
     int stretches = rows == 1 ? 1 : (inputs + DEPTH - 1) / DEPTH;
@@ -760,7 +764,7 @@ ALWAYS_INLINE void multiply(const int wide, int storage, const void *weights, in
             const char *from =
                 (const char *)weights + bytes * WIDTH * ((size_t)panel * (size_t)inputs + (size_t)first);
             size_t w_step = WIDTH * (size_t)inputs;
-            if (storage == INT16 && rows > 1) {
+            if (unpacks) { /* once, for all tiles */
                 const int16_t *shorts = (const int16_t *)from;
                 for (int p = 0; p < count; p++)
                     for (int i = 0; i < WIDTH * depth; i += WIDTH)
@@ -772,7 +776,7 @@ ALWAYS_INLINE void multiply(const int wide, int storage, const void *weights, in
                 int row = rows * t / tiles, own = rows * (t + 1) / tiles - row;
                 size_t at[TILE_ROWS];
                 for (int r = 0; r < own; r++) at[r] = slots[row + r] + WIDTH * (size_t)panel;
-                tile_of(wide, rows == 1 ? storage : FLOAT32, own, count, from, w_step,
+                tile_of(wide, unpacks ? FLOAT32 : storage, own, count, from, w_step,
                         x + (size_t)row * (size_t)inputs + first, (size_t)inputs, depth, sums, at);
             }
         }
