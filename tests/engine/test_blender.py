@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from hobble.core.skeleton import Skeleton
-from hobble.engine.compile import compile_library
+from hobble.engine import compile_library
 from hobble.engine.export import write_blender_addon
 from hobble.engine.hob import character_bytes
 from hobble.figure.gltf import write_glb

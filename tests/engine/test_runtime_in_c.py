@@ -17,8 +17,8 @@ import pytest
 
 from hobble.core.errors import HobbleError
 from hobble.core.skeleton import Skeleton
-from hobble.engine.compile import compile_c
-from hobble.engine.export import EXAMPLES, SOURCES, export_engine
+from hobble.engine import EXAMPLES, SOURCES, compile_c
+from hobble.engine.export import export_engine
 from hobble.engine.hob import character_bytes
 from hobble.engine.traces import SITUATIONS, trace
 from hobble.runtime.animation import ProceduralAnimation

@@ -12,8 +12,7 @@ import pytest
 
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
-from hobble.engine.compile import compile_c
-from hobble.engine.export import SOURCES
+from hobble.engine import SOURCES, compile_c
 from hobble.gait.cycles import measure_cycles
 from hobble.gait.profile import features, healthy_profile, profile_of_walk, read_people
 from hobble.gait.recognise import grade_walk, grader_of_all_people

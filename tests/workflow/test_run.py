@@ -7,7 +7,7 @@ import zipfile
 import numpy as np
 import pytest
 
-from hobble.engine.compile import LIBRARIES
+from hobble.engine import LIBRARIES
 from hobble.measures.measure import all_measures
 from hobble.report.parts import format_number
 from tests.faults.same import main as compare_runs

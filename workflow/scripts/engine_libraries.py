@@ -1,6 +1,6 @@
 """Creates results/page/engine_libraries/: the runtime in C as shared libraries for other systems."""
 
-from hobble.engine.compile import compile_libraries
+from hobble.engine import compile_libraries
 from hobble.workflow.job import job
 
 with job(snakemake):

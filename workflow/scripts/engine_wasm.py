@@ -1,6 +1,6 @@
 """Creates results/page/engine.wasm: the runtime in C, compiled to WebAssembly."""
 
-from hobble.engine.compile import compile_wasm
+from hobble.engine import compile_wasm
 from hobble.workflow.job import job
 
 with job(snakemake):

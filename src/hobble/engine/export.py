@@ -4,19 +4,17 @@ import zipfile
 from pathlib import Path
 
 from hobble.core.files import atomic_path, write_bytes
+from hobble.engine import EXAMPLES, SOURCES
 from hobble.engine.hob import character_bytes
 from hobble.engine.traces import FRAMES, SITUATIONS, trace
 from hobble.models.network import Network
 from hobble.runtime.options import Runtime
 
-SOURCES = Path(__file__).parent / "c"
-EXAMPLES = Path(__file__).parent / "examples"
-
 
 def export_engine(folder: str | Path, network: Network, runtime: Runtime, wasm: str | Path) -> None:
     """Write the runtime in C, character.hob, README.md, examples and golden traces into a folder.
 
-    wasm: the runtime in WebAssembly (`hobble.engine.compile.compile_wasm`), which is copied. Raises
+    wasm: the runtime in WebAssembly (`hobble.engine.compile_wasm`), which is copied. Raises
     HobbleError for a network without a skeleton.
     """
     folder = Path(folder)
@@ -34,7 +32,7 @@ def write_blender_addon(
 ) -> None:
     """Write the add-on for Blender as a zip file that Blender installs, with the character.
 
-    addon: the folder of its code. libraries: the folder of `hobble.engine.compile.compile_libraries`.
+    addon: the folder of its code. libraries: the folder of `hobble.engine.compile_libraries`.
     character: character.hob. body: character.glb.
     """
     files = {file.name: file for file in Path(addon).iterdir() if file.is_file()}

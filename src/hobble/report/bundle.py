@@ -49,7 +49,7 @@ def bundle_page_scripts(
     """Bundle sources/index.js and everything it imports into one script.
 
     modules: the folder node_modules that `install_npm_packages` fills. wasm: the runtime in WebAssembly, from
-    `hobble.engine.compile`. target: the file to write. Needs no internet. The same input gives the same
+    `hobble.engine`. target: the file to write. Needs no internet. The same input gives the same
     bytes. Raises HobbleError if a script has an error, and says in which line.
     """
     modules = Path(modules).resolve()
