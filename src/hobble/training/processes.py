@@ -7,6 +7,7 @@ does not communicate and does not start torch.distributed.
 
 import contextlib
 import os
+import zlib
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from datetime import timedelta
@@ -16,6 +17,7 @@ import torch
 import torch.distributed
 from torch import Tensor
 
+from hobble.core.errors import HobbleError
 from hobble.database.order import own_part
 
 Numbers = TypeVar("Numbers")
@@ -60,6 +62,18 @@ class Processes:
                 torch.distributed.broadcast(tensor, 0)
             torch.distributed.broadcast_object_list(shared, 0)
         return shared[0]  # type: ignore[no-any-return]
+
+    def check_same(self, flat: Tensor) -> None:
+        """Raise HobbleError if the processes hold different weights. flat: the weights of this process."""
+        if self.is_alone:
+            return
+        checksums: list[Any] = [None] * self.count
+        torch.distributed.all_gather_object(checksums, zlib.crc32(flat.cpu().numpy().tobytes()))
+        if len(set(checksums)) > 1:
+            raise HobbleError(
+                "the processes that train together hold different weights. The last checkpoint is kept. "
+                "Give all processes the same kind of processor, the same PyTorch and the same database."
+            )
 
 
 ALONE = Processes()

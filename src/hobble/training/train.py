@@ -131,6 +131,7 @@ def _run(
         if symmetry:
             symmetry.enforce()
         train_mse = watch.mean()
+        processes.check_same(state.network.flat)
         state.sections_done, state.samples = index + 1, state.samples + watch.samples
         if recorder:
             recorder.end_section(where, [pass_index + 1, section + 1], train_mse)
