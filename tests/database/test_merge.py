@@ -164,29 +164,3 @@ def test_clips_that_do_not_fit_together_are_refused(rows_of, tmp_path):
     with pytest.raises(InputError, match=r"^z: the layout of its rows differs from that of a"):
         write_database(tmp_path / "db", {"a": a, "z": other}, {"a": "train", "z": "train"}, **OPTIONS)
     assert not (tmp_path / "db").exists()
-
-
-@pytest.mark.parametrize(
-    ("field", "change", "message"),
-    [
-        ("x", lambda v: v[:, :-1], "x has shape"),
-        (
-            "y",
-            lambda v: np.where(np.arange(len(v))[:, None] == 4, np.nan, v),
-            "frame 64: y has a value that is not finite",
-        ),
-        ("fits", lambda v: np.where(np.arange(len(v)) == 7, 0, v), "fits holds 0, below"),
-        ("mean", lambda v: v * np.inf, "mean holds numbers that are not finite"),
-        ("layout", lambda v: np.array("{}"), "its layout: joints"),
-    ],
-)
-def test_a_bad_file_of_rows_is_named(rows_of, tmp_path, field, change, message):
-    save_clip_rows(tmp_path / "a.npz", rows_of("a", 30))
-    with np.load(tmp_path / "a.npz") as file:
-        data = dict(file)
-    data[field] = change(data[field])
-    np.savez(tmp_path / "a.npz", **data)
-    with pytest.raises(InputError, match=r"a\.npz.*" + message):
-        load_clip_rows(tmp_path / "a.npz")
-    with pytest.raises(InputError, match=r"a\.npz"):
-        write_database(tmp_path / "db", {"a": tmp_path / "a.npz"}, {"a": "train"}, **OPTIONS)

@@ -5,7 +5,6 @@ import os
 import subprocess
 import sys
 from collections import Counter
-from itertools import chain, pairwise
 from pathlib import Path
 
 import numpy as np
@@ -15,8 +14,7 @@ from hypothesis import strategies as st
 
 from hobble.core.errors import HobbleError, InputError
 from hobble.core.files import read_json
-from hobble.database.chunks import database_sizes, to_stored_type
-from hobble.database.order import own_part, stretches_of_section
+from hobble.database.chunks import to_stored_type
 from hobble.database.reader import Block, Database
 from hobble.database.write import write_database
 from hobble.rows.clip_rows import pair_batches
@@ -181,78 +179,6 @@ def test_a_manifest_that_differs_from_its_chunks_is_refused(sources, tmp_path):
         (tmp_path / "manifest.json").write_text(json.dumps(other))
         with pytest.raises(InputError, match=f"{chunk['file']}|its clips have other rows"):
             whole_pass(Database.open(tmp_path, DISK), "train", 0, 10)
-
-
-def test_an_incomplete_database_is_refused(path, tmp_path):
-    with pytest.raises(InputError, match="did not finish"):
-        Database.open(tmp_path)
-    manifest = read_json(path / "manifest.json")
-    (tmp_path / "manifest.json").write_text(json.dumps({**manifest, "version": 0}))
-    with pytest.raises(InputError, match="version"):
-        Database.open(tmp_path)
-    del manifest["chunks"]
-    (tmp_path / "manifest.json").write_text(json.dumps(manifest))
-    with pytest.raises(InputError, match="chunks"):
-        Database.open(tmp_path)
-
-
-def test_a_database_is_much_smaller_than_in_the_original_layout(path):
-    """The original has each pair of a frame and a ground apart. Most numbers here are of grounds."""
-    manifest = Database.open(path).manifest
-    found, layout = database_sizes(manifest), manifest.layout
-    rows = sum(manifest.row_count(split) for split in ("train", "held_out"))
-    assert (found["frames"], found["pairs"]) == (rows, 10 * rows)
-    assert found["bytes"] == sum(file.stat().st_size for file in path.rglob("*.safetensors"))
-    assert found["original_bytes"] == 10 * rows * 4 * (layout.x_size + layout.y_size + 1)
-    assert found["share"] == found["bytes"] / found["original_bytes"] < 0.25
-
-
-def test_a_chunk_can_be_opened_with_numpy(path):
-    """As the description of safetensors says: header length, header, arrays."""
-    db = Database.open(path)
-    chunk = db.manifest.chunks["train"][0]
-    data = (path / db.manifest.folder / chunk.file).read_bytes()
-    length = int.from_bytes(data[:8], "little")
-    header = json.loads(data[8 : 8 + length])
-    assert header["x"]["dtype"] == "F32"
-    assert header["x"]["shape"][0] == header["phase"]["shape"][0] == chunk.rows
-    ends = sorted(entry["data_offsets"] for entry in header.values())
-    assert ends[0][0] == 0
-    assert all(a[1] == b[0] for a, b in pairwise(ends))
-    assert ends[-1][1] == len(data) - 8 - length
-    assert os.path.getsize(path / db.manifest.folder / chunk.file) == chunk.bytes
-
-
-# How processes share a section.
-
-
-def batches(total: int, batch: int, count: int, own: range) -> list[list[int]]:
-    """The samples that the stretches `own` have of each batch."""
-    parts = [stretches_of_section(total, batch, count)[number] for number in own]
-    return [
-        list(chain(*(samples[turn * places : (turn + 1) * places] for samples, places in parts)))
-        for turn in range(-(-total // batch))
-    ]
-
-
-@given(st.integers(1, 300), st.integers(1, 40), st.integers(1, 5), st.integers(1, 4))
-@settings(max_examples=100, deadline=None)
-def test_processes_read_the_parts_of_the_batches_of_one(
-    total: int, batch: int, each: int, processes: int
-) -> None:
-    count = each * processes
-    batch = max(batch, count)
-    whole = batches(total, batch, count, range(count))
-    assert sorted(chain(*whole)) == list(range(total))
-    assert {len(found) for found in whole[:-1]} <= {batch}
-    shared = [batches(total, batch, count, own_part(count, rank, processes)) for rank in range(processes)]
-    assert [list(chain(*parts)) for parts in zip(*shared, strict=True)] == whole
-    for rank, own in enumerate(shared):
-        places = own_part(batch, rank, processes)
-        assert all(
-            found == of_all[places.start : places.stop]
-            for found, of_all in zip(own[:-1], whole, strict=False)
-        )
 
 
 # A reader stays within the configured memory.

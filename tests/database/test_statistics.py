@@ -7,7 +7,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hobble.channels import channel
 from hobble.database.statistics import (
     SILENCING_STD,
     UNSEEN,
@@ -83,9 +82,3 @@ def test_nothing_is_ever_divided_by_zero(rows_of, layout):
         assert np.isfinite(std).all()
     # The ground is always flat, so its heights mean nothing yet.
     assert (s.x_std[layout.x_terrain] == np.float32(SILENCING_STD)).all()
-
-
-def test_severities_share_one_deviation_and_unused_ones_are_scaled_to_0():
-    out = channel("injury").divisors(np.array([3.0, 0.0, 4.0]))
-    np.testing.assert_allclose(out, [5.0, SILENCING_STD, 5.0])
-    np.testing.assert_allclose(channel("injury").divisors(np.array([0.01, 0.0])), [1.0, SILENCING_STD])

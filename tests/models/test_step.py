@@ -13,7 +13,7 @@ from hobble.training import optimiser
 from hobble.training.optimiser import Adam
 
 from . import definition
-from .definition import fresh, new
+from .definition import new
 
 STEPS = [AutogradStep, FusedStep]
 # A class of networks, its arguments and the rows of a batch.
@@ -101,29 +101,3 @@ def test_the_gradient_is_exact_to_the_precision_of_the_factors(step_class, kind,
     for mine, plain in zip(step.gradients, reference.gradients, strict=True):
         mine = mine.double().view(plain.shape)
         assert float((mine - plain).norm() / plain.norm()) < (0.03 if half else 1e-5)
-
-
-@pytest.mark.parametrize("step_class", STEPS)
-def test_dropout_keeps_its_share_and_scales_it_up(step_class) -> None:
-    step = step_class(fresh((300, 200, 10)), 0.3)
-    step.seed(9)
-    first, second = step.masks(500), step.masks(500)
-    assert [tuple(mask.shape) for mask in first] == [(500, 300), (500, 200)]
-    for mask in first:
-        assert set(mask.unique().tolist()) == {0.0, torch.tensor(1 / 0.7).item()}
-        kept = (mask > 0).float()
-        assert float(kept.mean()) == pytest.approx(0.7, abs=0.005)
-        assert max(float(kept.mean(axis).std()) for axis in (0, 1)) < 0.05  # no column or row is special
-    step.seed(9)
-    assert all(torch.equal(a, b) for a, b in zip(first, step.masks(500), strict=True))
-    both = (first[0] > 0) & (second[0] > 0)
-    assert float(both.float().mean()) == pytest.approx(0.7**2, abs=0.01)
-
-
-def test_initial_weights_fill_their_bounds_and_biases_are_zero() -> None:
-    network = new(TrainableMann, (40, 30, 20), 4, (5, 8, 4), (0, 1, 2, 3, 4))
-    for layer, (a, b) in zip(network.layers, ((5, 8), (8, 4), (40, 30), (30, 20)), strict=True):
-        bound = (6 / (a * b)) ** 0.5
-        assert torch.count_nonzero(layer[:, :, -1]) == 0
-        assert 0.9 * bound < float(layer[:, :, :-1].abs().max()) <= bound
-    assert not torch.equal(network.layers[2][:, 0], network.layers[2][:, 1]), "experts differ"

@@ -1,7 +1,5 @@
 """The mirror of rows is that of the motion."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -86,11 +84,3 @@ def test_columns_that_are_scaled_apart_are_refused():
     swap = ColumnMirror(np.array([1, 0]), np.ones(2), np.zeros(2))
     with pytest.raises(HobbleError, match=r"columns 0 and 1 .* are 1 and 2\. .*mirror: true"):
         swap.for_standardised_rows(np.zeros(2), np.array([1.0, 2.0]))
-
-
-def test_a_skeleton_that_does_not_pair_its_sides_is_refused(holden31):
-    names = tuple("Links" if name == "LeftLeg" else name for name in holden31.joints)
-    roles = {role: "Links" if name == "LeftLeg" else name for role, name in holden31.roles.items()}
-    odd = replace(holden31, joints=names, roles=roles, links=(), unseen=(), end_sites={})
-    with pytest.raises(HobbleError, match="cannot be mirrored"):
-        mirror_of_x(RowLayout(31), odd)

@@ -16,7 +16,7 @@ from hobble.labels.label import label_clip
 from hobble.labels.options import LabelOptions
 from hobble.motion.make import make_clip
 from hobble.motion.options import ClipMotion
-from hobble.rows.build_rows import build_clip_rows, cycle_phase, phase_change
+from hobble.rows.build_rows import build_clip_rows
 from hobble.rows.clip_rows import ClipRows, pair_batches
 from hobble.rows.layout import GAITS, RowLayout
 from hobble.terrain.clip_fits import clip_fits, cycle_frames
@@ -184,17 +184,6 @@ def test_rows_of_a_rigid_turning_figure_are_exact(walk, labels, terrain):
     np.testing.assert_allclose(shares[:, 1], 1 - shares[:, 4], atol=1e-6)
     assert not shares[:, [0, 2, 3, 5]].any()
     np.testing.assert_allclose(y["phase_change"][:, 0], 1 / 37, atol=1e-6)
-
-
-def test_the_phase_is_0_and_1_at_the_ends_of_a_cycle(labels):
-    phase = cycle_phase(labels["phase"], labels["cycles"])
-    frame, cycle = cycle_frames(labels["cycles"])
-    first, last = frame == labels["cycles"][cycle, 0], frame == labels["cycles"][cycle, 1]
-    assert (phase[first] == 0).all()
-    assert (phase[last] == 1).all()
-    np.testing.assert_array_equal(phase[~first & ~last], labels["phase"][frame[~first & ~last]])
-    np.testing.assert_allclose(phase_change(labels["phase"]), 1 / 37)
-    np.testing.assert_allclose(phase_change(np.array([0.2, 0.2, 0.1])), [0, 0.9])
 
 
 def test_fits_of_a_row_differ_only_in_the_ground(walk, labels, terrain):

@@ -10,15 +10,6 @@ from hobble.runtime.ground import CELL, Heightmap
 from tests.runtime.walking import hills, walk
 
 
-def test_what_is_no_terrain_or_convention_is_refused(network) -> None:
-    with pytest.raises(TypeError, match="not str"):
-        ProceduralAnimation(network).next_pose((0, 1), terrain="hill")
-    with pytest.raises(ValueError, match="2 x 2"):
-        Heightmap(np.zeros((1, 5)))
-    with pytest.raises(ValueError, match="handed has to be right or left"):
-        Axes("both")
-
-
 @pytest.mark.parametrize(("handed", "up", "unit"), [("right", "Y", "cm"), ("left", "Z", "m")])
 def test_a_heightmap_is_in_the_callers_axes_and_unit(network, handed: str, up: str, unit: str) -> None:
     """A heightmap in the caller's coordinates gives the same ground as the function that it was made from."""

@@ -52,9 +52,3 @@ def test_truth_prediction_and_error_of_every_frame(network, rows: ClipRows) -> N
     assert k == len(found) - 1 == len(rows) - 1
     # A negative turn of the world is one to the left: the figure goes in a circle to +X.
     assert root[:, 0].mean() == pytest.approx(120 * 2 / (2 * np.pi), rel=0.02)
-
-
-def test_it_refuses_other_rows(network, rows: ClipRows) -> None:
-    fewer = type(rows)(**{**vars(rows), "layout": type(network.layout)(30)})
-    with pytest.raises(ValueError, match="not those that the network has learnt"):
-        ProceduralAnimation(network).compare(fewer)

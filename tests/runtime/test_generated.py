@@ -11,7 +11,7 @@ from hobble.core.skeleton import forward_kinematics
 from hobble.motion.read import decode_channels, read_bvh
 from hobble.runtime import generated
 from hobble.runtime.feet import leg_joints
-from hobble.runtime.generated import export_bvh, restore_bone_lengths, skeleton_in_motion
+from hobble.runtime.generated import export_bvh, restore_bone_lengths
 from hobble.runtime.options import Runtime
 from tests.figure.glb import Glb
 
@@ -34,15 +34,6 @@ def test_toes_reach_their_predicted_positions(holden31) -> None:
     assert np.median(off) < 1e-6  # all but legs that are stretched further than they are long
     others = np.setdiff1d(np.arange(31), legs[:, :2])  # feet, too
     np.testing.assert_allclose(quat.angle(world[:, others], rotations[:, others]), 0, atol=1e-6)
-
-
-def test_bone_lengths_are_estimated_from_a_motion(network, holden31) -> None:
-    """If the network's file has no skeleton, so that it may be that of another body."""
-    at = motion(holden31)
-    longer = replace(network, skeleton=replace(holden31, offsets=2 * holden31.offsets))
-    np.testing.assert_allclose(skeleton_in_motion(longer, *at).offsets[1:], holden31.offsets[1:], atol=1e-9)
-    own = replace(longer, meta={"skeleton": {}})
-    assert skeleton_in_motion(own, *at) is own.skeleton
 
 
 def test_bvh_round_trip(tmp_path: Path, holden31) -> None:

@@ -56,11 +56,3 @@ def test_a_body_that_cannot_jog_walks_a_little_faster_instead(limited: Network) 
     assert speed == pytest.approx(3.4, abs=1e-6)
     assert gait[JOG] > 0.99
     assert speed_and_gait(limited, (0, 7.0), {KNEE: 8}, limits=False)[1][JOG] > 0.99
-
-
-def test_steering_does_not_exceed_the_limit(limited: Network) -> None:
-    """The network always glides at 1.5, which is above the limit of 1."""
-    speed, _ = speed_and_gait(limited, (0, 2.5), {KNEE: 10}, steering=2.0)
-    assert speed < 1.0
-    speed, _ = speed_and_gait(limited, (0, 2.5), {}, steering=2.0)
-    assert speed > 2.5

@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 
 from hobble.cli.__main__ import main
 from hobble.models.load import load_network
-from hobble.models.network import Network
 from hobble.models.pfnn import OPTIONS
 from hobble.models.pfnn.release import write_release
 from hobble.models.predict import write_phase_shares
@@ -28,14 +27,6 @@ def test_no_phase_reads_outside_the_table(phase: float) -> None:
             assert around[[0, -1]].tolist() == [7, 7]
             assert around[1:-1].sum() == pytest.approx(1, abs=1e-6)
             assert np.count_nonzero(around[1:-1]) <= blended
-
-
-def test_release_folder_round_trip(tmp_path: Path, network: Network, holden31) -> None:
-    write_release(tmp_path / "pfnn", network)
-    assert (tmp_path / "pfnn" / "W2_049.bin").stat().st_size == 4 * network.weights[2][0].size
-    back = load_network(tmp_path / "pfnn", holden31)
-    for a, b in zip((*back.weights, *back.biases), (*network.weights, *network.biases), strict=True):
-        np.testing.assert_allclose(a, b, atol=1e-6)
 
 
 @pytest.mark.shared

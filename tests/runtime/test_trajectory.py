@@ -46,16 +46,6 @@ def move(
     return phase
 
 
-def test_a_prediction_moves_root_and_phase() -> None:
-    position, direction, gait = path(yaw=0.7)
-    before = position.copy()
-    phase = move(prediction(speed=2.0, side=0.5), position, direction, gait, np.array([0.99]))
-    ahead, left = np.array([np.sin(0.7), np.cos(0.7)]), np.array([np.cos(0.7), -np.sin(0.7)])
-    np.testing.assert_allclose(position[0, MIDDLE], 2.0 * ahead + 0.5 * left, atol=1e-6)
-    np.testing.assert_allclose(position[0, :MIDDLE], before[0, 1 : MIDDLE + 1])
-    assert phase[0] == pytest.approx(0.01, abs=1e-6)
-
-
 @pytest.mark.parametrize(("stand", "moves"), [(0.0, 1.0), (1.0, 0.0)])
 def test_a_negative_turn_is_one_to_the_left_and_a_standing_figure_does_not_drift(stand, moves) -> None:
     """q[i+1] q[i]^-1 of a figure that turns left by a has yaw -a, because it is that of the world."""
@@ -102,21 +92,6 @@ def test_strafing_follows_from_velocity_and_facing(
     np.testing.assert_allclose(np.diff(position[0, MIDDLE:], axis=0)[:, 1], 1.0, atol=1e-9)
     yaw = np.arctan2(direction[0, MIDDLE + 1 :, 0], direction[0, MIDDLE + 1 :, 1])
     np.testing.assert_allclose(yaw, np.pi / 2 * (1 - (1 - t) ** direction_bias), atol=1e-9)
-
-
-@pytest.mark.parametrize(
-    ("steering", "target", "corrected"),
-    [
-        (0.0, (0.0, 2.0), (0.0, 2.0)),
-        (1.0, (0.0, 1.5), (0.0, 1.5)),  # what is reached is not corrected
-        (2.0, (0.5, 2.0), (1.5, 3.0)),
-        (3.0, (0.0, 9.0), (0.0, 27.0)),  # at most twice as much again
-    ],
-)
-def test_steering_adds_the_error_to_the_target(steering: float, target: tuple, corrected: tuple) -> None:
-    """The figure glides ahead at 1.5 cm a frame."""
-    velocity, _, _ = follow(target, (0.0, 1.0), steering)
-    np.testing.assert_allclose(velocity, 0.9 * np.array(corrected), atol=1e-9)
 
 
 def follow(target, facing, steering: float, frames: int = 1, speed: float = 1.5, correction=None):

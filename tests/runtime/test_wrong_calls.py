@@ -17,20 +17,14 @@ SHARES = r"gait shares have to be \(6,\) or \(2, 6\) .* order: stand, walk"
 CALLS = [
     ({"target_velocity": (0, np.nan)}, "target_velocity is not a finite vector"),
     ({"target_velocity": (0, 1, 2, 3)}, r"target_velocity has to be a vector .* not of shape \(4,\)"),
-    ({"target_velocity": (1e30, 0)}, "faster than a body"),
     ({"target_velocity": (0, 31.0)}, "faster than a body"),
     ({"facing": np.ones((3, 2))}, r"facing has to be a vector of 2 or 3 .* of 2, not of shape \(3, 2\)"),
-    ({"gait": np.ones(5)}, SHARES),
-    ({"gait": [-1, 0, 0, 0, 0, 0]}, SHARES),
     ({"gait": np.ones((3, 6), int)}, SHARES),
     ({"gait": [np.inf, 0, 0, 0, 0, 0]}, SHARES),
-    ({"gait": ["walk"]}, "1 gaits for 2 characters"),
     ({"terrain": lambda x, z: 1e30 + 0 * x}, "a height of 1e\\+30"),
     ({"terrain": lambda x, z: x * np.nan}, "heights that are not finite"),
     ({"terrain": lambda x, z: np.zeros(2)}, r"terrain returned heights of shape \(2,\) for 72 points"),
     ({"injury": {KNEE: 10.5}}, r"the severity of LeftUpLeg-LeftLeg is 10.5.* from 0 to 10"),
-    ({"injury": {KNEE: -0.1}}, "from 0 to 10"),
-    ({"injury": {KNEE: np.nan}}, "from 0 to 10"),
     ({"injury": np.ones(29)}, r"injury has to have shape \(30,\) or \(2, 30\), not \(29,\)"),
     ({"injury": {KNEE: [1, 2, 3]}}, r"one severity for all .* 2, one for each; its shape is \(3,\)"),
     ({"injury": {"Tail": 1}}, "injury has no 'Tail': there are Hips-LHipJoint, "),
@@ -49,20 +43,9 @@ def test_an_impossible_call_is_refused_and_changes_nothing(hurtable, call: dict,
     assert np.isfinite(character.next_pose((0.5, 2.0)).positions).all()
 
 
-def test_severities_may_have_these_shapes_and_need_an_input(hurtable, network) -> None:
-    crowd, plain = ProceduralAnimation(hurtable, characters=3), ProceduralAnimation(network)
-    for injury in (np.ones((3, 30)), np.ones(30), {KNEE: [1, 2, 3]}, {KNEE: 4}, {}):
-        crowd.next_pose((0, 1), injury=injury)
-    for injury in ({KNEE: 1}, np.ones(30)):
-        with pytest.raises(ValueError, match=r"no input for injury; train a configuration with"):
-            plain.next_pose((0, 1), injury=injury)
-
-
 def test_wrong_options_are_refused(tmp_path: Path, network) -> None:
     for options, message in (
-        ({"characters": 0}, "characters is 0, but has to be"),
         ({"steering": np.nan}, "steering is nan, but has to be"),
-        ({"rates": {"injury": 0}}, "the rate of injury is 0, but has to be more than 0"),
         ({"scales": {"injury": 0}}, "the scale of injury is 0, but has to be more than 0"),
         ({"position": (1e30, 0)}, "100 km"),
         ({"mode": "quadratic"}, "constant, linear, cubic"),

@@ -8,7 +8,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hobble.core.skeleton import Skeleton
 from hobble.labels.label import label_clip
 from hobble.labels.options import LabelOptions
 from hobble.motion.make import make_clip
@@ -16,13 +15,10 @@ from hobble.motion.options import ClipMotion
 from hobble.motion.root import RootFrames
 from hobble.terrain.clip_fits import clip_fits, heights_under, sample_points
 from hobble.terrain.cycle_ground import (
-    IS_HEEL,
     distances,
-    find_soles,
     fit_surfaces,
-    heel_above_toe,
 )
-from hobble.terrain.options import FitOptions, Terrain
+from hobble.terrain.options import Terrain
 from hobble.terrain.patches import Patches
 
 from .conftest import database, figure, options, some_patches, walk
@@ -81,20 +77,6 @@ def test_heights_are_ordered_left_centre_right_from_past_to_future() -> None:
             assert np.allclose(heights[row, 1, side], 7 + at[:, 1])
 
 
-def test_heights_of_joints_above_their_soles(holden31: Skeleton) -> None:
-    motion, labels = walk(GROUNDS["level"])
-    contacts, frames = labels["contacts"], np.arange(60, 360)
-    flat = find_soles(motion, contacts, frames, True, FitOptions())
-    assert (flat.heel_height, flat.toe_height) == (pytest.approx(7.0), pytest.approx(2.5))
-    assert np.abs(flat.soles[contacts][:, 1]).max() < 1e-9
-    uneven = find_soles(motion, contacts, frames, False, FitOptions())
-    assert (uneven.heel_height, uneven.toe_height) == (8.5, 4.0)
-    given = find_soles(motion, contacts, frames, True, FitOptions(heel_height=5.0, toe_height=4.5))
-    expected = motion.positions[:, -4:, 1] - np.where(IS_HEEL, 5.0, 4.5)
-    assert np.allclose(given.soles[..., 1], expected)
-    assert heel_above_toe(holden31) == pytest.approx(4.5)
-
-
 @pytest.mark.shared
 def test_real_clips_stand_on_the_fitted_ground(shared: Path, root: Path) -> None:
     """Uneven ground, a limp, and the original's own flat clip, whose ground stays at zero."""
@@ -141,14 +123,6 @@ def test_an_uneven_floor_is_adapted_and_a_foot_below_a_flat_one_makes_only_a_loc
     changed = options(deepest=None)
     as_it_is = clip_fits(clip, labels, patches, "flat", changed, database())
     assert as_it_is.foot_below.max() == pytest.approx(4)
-
-
-def test_flat_ground_can_be_at_the_height_of_the_feet_as_in_the_original(patches: Patches) -> None:
-    motion, labels = walk(lambda x, z: np.full_like(z, 3.0))
-    for level, expected in (("zero", 0.0), ("feet", 3.0)):
-        changed = options(flat_level=level, deepest=None)
-        fits = clip_fits(motion, labels, patches, "flat", changed, database())
-        assert np.allclose(fits.heights, expected, atol=1e-5)
 
 
 def test_the_surface_solves_the_regularised_system_of_the_original() -> None:

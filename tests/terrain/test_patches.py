@@ -1,27 +1,19 @@
 """Patches: views of heightmaps, the rule of 50 cm, and the search for the patches with the lowest errors."""
 
-from pathlib import Path
-
 import numpy as np
-import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hobble.core.errors import InputError
 from hobble.terrain.heightmaps import TerrainMap
 from hobble.terrain.patches import (
     FootPoints,
     Patches,
     best_patches,
     draw_patches,
-    load_patches,
-    save_patches,
 )
 
 CELL = 3.937007874
 SIZE = 128
-CELLS = np.stack(np.meshgrid(*[np.arange(SIZE) - SIZE // 2] * 2, indexing="ij"), -1).reshape(-1, 2)
-CELLS = CELLS.astype(np.float32)
 
 
 def plane(a: float, b: float, rows: int = 260, columns: int = 300, cell: float = CELL) -> TerrainMap:
@@ -58,23 +50,6 @@ def test_no_patch_shows_a_hole() -> None:
         rows, columns = seen[:, 0] + shift[0], seen[:, 1] + shift[1]
         assert not np.isnan(heights[rows, columns]).any()
     assert np.isfinite(patches.heights).all()
-
-
-def test_patches_round_trip_and_are_small(tmp_path: Path, patches: Patches) -> None:
-    save_patches(tmp_path / "p.npz", patches)
-    back = load_patches(tmp_path / "p.npz")
-    assert np.array_equal(back.heights_at(range(9), CELLS), patches.heights_at(range(9), CELLS))
-    views = sum(getattr(patches, n).nbytes for n in ("which", "affine", "mean"))
-    assert views / len(patches) * 20_000 < 1e6
-
-
-def test_maps_without_patches_are_refused_by_name() -> None:
-    with pytest.raises(
-        InputError, match="plane: none of 1000 random views, 128 cells wide, stay within 50 cm"
-    ):
-        draw(plane(0, 0), plane(3, 3))
-    with pytest.raises(InputError, match="plane: 90 x 300 cells are too few for patches of 128 x 128"):
-        draw(plane(0, 0, rows=90))
 
 
 def plain_errors(patches: Patches, footing: FootPoints) -> np.ndarray:

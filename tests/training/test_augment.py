@@ -15,7 +15,6 @@ from hobble.database.reader import Block, Database
 from hobble.database.write import write_database
 from hobble.measures.accuracy_run import RollOutInputs
 from hobble.rows.clip_rows import ClipRows
-from hobble.training import augment
 from hobble.training.augment import (
     BEYOND,
     NEAR,
@@ -323,16 +322,6 @@ def test_the_ground_of_a_pose_is_subtracted(tmp_path: Path) -> None:
     )
     block, moved = mixed(data)
     np.testing.assert_allclose(moved, block.x, atol=1e-4)
-
-
-def test_only_a_database_with_versions_has_this_augmentation(
-    healthy_and_hurt: Database, data: Database, training: Any
-) -> None:
-    made = [
-        augment.augmentations(d, training | {"version_poses": 0.5}, range(32), CPU)
-        for d in (data, healthy_and_hurt)
-    ]
-    assert [len(each) for each in made] == [0, 1]
 
 
 # Roll-outs: the poses have the errors that a running character would have.

@@ -18,7 +18,7 @@ from hobble.core.errors import HobbleError
 from hobble.core.files import load_npz
 from hobble.database.write import write_database
 from hobble.training.options import Machines
-from hobble.workflow.training_processes import command, on_machines, train_together
+from hobble.workflow.training_processes import on_machines, train_together
 
 from .conftest import SPLITS, Recipe, clip_rows
 
@@ -101,14 +101,6 @@ def together(database: Path, network: Any, training: Recipe, tmp_path: Path) -> 
 
 
 @pytest.mark.slow
-def test_training_twice_gives_the_same_bits(together: Callable[..., dict[str, Any]]) -> None:
-    one, again = together(2, "one", passes=2 / 3), together(2, "two", passes=2 / 3)
-    assert int(one["sections"]) == 2
-    for name in ("weights", "first", "second", "best"):
-        np.testing.assert_array_equal(one[name], again[name])
-
-
-@pytest.mark.slow
 def test_after_a_crash_another_number_of_processes_can_resume(
     together: Callable[..., dict[str, Any]], tmp_path: Path
 ) -> None:
@@ -137,17 +129,6 @@ def test_after_a_crash_another_number_of_processes_can_resume(
     assert int(final["sections"]) == (reached // 3 + 1) * 3
     assert int(final["samples"]) == (reached // 3 + 1) * 2300
     assert f"after section {reached} of" in (tmp_path / "log").read_text()
-
-
-def test_several_machines_need_slurm(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    machines = Machines(nodes=4, gpus=8)
-    monkeypatch.delenv("SLURM_JOB_ID", raising=False)
-    with pytest.raises(HobbleError, match=r"training\.nodes is 4, but this is not a SLURM job"):
-        command(machines, tmp_path)
-    monkeypatch.setenv("SLURM_JOB_ID", "7")
-    words = command(machines, tmp_path)
-    assert words[0] == "srun"
-    assert {"--ntasks=4", "--nnodes=4", "--nproc-per-node=8"} <= set(words)
 
 
 @pytest.mark.parametrize(

@@ -65,9 +65,3 @@ def test_a_network_trained_so_mirrors_its_output(data: Database, network: Option
     free, kept = (go(f"{way}", rollout=3, batch=64, symmetric=way) for way in (False, True))
     assert apart(kept.network, data) < 1e-5
     assert apart(free.network, data) > 1e-2
-
-
-def test_a_symmetric_training_that_goes_on_ends_with_the_same_bytes(go: Run) -> None:
-    straight = go("a", symmetric=True)
-    go("b", symmetric=True, passes=1)
-    assert torch.equal(straight.network.flat, go("b", symmetric=True).network.flat)

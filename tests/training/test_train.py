@@ -3,7 +3,6 @@
 import csv
 import json
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +19,6 @@ from hobble.models.load import load_network
 from hobble.models.matching import MatchingOptions
 from hobble.models.network import TrainingFacts
 from hobble.rows.clip_rows import save_clip_rows
-from hobble.rows.layout import GAITS
 from hobble.training import checkpoint
 from hobble.training.batches import HeldOutErrors, HostRows
 from hobble.training.checkpoint import State, write_history
@@ -106,44 +104,10 @@ def test_what_cannot_be_trained_is_refused(go: Run, monkeypatch: pytest.MonkeyPa
         go(keep="best")
 
 
-@pytest.mark.parametrize(("major", "half"), [(7, False), (8, True)])
-def test_bfloat16_is_chosen_where_a_device_has_it(
-    training: Settings, monkeypatch: pytest.MonkeyPatch, major: int, half: bool
-) -> None:
-    """PyTorch also calls bfloat16 supported if it is only emulated."""
-
-    def supported(including_emulation: bool = True) -> bool:
-        return including_emulation or major >= 8
-
-    monkeypatch.setattr(torch.cuda, "is_bf16_supported", supported)
-    rounds = checkpoint.rounds_to_bfloat16
-    assert rounds(training | {"batch": 256}, torch.device("cuda")) is half
-    assert rounds(training | {"batch": 32}, torch.device("cuda")) is False
-    assert rounds(training | {"batch": 32, "precision": "bfloat16"}, CPU) is True
-
-
-@pytest.mark.parametrize(
-    "asked", [{"other_paces": 1.2, "keep_channels": True}, {"other_poses": 0.5}, {"rollout": 4}]
-)
-def test_training_changes_batches_only_if_asked_and_never_channels(
-    go: Run, data: Database, monkeypatch: pytest.MonkeyPatch, asked: Settings
-) -> None:
-    given: list[torch.Tensor] = []
-    plain = Update.__call__
-
-    def noted(self: Update, x: torch.Tensor, *rest: Any) -> torch.Tensor:
-        given.append(x.clone())
-        return plain(self, x, *rest)
-
-    monkeypatch.setattr(Update, "__call__", noted)
-    for number, options in enumerate(({}, asked)):
-        go(str(number), passes=1, sections=2, batch=90, **options)
-    half, injury = len(given) // 2, data.layout.x_channel("injury")
-    changed = 0
-    for without, other in zip(given[:half], given[half:], strict=True):
-        assert torch.equal(without[:, injury], other[:, injury])
-        changed += int((without != other).any(dim=1).sum())
-    assert 0 < changed <= sum(len(x) for x in given[:half])
+@pytest.mark.parametrize("asked", [{"other_paces": 1.2}, {"other_poses": 0.5}, {"rollout": 4}])
+def test_changed_batches_train_another_network(go: Run, asked: Settings) -> None:
+    plain, other = (go(str(options), passes=1, batch=90, **options).network for options in ({}, asked))
+    assert not torch.equal(plain.flat, other.flat)
 
 
 @pytest.mark.parametrize("keep", [True, False])
@@ -167,28 +131,20 @@ def test_dropout_keeps_the_channels_only_if_asked(
 def test_each_batch_has_the_rate_of_its_place(
     go: Run, training: Settings, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Also in an interrupted run: the rate depends only on the number of samples so far."""
+    """The rate depends only on the number of samples so far."""
     fast = {"schedule": "cosine", "warm_up": 0.5, "rollout": 4, "batch": 300}
     rates: list[float] = []
     step = Adam.step
 
     def noted(self: Adam, gradients: list[torch.Tensor], rate: float = 1.0) -> None:
         rates.append(rate)
-        if len(rates) == 10:
-            raise KeyboardInterrupt
         step(self, gradients, rate)
 
     monkeypatch.setattr(Adam, "step", noted)
-    with pytest.raises(KeyboardInterrupt):
-        go(**fast)
+    go(**fast)
     sizes = [300, 300, 166, 300, 300, 167, 300, 300, 167] * 2
     seen = np.cumsum([0, *sizes])[: len(sizes)]
-    wanted = [(training | fast).learning_rate_share(samples / 2300) for samples in seen]
-    assert rates == pytest.approx(wanted[:10])
-    del rates[9:]  # the section that was cut short is done again
-    rates += [np.nan] * 3
-    go(**fast)
-    assert rates[12:] == pytest.approx(wanted[9:])
+    assert rates == pytest.approx([(training | fast).learning_rate_share(n / 2300) for n in seen])
 
 
 def test_the_best_weights_are_written_and_the_checkpoint_keeps_the_last(
@@ -273,22 +229,6 @@ def test_the_ranges_cover_every_row_with_every_fit(small_database: Path, memory:
     columns = np.r_[columns, data.layout.x_joint_position, data.layout.x_joint_velocity]
     far = np.square(block.x[:, columns]).mean(axis=1)
     assert (far < far[same[0]] - 1e-6).mean() < 0.01  # of many grounds, another may be nearer to the mean
-
-
-def test_if_no_row_stands_a_character_starts_from_the_stillest(data: Database) -> None:
-    """The gait "stand" can be common in the mean without a row that stands for certain."""
-    stand = data.layout.x_gait.start + GAITS.index("stand") * data.layout.samples + data.layout.samples // 2
-    mean, std = data.statistics.x_mean.copy(), data.statistics.x_std.copy()
-    mean[stand], std[stand] = 0.3, 0.0  # each row stands to 30 %
-    s = replace(data.statistics, x_mean=mean, x_std=std)
-    seen = TrainingFacts.from_rows(data.layout, data.each_row("train"), s)
-    (block,) = data.blocks("train", 0, 0, 1, 0, data.sample_count("train"))
-    x, y = block.x * s.x_std + s.x_mean, block.y * s.y_std + s.y_mean
-    moved = np.square(x[:, data.layout.x_position]).sum(axis=1)
-    moved += np.square(y[:, data.layout.y_joint_velocity]).sum(axis=1)
-    start = np.square(seen.start_x[data.layout.x_position]).sum()
-    start += np.square(seen.start_y[data.layout.y_joint_velocity]).sum()
-    assert start == pytest.approx(moved.min(), rel=1e-3)
 
 
 def test_a_built_network_holds_the_training_clips_and_writes_the_same_files(

@@ -6,12 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hobble.core.errors import InputError
 from hobble.core.skeleton import Skeleton
 from hobble.models.matching import MatchingOptions
 from hobble.models.matching.build import feature_groups, find_runs, on_mean_ground
-from hobble.rows.clip_rows import ClipRows, compose_pairs, save_clip_rows
-from hobble.rows.layout import RowLayout
+from hobble.rows.clip_rows import ClipRows, compose_pairs
 
 from .example import CUT, FRAMES, built, clip, layout_of
 
@@ -33,13 +31,6 @@ def test_a_gap_between_cycles_ends_a_run(rows: ClipRows) -> None:
     kept, remaining = find_runs(rows)
     assert len(kept) == len(rows)
     np.testing.assert_array_equal(remaining, [*range(CUT, -1, -1), *range(len(rows) - CUT - 2, -1, -1)])
-
-
-def test_a_clip_without_rows_gives_no_frames(rows: ClipRows) -> None:
-    cut = {n: getattr(rows, n)[:0] for n in ("x", "y", "p", "frame", "cycle", "fits", "heights", "mean")}
-    rows = replace(rows, **cut, channels={"injury": rows.channels["injury"][:0]})
-    assert [len(part) for part in find_runs(rows)] == [0, 0]
-    assert [len(part) for part in on_mean_ground(rows, rows.layout)] == [0, 0]
 
 
 def test_rows_lie_on_the_mean_of_their_fits(rows: ClipRows) -> None:
@@ -84,12 +75,3 @@ def test_a_group_has_its_configured_weight(holden31: Skeleton, tmp_path: Path) -
     assert not tables["feature_weights"][gait].any()
     # Severity 7 of at most 10.
     np.testing.assert_allclose(tables["features"][FRAMES[0] :, -26], 2 * 10 * 0.7**0.42, rtol=1e-5)
-
-
-def test_rows_of_another_layout_are_refused(holden31: Skeleton, tmp_path: Path) -> None:
-    save_clip_rows(tmp_path / "one.npz", clip(holden31, 0))
-    layout = RowLayout(len(holden31.joints), window=30)
-    with pytest.raises(InputError, match=r"one\.npz"):
-        MatchingOptions().build([tmp_path / "one.npz"], layout, holden31)
-    with pytest.raises(InputError, match="no frame"):
-        MatchingOptions().build([], layout_of(holden31), holden31)

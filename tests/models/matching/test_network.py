@@ -1,15 +1,11 @@
 """Motion matching at run time: which frames are shown, when it searches. The page does the same."""
 
-import json
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 import pytest
 
-from hobble.core.errors import InputError
 from hobble.core.skeleton import Skeleton
-from hobble.models.load import network_from_arrays
 from hobble.models.matching.network import ROW, SINCE, Matching
 from hobble.models.network import STORAGES, standardise_inputs
 
@@ -113,25 +109,3 @@ def test_a_page_of_many_rows_has_the_first_part_of_each_run(network: Matching) -
     np.testing.assert_array_equal(short.frames[35:], network.frames[70:115])
     np.testing.assert_array_equal(short.features[:35], network.features[:35])
     assert short.start_rows.max() < 80 - 20
-
-
-WRONG: list[tuple[str, Callable[[np.ndarray], np.ndarray] | None]] = [
-    ("frames", lambda a: a[:-1]),
-    ("phase", lambda a: a + 2),
-    ("remaining", lambda a: a + 1),  # the last row would be followed by one that is not there
-    ("remaining", lambda a: a[::-1]),
-    ("columns", lambda a: a + 10_000),
-    ("feature_weights", lambda a: -a),
-    ("features", None),
-    *(("meta", lambda a, fact=fact: np.array(json.dumps(json.loads(str(a)) | fact)))
-      for fact in ({"every": 0}, {"every": "5"}, {"halflife": -1.0}, {"skeleton": None})),
-]  # fmt: skip
-
-
-@pytest.mark.parametrize(("name", "change"), WRONG)
-def test_a_malformed_array_or_fact_is_refused(made: Made, name: str, change: Callable | None) -> None:
-    arrays = {key: value for key, value in made[1].items() if key != name}
-    if change is not None:
-        arrays[name] = change(made[1][name])
-    with pytest.raises(InputError, match=r"weights\.npz"):
-        network_from_arrays("weights.npz", arrays)
