@@ -71,14 +71,6 @@ def test_no_joint_jumps_when_the_wish_changes(made: Made) -> None:
     assert move[19:].max() < 0.5 * jump, (move, jump)
 
 
-def test_a_character_forgets_a_memory_that_is_no_number(made: Made) -> None:
-    matching, learned = made
-    x, memory = x_of(matching, np.array([5])), np.full((1, learned.memory_size), np.nan)
-    y = learned.predictor().predict(x, np.zeros(1), None, memory)
-    np.testing.assert_allclose(y, learned.predict(x, np.zeros(1)), rtol=1e-4, atol=1e-3)
-    assert np.isfinite(memory).all()
-
-
 def test_the_same_seed_gives_the_same_bits(holden31: Skeleton, tmp_path: Path) -> None:
     tiny = {"steps": 2, "units": 8, "decompressor_units": 8, "latent": 3}
     one, again, other = (built(holden31, tmp_path, "learned", seed=n, **tiny)[0].arrays for n in (1, 1, 2))

@@ -74,22 +74,6 @@ def test_a_prediction_that_is_not_finite_does_no_harm(network, value: float) -> 
     assert np.abs(pose.positions[1] - pose.positions[0]).max() < 5
 
 
-def test_a_character_starts_in_the_start_frame(make_network) -> None:
-    network = make_network(scale=0.0)
-    seen = walked(network)
-    character = ProceduralAnimation(
-        replace(network, training_facts=seen), position=(100.0, 0, 50.0), facing=(1.0, 0, 0)
-    )
-    state, middle = character.state, network.layout.window
-    assert state.phase[0] == 0.3
-    np.testing.assert_allclose(state.position[0, middle], [100, 50], atol=1e-4)
-    np.testing.assert_allclose(state.position[0, middle - 20], [70, 50], atol=1e-4)  # it came from there
-    np.testing.assert_allclose(state.direction[0], np.tile([1.0, 0], (2 * middle, 1)), atol=1e-6)
-    assert state.gait[0, :, 1].min() == 1.0
-    x, y, z = network.y_mean[network.layout.y_joint_position].reshape(-1, 3).T
-    np.testing.assert_allclose(state.joint_position[0], np.stack([z + 100, y, 50 - x], axis=1), atol=1e-4)
-
-
 @pytest.mark.parametrize("with_facts", [False, True])
 def test_the_hips_keep_their_height_when_the_ground_is_switched(make_network, with_facts: bool) -> None:
     """The ground under a walking character jumps up and down by a metre, or becomes a slope."""

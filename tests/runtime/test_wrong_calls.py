@@ -1,13 +1,10 @@
 """Wrong arguments of `next_pose` are refused, and a failed call changes nothing."""
 
 import copy
-from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-from hobble.core.errors import InputError
 from hobble.runtime import ProceduralAnimation
 from hobble.runtime.waypoints import Waypoint
 from tests.runtime.walking import KNEE, same, walk
@@ -27,7 +24,6 @@ CALLS = [
     ({"injury": {KNEE: 10.5}}, r"the severity of LeftUpLeg-LeftLeg is 10.5.* from 0 to 10"),
     ({"injury": np.ones(29)}, r"injury has to have shape \(30,\) or \(2, 30\), not \(29,\)"),
     ({"injury": {KNEE: [1, 2, 3]}}, r"one severity for all .* 2, one for each; its shape is \(3,\)"),
-    ({"injury": {"Tail": 1}}, "injury has no 'Tail': there are Hips-LHipJoint, "),
     ({"injury": {"LeftUpLeg-LeftFoot": 1}}, "did you mean .*LeftUpLeg-LeftLeg"),
 ]
 
@@ -43,7 +39,7 @@ def test_an_impossible_call_is_refused_and_changes_nothing(hurtable, call: dict,
     assert np.isfinite(character.next_pose((0.5, 2.0)).positions).all()
 
 
-def test_wrong_options_are_refused(tmp_path: Path, network) -> None:
+def test_wrong_options_are_refused(network) -> None:
     for options, message in (
         ({"steering": np.nan}, "steering is nan, but has to be"),
         ({"scales": {"injury": 0}}, "the scale of injury is 0, but has to be more than 0"),
@@ -56,10 +52,6 @@ def test_wrong_options_are_refused(tmp_path: Path, network) -> None:
             ProceduralAnimation(network, **options)
     with pytest.raises(KeyError, match=r"no gait 'jogging'; did you mean jog\?"):
         ProceduralAnimation(network, waypoints=[Waypoint((0, 0), "walk", 2), Waypoint((9, 0), "jogging", 2)])
-    with pytest.raises(ValueError, match="skeleton"):
-        ProceduralAnimation(replace(network, skeleton=None))
-    with pytest.raises(InputError, match="no such file"):
-        ProceduralAnimation.load(tmp_path / "missing.npz")
 
 
 def test_a_failed_frame_leaves_no_trace(hurtable) -> None:

@@ -42,16 +42,6 @@ def test_rows_lie_on_the_mean_of_their_fits(rows: ClipRows) -> None:
     np.testing.assert_allclose(y, (each[0].y + each[1].y) / 2, atol=1e-5)
 
 
-def test_tables_hold_the_clips_in_order(holden31: Skeleton, tmp_path: Path) -> None:
-    _, arrays, network = built(holden31, tmp_path)
-    each = [
-        on_mean_ground(rows, rows.layout)[1][find_runs(rows)[0]] for rows in map(clip, [holden31] * 2, (0, 1))
-    ]
-    np.testing.assert_allclose(arrays["frames"], np.concatenate(each), atol=1e-6)
-    assert arrays["remaining"][FRAMES[0] - 1] == arrays["remaining"][-1] == 0
-    assert set(network.start_rows) == {*range(1, FRAMES[0] - 20), *range(FRAMES[0] + 1, sum(FRAMES) - 20)}
-
-
 def test_features_are_the_columns_that_their_names_say(holden31: Skeleton) -> None:
     layout, options = layout_of(holden31), MatchingOptions()
     found = {name: columns for name, columns, _ in feature_groups(layout, holden31, options)}

@@ -63,21 +63,6 @@ def test_a_character_plays_on_between_searches(network: Matching) -> None:
     assert memory[0, SINCE] == 2
 
 
-def test_the_end_of_a_run_starts_a_search(network: Matching) -> None:
-    predictor, memory = network.predictor(), np.zeros((1, network.memory_size))
-    memory[0, ROW], last = FRAMES[0], FRAMES[0] - 1  # the last row of the first clip
-    assert network.remaining[last] == 0
-    predictor.predict(x_of(network, 40), np.zeros(1), None, memory)
-    assert memory[0, ROW] - 1 == 40
-
-
-def test_no_transition_to_nearby_frames(network: Matching) -> None:
-    predictor, memory = network.predictor(), np.zeros((1, network.memory_size))
-    memory[0, ROW], memory[0, SINCE] = 11, 4
-    predictor.predict(x_of(network, 25), np.zeros(1), None, memory)
-    assert memory[0, ROW] - 1 == 11, "14 frames further on is the same motion"
-
-
 @pytest.mark.parametrize("wrong", [-3.0, 1e7, np.nan, np.inf])
 def test_an_invalid_memory_is_reset(network: Matching, wrong: float) -> None:
     memory = np.full((1, network.memory_size), wrong)
