@@ -61,28 +61,6 @@ def test_existing_label_files_are_not_overwritten(folder, tmp_path, capsys):
     assert main(["labels", source, str(tmp_path), "--overwrite"]) == 0
 
 
-def test_a_missing_report_is_named_with_the_command_that_makes_it(tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    assert main(["play", "results/injured/report.html"]) == 1
-    assert "snakemake -c2 results/injured/report.html" in capsys.readouterr().err
-    page = tmp_path / "results" / "mine" / "report.html"
-    page.parent.mkdir(parents=True)
-    page.write_text("<html>")
-    assert main(["play", "--print"]) == 0
-    assert capsys.readouterr().out.strip() == page.as_uri() + "#play"
-
-
-def test_help_lists_every_command_once_in_its_group(capsys):
-    with pytest.raises(SystemExit) as stop:
-        main(["--help"])
-    assert stop.value.code == 0
-    text = capsys.readouterr().out
-    assert [len(re.findall(rf"^  {name} +[A-Z]", text, re.M)) for name in COMMANDS] == [1] * len(COMMANDS)
-    with pytest.raises(SystemExit):
-        main(["--version"])
-    assert re.fullmatch(r"hobble \d+\.\d+\.\d+\n", capsys.readouterr().out)
-
-
 def test_what_a_machine_reads_is_json(folder, tmp_path, capsys):
     assert main(["look", str(folder), "--json"]) == 1
     clips = {clip["name"]: clip for clip in json.loads(capsys.readouterr().out)["clips"]}

@@ -4,21 +4,13 @@ import json
 from pathlib import Path
 
 import numpy as np
-import pytest
 
 from hobble.cli.__main__ import main
 from hobble.core.bvh import write_bvh
 from hobble.core.clip import Clip
 from hobble.core.skeleton import Skeleton
-from hobble.gait.profile import healthy_profile
-from hobble.gait.recognise import compare_clip, shares_of_answers
 from hobble.synthetic.generate_clip import walk_from_plan
 from hobble.synthetic.plan import WALK, Segment
-
-
-@pytest.fixture(autouse=True)
-def at_the_checkout(monkeypatch, root):
-    monkeypatch.chdir(root)
 
 
 def walker(skeleton: Skeleton, speed: float) -> Clip:
@@ -30,14 +22,6 @@ def walker(skeleton: Skeleton, speed: float) -> Clip:
 def written(folder: Path, clip: Clip) -> str:
     write_bvh(folder / f"{clip.name}.bvh", clip)
     return str(folder / f"{clip.name}.bvh")
-
-
-@pytest.mark.parametrize("speed", [65, 150])
-def test_the_procedural_walker_is_healthy_at_any_speed(holden31, speed):
-    seen = compare_clip(walker(holden31, speed), healthy_profile([walker(holden31, 125)]))
-    assert seen.window_answers
-    assert shares_of_answers(seen.window_answers) == {"normal": 1.0}
-    assert seen.effects["right"]["speed"] == pytest.approx(speed / 125, abs=0.03)
 
 
 def test_the_command_prints_a_result_for_each_clip(holden31, tmp_path, capsys):

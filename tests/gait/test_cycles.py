@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from hobble.gait.cycles import CURVES, SAMPLES, _share_below, measure_cycles
+from hobble.gait.cycles import CURVES, SAMPLES, measure_cycles
 from tests.gait.conftest import CYCLE, LEG, Stepper, Swinger
 
 
@@ -27,12 +27,6 @@ def test_landings_stances_and_steps_of_a_made_walk_are_found(holden31):
         assert scalars["step_R"] == pytest.approx((10 - left_then) / LEG)
         assert scalars["step_L"] == pytest.approx((30 - right_then) / LEG)
         assert scalars["step_width"] == pytest.approx(18 / LEG)
-
-
-def test_the_time_below_a_limit_is_interpolated_between_frames() -> None:
-    cosine = tuple(1 + np.cos(np.linspace(0, 2 * np.pi, 38)))
-    for values, share in (((0, 0, 0), 1), ((1, 2, 1), 0), ((2, 0, 0, 4), 1.75 / 3), (cosine, 0.5)):
-        assert _share_below(np.array(values, float), 1.0) == pytest.approx(share, abs=1e-3)
 
 
 # Curve -> its mean and its range.
@@ -74,17 +68,10 @@ def test_cycles_do_not_depend_on_place_size_and_direction(holden31):
 PARTS = slice(None, None, -1), slice(20), slice(1)  # backward, and too short
 
 
-def on_a_circle(positions):
-    """The walk bent onto a circle of four cycles."""
-    radius = 4 * 90 / (2 * np.pi)
-    angle, out = positions[..., 2] / radius, positions[..., 0] + radius
-    return np.stack([out * np.cos(angle) - radius, positions[..., 1], out * np.sin(angle)], axis=-1)
-
-
 def standing(positions):
     return positions - [0, 0, 1.5] * np.arange(len(positions))[:, None, None]
 
 
-@pytest.mark.parametrize("change", [standing, on_a_circle, *(lambda p, s=s: p[s] for s in PARTS)])
+@pytest.mark.parametrize("change", [standing, *(lambda p, s=s: p[s] for s in PARTS)])
 def test_only_straight_walking_has_cycles(holden31, change):
     assert len(measure_cycles(holden31, change(Stepper().positions(holden31)))) == 0

@@ -5,8 +5,8 @@ import pytest
 
 from hobble.gait.cycles import measure_cycles
 from hobble.gait.profile import measure_effects, mirror_profile, profile_of_walk
-from hobble.gait.recognise import grade_walk, recognise, windows_with_cycles
-from tests.gait.conftest import Stepper, Swinger
+from hobble.gait.recognise import grade_walk, recognise
+from tests.gait.conftest import Swinger
 
 
 @pytest.fixture(scope="module")
@@ -62,14 +62,3 @@ def test_effects_of_a_made_limp_are_found(holden31, healthy):
     # From 3 degrees to the left to none: towards the right.
     expected |= {"lean_forward": 4.0, "lean_hurt": 3.0, "lean": 5.0, "pelvis_drop": 2.0}
     assert {name: sizes[name] for name in expected} == pytest.approx(expected)
-
-
-def test_windows_begin_every_second_and_hold_three_cycles(holden31):
-    """Right cycles begin at frames 60, 120, .. 240, left ones at 30, 90, .. 270; each has 60 frames."""
-    positions = Stepper().positions(holden31)
-    walk = measure_cycles(holden31, positions)
-    found = windows_with_cycles(walk, len(positions), seconds=2.5)
-    assert [start for start, _ in found] == [0, 60, 120, 180]
-    right, left = ([[c.start for c in getattr(part, s)] for _, part in found] for s in ("right", "left"))
-    assert right == [[60], [60, 120], [120, 180], [180, 240]]
-    assert left == [[30, 90], [90, 150], [150, 210], [210, 270]]

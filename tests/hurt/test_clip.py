@@ -7,7 +7,6 @@ import pytest
 
 from hobble.core import quat
 from hobble.core.clip import Clip
-from hobble.core.errors import HobbleError
 from hobble.core.skeleton import other_side
 from hobble.core.smooth import true_runs
 from hobble.hurt.hurt_clip import hurt_clip
@@ -87,8 +86,6 @@ CASES = [
 def test_a_hurt_clip_keeps_to_the_ground_and_to_its_body(made, hurting, name, links) -> None:
     clip, labels, flat = made(name)
     hurt = hurt_clip(clip, labels, hurting(len(clip), links), flat=flat)
-    assert np.isfinite(hurt.clip.rotations).all()
-    assert np.isfinite(hurt.clip.root).all()
     # A shorter stance gives more weight to the frames in which a foot lands and leaves. A generated walk has
     # no slide, so its hurt version may have .3 mm a frame, a fifth of the limit for contact.
     assert slide(hurt.clip, hurt.labels) <= max(1.25 * slide(clip, labels), 0.03)
@@ -142,12 +139,3 @@ def test_on_stairs_a_badly_hurt_leg_goes_last_up_and_first_down(holden31, hurtin
     else:
         assert first_up == {0, 1}
         assert 1 in first_down
-
-
-def test_severities_out_of_range_are_refused(made, hurting) -> None:
-    clip, labels, _ = made("turning")
-    for bad in (-1.0, 10.5, np.nan):
-        with pytest.raises(HobbleError, match="turning: every severity should be a number from 0 to 10"):
-            hurt_clip(clip, labels, hurting(len(clip), {"RightUpLeg-RightLeg": bad}))
-    with pytest.raises(HobbleError, match="turning: the severities"):
-        hurt_clip(clip, labels, np.zeros((3, 30)))

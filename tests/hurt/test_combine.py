@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from hobble.core.clip import Clip
-from hobble.core.errors import HobbleError
 from hobble.core.quat import Array
 from hobble.hurt.combine import combine_clips, joints_of_part
 from hobble.labels.clip_labels import Labels
@@ -44,11 +43,3 @@ def test_the_result_has_the_legs_of_one_clip_and_the_arm_of_the_other(clips, par
     # cadence.
     speed, jog_speed = (np.abs(np.diff(c.rotations[:, arm], axis=0)).max() for c in (both, jog))
     assert speed < 1.5 * jog_speed
-
-
-@pytest.mark.shared
-def test_a_clip_without_steps_is_refused(clips) -> None:
-    (walk, labels), (jog, jog_labels) = clips
-    none = Labels(**{**vars(jog_labels), "cycles": np.zeros((0, 2), int)})
-    with pytest.raises(HobbleError, match="Injured_Jog_LLA has no gait cycle"):
-        combine_clips(walk, labels, jog, none, "arms", "x")

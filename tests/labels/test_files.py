@@ -29,19 +29,11 @@ def gait_keys(path: Path, time: SourceTime) -> np.ndarray:
     ("read", "text", "line", "word"),
     [
         (read_footsteps, "1 20\n20 30\n", 2, "frame 20 does not come after 20"),
-        (read_footsteps, "1 20\n40 30\n", 2, "frame 30 does not come after 40"),
-        (read_footsteps, "0 20\n", 1, "does not come after 0"),
         (read_footsteps, "1 20\nx 30\n", 2, "'x' is not a number"),
-        (read_footsteps, "1 nan\n", 1, "'nan' is not a number"),
         (read_footsteps, "1 2 3\n", 1, "a line holds"),
-        (read_footsteps, "*\n", 1, "a line holds"),
         (read_footsteps, "1 20\n30\n\n\n40 50\n", 2, "only the last line"),
         (read_footsteps, "1 20\n30 242\n", 2, "past the clip's last frame, 240"),
         (gait_keys, "1 stand\n20 moonwalk\n", 2, "no such gait: 'moonwalk'. There are stand, walk, jog, run"),
-        (gait_keys, "1 stand\n1 walk\n", 2, "does not come after"),
-        (gait_keys, "1\n", 1, "a line holds"),
-        (gait_keys, "one stand\n", 1, "not a number"),
-        (gait_keys, "1 stand\n500 walk\n", 2, "past the clip's last"),
         (gait_keys, "\n", None, "holds no keys"),
         (four_phases, "0.1\n1.1\n0.2\n0.3\n", 2, "outside 0..1"),
         (four_phases, "0.1\nnan\n0.2\n0.3\n", 2, "not a number"),
@@ -57,16 +49,13 @@ def test_a_wrong_file_is_refused_with_its_line(write, read, text, line, word):
 
 
 def test_a_clip_cut_at_the_start_uses_the_matching_part_of_its_files(write):
-    whole, late = SourceTime(240, 120.0), SourceTime(240, 120.0, first=7)
+    late = SourceTime(240, 120.0, first=7)
     rows = np.round(np.linspace(0, 0.9, 240), 5)
     phase = write("a.phase", "\n".join(f"{r:.5f}" for r in rows))
     assert read_phase(phase, late, 100).tolist() == rows[7:207:2].tolist()
     shares = np.outer(rows, np.eye(8)[1])
     gait = write("a.gait", "\n".join(" ".join(map(str, row)) for row in shares))
     assert read_gait(gait, late, 100)[:, 1].tolist() == rows[7:207:2].tolist()
-    keys = read_gait_keys(write("late_gait.txt", "11 stand\n52 walk\n"), late, 100)
-    moved = read_gait_keys(write("whole_gait.txt", "4 stand\n45 walk\n"), whole, 100)
-    np.testing.assert_allclose(keys, moved)
 
 
 @pytest.mark.shared

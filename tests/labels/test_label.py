@@ -67,14 +67,10 @@ def test_labels_survive_their_file_and_the_picture_is_drawn(walker, options, tmp
     for name in ("contacts", "phase", "phase_known", "gait", "footsteps", "cycles"):
         np.testing.assert_equal(getattr(again, name), getattr(labels, name))
     write_report(tmp_path / "a.json", report, labels, clip)
-    data = json.loads((tmp_path / "a.json").read_text())
     assert load_report(tmp_path / "a.json", "labels", LabelReport) == report
-    assert data["seconds"]["walk"] == pytest.approx(10, abs=1)
-    curves = data["curves"]
+    curves = json.loads((tmp_path / "a.json").read_text())["curves"]
     assert len(curves["seconds"]) == len(curves["phase"]) == len(curves["speed"]) == 400
     assert curves["speed"][200] == pytest.approx(1.2, rel=0.01)
-    assert curves["phase"][0] is None
-    assert len(curves["landings"]["right"]) == np.isfinite(labels.footsteps[:, 0]).sum()
 
 
 @pytest.mark.parametrize(("fps", "start"), [(60.0, 0), (120.0, 0), (30.0, 0), (120.0, 8), (100.0, 3)])

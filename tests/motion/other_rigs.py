@@ -1,4 +1,4 @@
-"""Rigs of other programs, studios and languages, built from clips of the 31 joints, and a dog.
+"""Rigs of other programs, studios and languages, built from clips of the 31 joints.
 
 A rig is a text with a line `name|parent|joint` for each joint. The joint is one of the 31, or `ground`.
 `+x,y,z` moves it by so many centimetres in that joint's own axes.

@@ -315,16 +315,13 @@ def from_world(skeleton: Skeleton, fps: float, places: Array, turns: Array, six:
 
 @dataclass(frozen=True)
 class Outcome:
-    """The result for a scrambled file: `off`, (N,) cm for each of `names`, or why it was refused.
-
-    said: the sentences on what is uncertain.
-    """
+    """The result for a scrambled file: `off`, (N,) cm for each of `names`, or why it was refused."""
 
     how: Scramble
     names: dict[str, str]
     off: Array | None
     refused: str = ""
-    said: str = ""
+    said: str = ""  # on what is uncertain
 
     @property
     def right(self) -> bool:
@@ -341,10 +338,7 @@ def source_of(file: Path, frames: int | None = None) -> Clip:
 
 
 def outcome(file: Path, seed: int, folder: Path, frames: int | None = None) -> Outcome:
-    """Scramble a file of the 31 joints, make a clip of it and of the file itself, and compare the two.
-
-    frames: how many of the clip's first frames are taken.
-    """
+    """Scramble a file of the 31 joints, or its first frames, and compare its clip with the plain file's."""
     how, target = Scramble.drawn(seed), SKELETONS / "holden31.yaml"
     clip = stretched(source_of(file, frames), how)
     rewritten, names = written(clip, how)

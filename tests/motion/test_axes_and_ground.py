@@ -79,23 +79,8 @@ def raised(clip, height):
     return replace(clip, root=clip.root + np.multiply.outer(height, [0.0, 1.0, 0.0]))
 
 
-@pytest.mark.parametrize("rise", [0.0, 0.6])
-def test_a_lying_rest_pose_gives_an_upright_figure(walk, bvh, make, rise):
-    """Even on stairs, or in a jump."""
-    time = np.arange(len(walk)) / walk.fps
-    climbing = raised(walk, rise * walk.root[:, 2] + 40 * np.maximum(np.sin(4 * time), 0))
-    clip, report = make(bvh(turned(climbing, QUARTER)))
-    assert report["up"] == "+Z"
-    note = report["notes"][0]
-    assert "its rest pose along +Y. +Z was taken for up, because the motion is more reliable" in note
-    np.testing.assert_allclose(clip.positions, climbing.positions[::2], atol=1e-4)
-
-
-def test_the_axes_can_be_set(walk, bvh, make):
-    clip, report = make(bvh(walk), handedness="left", proportions="clip", accept_doubt=True)
-    assert report["handedness"] == "left"
-    np.testing.assert_allclose(clip.positions * [-1, 1, 1], walk.positions[::2], atol=1e-4)
-    clip, report = make(bvh(walk), up="Z", proportions="clip")
+def test_the_up_axis_can_be_set(walk, bvh, make):
+    clip, _ = make(bvh(walk), up="Z", proportions="clip")
     np.testing.assert_allclose(clip.positions[..., 1], walk.positions[::2, :, 2], atol=1e-4)
 
 
@@ -122,14 +107,6 @@ def test_uneven_ground_stays_where_it_is_unless_it_is_far_below(walk, bvh, make)
     np.testing.assert_allclose(clip.root[:, 1], walk.root[::2, 1] + 40, atol=1e-6)
 
 
-def test_a_run_far_from_height_0_is_not_taken_for_uneven_ground(walk, bvh, make):
-    """Between two stances, its lower toe is slow at the top of its way."""
-    hop = np.maximum(np.sin(np.arange(len(walk)) * np.pi / 20), 0.0)
-    clip, report = make(bvh(raised(walk, 40 * hop - 30)))
-    assert report["unsure"] == []
-    assert np.percentile(clip.positions[..., 1].min(axis=1), 5) == pytest.approx(2, abs=3)
-
-
 def tilted(clip, axis, degrees):
     return turned(clip, quat.from_axis_angle(np.asarray(axis), np.radians(degrees)))
 
@@ -148,16 +125,6 @@ def sloped(clip, degrees):
     parents = [max(p, 0) for p in clip.skeleton.parents]
     none = np.broadcast_to(quat.IDENTITY, clip.rotations.shape)
     return replace(clip, rotations=none, root=at[:, 0], translations=at - at[:, parents])
-
-
-@pytest.mark.shared
-@pytest.mark.parametrize(("name", "degrees"), [("07_01", 8.0), ("105_16", -8.0), ("105_03", 8.0)])
-def test_a_captured_walk_tilted_to_the_side_is_refused(shared, make, name, degrees):
-    clip, _ = make(shared / f"mocap/cmu/{name}.bvh")
-    ahead = clip.root[-1] - clip.root[0]
-    assert world_tilt(clip) is None
-    found, _ = world_tilt(tilted(clip, ahead / np.linalg.norm(ahead), degrees))
-    assert found == pytest.approx(8.0, abs=2.5)
 
 
 # The made-up walk balances 5 degrees forward of its feet, so on 8 degrees down it would look tilted.

@@ -1,13 +1,16 @@
-"""The lines about the clips of a folder."""
+"""The lines, and the page, about the clips of a folder."""
 
+import json
 import re
 import shutil
 
+import numpy as np
 import pytest
 
 from hobble.cli.__main__ import main
 from hobble.core.bvh import write_bvh
-from hobble.motion.look import PICTURES, WRONG, ClipSummary, format_table, summarise_clips
+from hobble.motion import look as module
+from hobble.motion.look import PICTURES, WRONG, look_page, summarise_clips
 from hobble.motion.skeleton_file import load_skeleton
 
 
@@ -24,12 +27,6 @@ def test_a_folder_is_described_with_duplicates_and_unused_files(root, tmp_path, 
     assert "again and healthy are the same file" in text
     assert "helthy_injuries.txt belongs to no clip and is not read. If it belongs to healthy" in text
     assert "Nobody stands in these clips" in text
-
-
-def test_a_warning_of_many_clips_is_printed_once():
-    clips = [ClipSummary(str(i), warnings=(f"It is {i} cm too high.",)) for i in range(6)]
-    lines = format_table(clips, ["A note."]).split("\n")
-    assert lines[7:] == ["6 clips, such as 0: It is 0 cm too high.", "A note."]
 
 
 def test_a_wrong_map_is_refused_with_the_joint_and_a_picture(root, walker, tmp_path, capsys) -> None:
@@ -49,3 +46,25 @@ def test_a_wrong_map_is_refused_with_the_joint_and_a_picture(root, walker, tmp_p
     drawn = (tmp_path / "apart.svg").read_text()
     assert found[0] in drawn
     assert {"upper arm": 1, "forearm": 1, "elbow": 2}[found[2]] * 4 * PICTURES == drawn.count(WRONG)
+
+
+def test_a_page_lists_every_clip_and_of_very_many_draws_a_sample(walker, holden31, monkeypatch):
+    """The sample has those with a warning, and is spread over the others."""
+    clip, numbers, count = walker(holden31, 240, 60.0), list[int](), 10_000
+    monkeypatch.setattr(module, "MOST_READ", 40)
+    report = {"rig": "<rig>", "source_fps": 120.0, "seconds": 4.0, "repairs": [], "retarget": None}
+    reports = [report | {"clip": f"clip-{n:05}", "sha256": str(n)} for n in range(count)]
+    reports[123]["unsure"] = ["no idea"]
+    label = {"cycles": 3, "seconds": {"walk": 4.0, "jog": 0.0}}
+    labels = [label | {"warnings": ["odd & new"] if n in (7, 9_876) else []} for n in range(count)]
+    page = look_page("mine", reports, labels, lambda n: numbers.append(n) or (clip, np.ones((10, 4))))
+    assert len(numbers) == 40 == page.count("<canvas")
+    assert {7, 123, 9_876} <= set(numbers)
+    assert np.diff(numbers).max() < 3 * count / 40
+    assert page.count("<tr>") == count + 1
+    for text in ("&lt;rig&gt;", "odd &amp; new", "walk 4.0", "only 40 clips were read"):
+        assert text in page
+    assert "http" not in page
+    assert len(page.encode()) < 25e6
+    data = json.loads(re.search(r'id="d">(.*?)</script>', page)[1])
+    assert [len(one["p"]) for one in data] == [40] * 40

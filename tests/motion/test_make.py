@@ -1,4 +1,4 @@
-"""From files to clips: units, skeletons, frame counts."""
+"""From files to clips: units, rates, skeletons, frame counts, position channels."""
 
 import re
 from dataclasses import replace
@@ -8,7 +8,8 @@ import pytest
 
 from hobble.core import quat
 from hobble.core.errors import InputError
-from hobble.motion.skeleton_file import load_skeleton
+from hobble.motion.edit import resample, sample_times
+from hobble.motion.read import frame_rate
 
 
 def test_a_clip_on_the_target_skeleton_is_unchanged_and_always_the_same(walk, bvh, make):
@@ -55,31 +56,60 @@ def test_a_leg_of_length_0_is_refused(walk, bvh, make):
         make(path)
 
 
-def carried(clip, turn, place):
-    """The clip below a joint "Reference" that turns (F, 4) and moves (F, 3) and also carries a camera."""
-    own, n = clip.skeleton, len(clip)
-    joints, parents = ("Reference", *own.joints, "Camera"), (-1, *(p + 1 for p in own.parents), 0)
-    offsets = np.concatenate([np.zeros((1, 3)), own.offsets, [[0, 180, 300]]])
-    skeleton = replace(own, joints=joints, parents=parents, offsets=offsets)
-    rotations = np.concatenate([turn[:, None], clip.rotations, turn[:, None]], axis=1)
-    rotations[:, 1] = quat.mul(quat.inv(turn), clip.rotations[:, 0])
-    moved = np.tile(offsets, (n, 1, 1))
-    moved[:, 1] = quat.rotate(quat.inv(turn), clip.root - place)
-    return replace(clip, skeleton=skeleton, rotations=rotations, root=place, translations=moved)
+def test_the_frame_rate_can_be_set(walk, bvh, make):
+    path = bvh(walk, edit=lambda s: s.replace("0.00833333", "0.06666667"))
+    assert (make(path)[1]["source_fps"], len(make(path)[0])) == (15.0, 961)
+    right, report = make(path, source_fps=120.0)
+    assert report["source_fps"] == 120.0
+    np.testing.assert_allclose(right.root, walk.root[::2], atol=1e-6)
 
 
-@pytest.mark.parametrize("moves", [False, True])
-@pytest.mark.parametrize("rig", ["holden31", "mixamo55"])
-def test_a_joint_above_the_hips_is_merged_into_them_and_reported(walker, bvh, make, root, rig, moves):
-    clip = walker(load_skeleton(root / f"config/skeletons/{rig}.yaml").skeleton, 121, 60.0)
-    time = moves * np.linspace(0, 1, len(clip))
-    turn = quat.mul(quat.yaw(2 * time), quat.from_axis_angle(np.array([1.0, 0, 0]), -np.pi / 2 + 0 * time))
-    place = np.stack([50 * time, 20 + 0 * time, 90 * time**2], axis=1)
-    made, report = make(bvh(carried(clip, turn, place), name="carried"))
-    alone, without = make(bvh(clip))
-    np.testing.assert_allclose(made.positions, alone.positions, atol=1e-4)
-    assert report["notes"] == [
-        "The joints above Hips (Reference) were left out; their motion was added to it."
-    ]
-    assert report["rig"] == without["rig"] == rig
-    assert made.translations is None
+@pytest.mark.parametrize(
+    ("text", "fps"),
+    [
+        ("0.0083333", 120), ("0.0166667", 60), ("0.0333", 30), ("0.04", 25), ("0.0416667", 24), ("0.02", 50),
+        ("0.01", 100), ("0.0111111", 90), ("0.066667", 15), ("8.33333e-3", 120), ("0.005", 200),
+    ],
+)  # fmt: skip
+def test_rounded_frame_times_mean_standard_rates(text, fps):
+    assert frame_rate(float(text), text) == pytest.approx(fps, rel=1e-5)
+
+
+@pytest.mark.parametrize("rate", [24, 50, 90])
+def test_resampling_keeps_time_and_rotates_the_shorter_way(walk, rate):
+    times, new = sample_times(len(walk), 120, rate), resample(walk, rate)
+    assert len(times) == len(new) == int(240 * rate / 120) + 1
+    assert np.abs(np.linalg.norm(new.rotations, axis=-1) - 1).max() < 1e-12
+    assert np.sum(new.rotations[1:] * new.rotations[:-1], axis=-1).min() > 0
+    np.testing.assert_allclose(new.root[-1], walk.root[round(times[-1])], atol=1e-9)
+
+
+def wrong_toe(text: str) -> str:
+    return text.replace("0.000000 -4.500000 13.500000", "0 -4.5 0", 1)
+
+
+@pytest.mark.parametrize(
+    ("zero", "edit", "said"),
+    [
+        ((), None, ""),
+        ((), wrong_toe, "OFFSET of LeftToeBase contradicts its position channels"),
+        (("Leg", "Foot"), None, "The position channels of LeftUpLeg, LeftLeg, LeftFoot,"),
+    ],
+)
+def test_constant_position_channels_become_offsets(walk, bvh, make, zero, edit, said):
+    channels, names = np.tile(walk.skeleton.offsets, (len(walk), 1, 1)), walk.skeleton.joints
+    channels[:, [j for j, name in enumerate(names) if any(part in name for part in zero)]] = 0.0
+    clip, report = make(bvh(replace(walk, translations=channels), edit=edit))
+    assert clip.translations is None
+    assert said in " ".join(report["repairs"])
+    np.testing.assert_allclose(clip.positions, walk.positions[::2], atol=1e-4)
+
+
+@pytest.mark.parametrize(("joint", "base"), [("LeftLeg", 1.0), ("LeftForeArm", 0.0)])
+def test_position_channels_that_move_are_kept(walk, bvh, make, joint, base):
+    """Around the offset (base 1), or around 0 and added to it (base 0)."""
+    move = np.zeros((len(walk), 31, 3))
+    move[:, walk.skeleton.index(joint), 1] = 0.3 + np.sin(np.arange(len(walk)) / 9)
+    path = bvh(replace(walk, translations=base * walk.skeleton.offsets + move))
+    clip, _ = make(path, proportions="clip")
+    np.testing.assert_allclose(clip.translations, (walk.skeleton.offsets + move)[::2], atol=1e-5)

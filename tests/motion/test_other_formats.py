@@ -103,17 +103,6 @@ def test_a_gltf_file_gives_the_motion_of_the_bvh_file(tmp_path, walk, bvh, make,
     assert np.abs(from_gltf.positions - from_bvh.positions).max() < 0.1
 
 
-@pytest.mark.shared
-def test_a_captured_clip_as_gltf(tmp_path, shared, make):
-    from tests.motion.scramble import source_of
-
-    file = shared / "mocap/cmu/105_16.bvh"
-    from_bvh, _ = make(file)
-    from_gltf, _ = make(write_gltf(tmp_path / "limp.glb", source_of(file)))
-    frames = min(len(from_bvh), len(from_gltf))
-    assert np.linalg.norm(from_gltf.positions[:frames] - from_bvh.positions[:frames], axis=-1).mean() < 0.3
-
-
 def test_keys_that_are_far_apart_are_interpolated(tmp_path, walk):
     file = read_motion(write_gltf(tmp_path / "sparse.glb", replace(walk.part(slice(0, None, 30)), fps=4.0)))
     assert (len(file), file.frame_time) == (61, 1 / 30)

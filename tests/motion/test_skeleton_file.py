@@ -17,18 +17,6 @@ def role(name: str, joint: str):
     return lambda text: re.sub(rf"^  {name}: \w+$", f"  {name}: {joint}", text, flags=re.MULTILINE)
 
 
-def swapped(first: str, second: str):
-    """An edit of a skeleton file: two roles on each side exchange their joints."""
-
-    def edit(text: str) -> str:
-        for side in ("left", "right"):
-            a, b = (re.search(rf"^  {side}_{part}: (\w+)$", text, re.M)[1] for part in (first, second))
-            text = role(f"{side}_{second}", a)(role(f"{side}_{first}", b)(text))
-        return text
-
-    return edit
-
-
 def without(*roles: str):
     return lambda text: re.sub(rf"^  ({'|'.join(roles)}): \w+\n", "", text, flags=re.MULTILINE)
 
@@ -37,10 +25,6 @@ def sides_swapped(text: str) -> str:
     return re.sub(
         r"^(  (?:left|right)_\w+: \w+_)([LR])$", lambda m: m[1] + "LR"["RL".index(m[2])], text, flags=re.M
     )
-
-
-def knees_crossed(text: str) -> str:
-    return role("right_knee", "LowerLeg_L")(role("left_knee", "LowerLeg_R")(text))
 
 
 def far_root(text: str) -> str:
@@ -55,25 +39,17 @@ def replaced(old: str, new: str):
 @pytest.mark.parametrize(
     ("edit", "line", "problem"),
     [
-        (swapped("elbow", "wrist"), "left_wrist", "which does not hang from Hand_L, the left_elbow"),
-        (knees_crossed, "left_knee", "LowerLeg_R, which does not hang from UpperLeg_L, the left_hip"),
-        (sides_swapped, "left_shoulder", "left_shoulder is UpperArm_R, whose name says right"),
         (role("head", "Chest"), "head", "head is Chest, which does not hang from Neck, the neck"),
+        (sides_swapped, "left_shoulder", "left_shoulder is UpperArm_R, whose name says right"),
         (role("chest", "Chest"), "chest", "chest is Chest, but the arms hang from UpperChest"),
         (far_root, "hips", "hips is Root, but the legs hang from Hips"),
         (role("hips", "Spine"), "spine", "spine and hips are the same joint, Spine"),
         (role("left_knee", "LowerLeg"), "left_knee", "there is no joint 'LowerLeg' (is it 'LowerLeg_"),
-        (role("left_elbow", "[Hand_L]"), "left_elbow", "there is no joint ['Hand_L']"),
         (replaced("left_knee:", "left_kne:"), "left_kne", "there is no role left_kne (is it left_knee?)"),
         (without("left_elbow", "head"), "roles", "these roles are missing: head, left_elbow"),
-        (without("left_toe"), "roles", "these roles are missing: left_toe"),
         (replaced("{parent: null", "{parent: Spine"), None, "Hips: its parent 'Spine' must be listed before"),
         (replaced("[0, 10, 0]", "[0, 10]"), "Spine", "joints Spine offset 2: Field required"),
-        (replaced("[0, 10, 0]", "[0, .nan, 0]"), "Spine", "joints Spine offset 1: Input should be"),
-        (replaced("{parent: Hips, offset: [0, 10, 0]}", "Hips"), "Spine", "joints Spine: Input should be"),
         (replaced("roles:", "rolls:"), None, "needs a section `roles`"),
-        (replaced("joints:", "joint:"), None, "joints: Field required"),
-        (lambda text: "- Hips\n", None, "needs a section `roles`"),
     ],
 )
 def test_a_mistake_in_a_skeleton_file_is_refused_in_its_line(root, tmp_path, edit, line, problem):
