@@ -10,7 +10,6 @@ from torch import Tensor
 
 from hobble.models.blend import TrainableBlend
 from hobble.models.mann import TrainableMann
-from hobble.models.pfnn import TrainablePfnn
 from hobble.models.plain import TrainablePlain
 
 
@@ -18,11 +17,6 @@ def new(kind: type[TrainableBlend], *arguments: Any, seed: int = 1) -> Any:
     """An untrained network. arguments: those of the class after `flat`."""
     shapes = kind(None, *arguments).shapes  # type: ignore[arg-type]
     return kind(torch.zeros(sum(map(prod, shapes))), *arguments).randomise(seed)
-
-
-def fresh(sizes: tuple[int, ...], points: int = 4, seed: int = 1) -> TrainablePfnn:
-    """An untrained phase-functioned network."""
-    return new(TrainablePfnn, sizes, points, seed=seed)
 
 
 def spline(control_points: Tensor, p: float) -> Tensor:

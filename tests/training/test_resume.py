@@ -156,16 +156,11 @@ def test_a_changed_manifest_or_statistics(small_database: Path, tmp_path: Path, 
 
 def test_a_changed_checkpoint(go: Run, tmp_path: Path) -> None:
     go(passes=1)
-    path, refusals = next(tmp_path.glob("*/*/checkpoint.npz")), []
-    whole = path.read_bytes()
-    for number in range(60):
-        path.write_bytes(whole)
-        change_file(Random(number), path)
-        try:
-            state = go(passes=1)
-        except InputError as error:
-            refusals.append(str(error))
-        else:
-            assert torch.isfinite(state.network.flat).all(), number
-    assert refusals
-    assert not [said for said in refusals if "checkpoint.npz: " not in said]
+    path = next(tmp_path.glob("*/*/checkpoint.npz"))
+    arrays = load_npz(path)
+    for name in set(arrays) - {"recipe", "history"}:  # a history may lack numbers
+        array = arrays[name]
+        for wrong in (array[None], np.full(array.shape, np.nan), np.full(array.shape, "a")):
+            save_npz(path, **{**arrays, name: wrong})
+            with pytest.raises(InputError, match=r"checkpoint\.npz: "):
+                go(passes=1)
