@@ -6,9 +6,9 @@ import subprocess
 import threading
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass, field
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 import yaml
@@ -50,25 +50,14 @@ def holden31() -> Skeleton:
     return Skeleton.from_dict({"name": "holden31", **{k: v for k, v in data.items() if k != "maps"}})
 
 
-@dataclass
-class Server:
-    """A server on the loopback address that serves `content`.
+@pytest.fixture
+def server() -> Iterator[SimpleNamespace]:
+    """A server on the loopback address that serves `content`, and counts its `requests`.
 
     Each answer takes the next of `faults`: an error's status, or the bytes after which it breaks off.
-    announces: whether it tells the size. requests: how many there were.
+    announces: whether it tells the size.
     """
-
-    url: str = ""
-    content: bytes = b""
-    faults: list[int] = field(default_factory=list)
-    announces: bool = True
-    requests: int = 0
-
-
-@pytest.fixture
-def server() -> Iterator[Server]:
-    """A server on a port of its own."""
-    server = Server()
+    server = SimpleNamespace(content=b"", faults=list[int](), announces=True, requests=0)
 
     class Handler(BaseHTTPRequestHandler):
         def do_GET(self) -> None:
@@ -148,15 +137,3 @@ def copied(finished: Workflow, tmp_path: Path) -> Workflow:
     target = tmp_path / "copy"
     shutil.copytree(finished.folder, target / "checkout", symlinks=True)
     return Workflow(target / "checkout")
-
-
-def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
-    """Say which report tests were skipped because there is no browser."""
-    skipped = terminalreporter.getreports("skipped")
-    missed = [report.nodeid for report in skipped if "the page was not opened" in str(report.longrepr)]
-    if missed:
-        terminalreporter.section(
-            f"{len(missed)} tests of the report did not run: no browser, or no npm packages"
-        )
-        for name in missed:
-            terminalreporter.write_line(name)

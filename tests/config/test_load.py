@@ -5,15 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from hobble.config.load_configuration import Catalogue, merge, read_yaml, validate
+from hobble.config.load_configuration import Catalogue, read_yaml, validate
 from hobble.config.models import Configuration, Dataset, SkeletonFile
 from hobble.core.errors import HobbleError
-
-
-def test_merging_replaces_given_keys_and_keeps_the_others() -> None:
-    base = {"a": {"x": 1, "y": 2}, "b": 3, "c": {"x": 4}, "d": 5}
-    over = {"a": {"y": 6}, "b": {"x": 7}, "c": 8, "e": {"z": 9}}
-    assert merge(base, over) == {"a": {"x": 1, "y": 6}, "b": {"x": 7}, "c": 8, "d": 5, "e": {"z": 9}}
 
 
 @pytest.fixture
@@ -66,24 +60,12 @@ def test_a_name_that_yaml_reads_as_a_number_has_to_be_quoted(tmp_path: Path, tex
         ({"traning": {}}, r"x\.yaml: traning: there is no such key\. Allowed here: .*training"),
         ({"training": {"lr": 1}}, r"training\.lr: there is no such key\. Allowed here: passes, sections"),
         ({"training": {"learning_rate": -1}}, r"training\.learning_rate: .*greater than 0, not -1"),
-        ({"training": {"batch": "many"}}, r"training\.batch: .*integer.*not 'many'"),
-        (
-            {"evaluation": {"rollouts": []}},
-            r"evaluation\.rollouts: .*at least 1 item.*, not \[\]",
-        ),
-        ({"evaluation": {"lap_seconds": 0.01}}, r"evaluation\.lap_seconds: .*equal to 1, not 0\.01"),
         ({"runtime": {"mode": "quartic"}}, r"runtime\.mode: .*'constant', 'linear' or 'cubic'"),
     ],
 )
 def test_a_wrong_value_names_file_key_and_what_is_allowed(values: dict, message: str) -> None:
     with pytest.raises(HobbleError, match=message):
         validate(Configuration, values, "x.yaml")
-
-
-def test_all_problems_are_reported_at_once() -> None:
-    with pytest.raises(HobbleError) as caught:
-        validate(Configuration, {"foo": 1, "training": {"passes": 0}}, "x.yaml")
-    assert len(str(caught.value).splitlines()) == 2
 
 
 @pytest.mark.parametrize(
@@ -97,10 +79,7 @@ def test_all_problems_are_reported_at_once() -> None:
             {"skeleton": "s", "folder": "f", "terrain": {"patches": 5}},
             "`patches` .5. must not be fewer than `fits`",
         ),
-        ({"skeleton": "s", "folder": "f", "terrain": {"heightmaps": []}}, r"heightmaps: .*at least 1"),
         ({"skeleton": "s", "folder": "f", "terrain": {"cell": float("nan")}}, r"terrain\.cell: .*finite"),
-        ({"skeleton": "s", "folder": "f", "held_out": ["../a"]}, "a clip's name must have no .*slashes"),
-        ({"skeleton": "../s", "folder": "f"}, "skeleton: string should match"),
     ],
 )
 def test_an_impossible_data_set_is_refused(values: dict, message: str) -> None:
@@ -155,8 +134,6 @@ def test_shipped_configurations_are_the_published_ones(root: Path) -> None:
     assert xt.training.model_copy(update={"passes": 20, "continues": None}) == t
     hurried = Catalogue(root / "config", {"training": "fast"}).configuration("holden-xt").training
     assert hurried == catalogue.configuration("fast").training != t
-    assert catalogue.configuration("ava-m").network_of == "ava"
-    assert "injury" in catalogue.configuration("injured").channels
     assert catalogue.dataset("synthetic").terrain.fits == 10
     assert catalogue.dataset("synthetic").synthetic.frames == 12_795
 

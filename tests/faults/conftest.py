@@ -53,9 +53,7 @@ def outcome(act: Callable[[], Any]) -> str:
 
 
 def refused(read: Callable[[], Any], *pieces: str, mb: int = 300, letters: int = 2000) -> None:
-    """`read` raises a HobbleError with these pieces, takes less than `mb` of memory and SECONDS of the
-    processor. The error has fewer than `letters`.
-    """
+    """`read` raises a HobbleError with these pieces, in less than `mb` of memory and SECONDS."""
 
     def limited() -> None:
         pages = int(Path("/proc/self/statm").read_text().split()[0])

@@ -1,8 +1,4 @@
-"""One undisturbed run, of which every job can be run again on its own.
-
-While the workflow runs, each job's script is kept as Snakemake wrote it, with all that the rule gives it. So
-a job can be run again in a fraction of a second, in a fork of this process, which has imported all of it.
-"""
+"""One undisturbed run. Each job's script is kept as Snakemake wrote it, and can be run again in a fork."""
 
 from __future__ import annotations
 
@@ -63,10 +59,7 @@ class End:
 
 
 class Lab:
-    """Runs the workflow once and keeps its jobs. Then each job is run again alone and must give the same.
-
-    run: the folder of the undisturbed run. not_finite: what is NaN in it, such as an unknown landing.
-    """
+    """Runs the workflow once and keeps its jobs. Then each job is run again alone and must give the same."""
 
     def __init__(self, folder: Path, *targets: str) -> None:
         self.folder, kept, site = folder, folder / "kept", folder / "site"
@@ -78,6 +71,7 @@ class Lab:
         self.run = whole.folder
         jobs = (_job(file.read_text()) for file in kept.iterdir())
         self.jobs = sorted((job for job in jobs if job.rule not in FETCHED), key=lambda job: job.outputs)
+        # What is NaN in the undisturbed run, such as an unknown landing.
         self.not_finite = set(not_finite(self.run / "results"))
         for job in self.jobs:
             with self.bench(job) as bench:
@@ -142,10 +136,7 @@ class Bench:
         after: Callable[[], Any] = lambda: None,
         meanwhile: Callable[[], Any] = lambda: None,
     ) -> End:
-        """Run the job's script in a fork to its end.
-
-        before, after: called in the fork, first and last. meanwhile: called in this process while it runs.
-        """
+        """Run the job's script in a fork, `before` and `after` it there, and `meanwhile` in this process."""
         with tempfile.TemporaryFile() as said:
             pid = os.fork()
             if not pid:

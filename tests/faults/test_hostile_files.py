@@ -16,15 +16,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from hobble.channels.injury.status import clip_severity, read_status, severity_matrix
+from hobble.channels.injury.status import read_status
 from hobble.config.load_configuration import Catalogue
 from hobble.core.clip import Clip, load_clip
-from hobble.core.declared import ArrayOf
 from hobble.core.errors import InputError
-from hobble.core.files import load_npz, read_bytes, read_json, read_yaml
-from hobble.labels.label_files import SourceTime, read_gait_keys, read_phase
-from hobble.measures.study import FilmAnswer, ShownFilm, Study, read_answers, read_study
-from hobble.models.load import load_network, read_arrays
+from hobble.core.files import load_npz, read_json, read_yaml
+from hobble.labels.label_files import SourceTime, read_phase
+from hobble.measures.study import ShownFilm, Study, read_answers, read_study
+from hobble.models.load import load_network
 from hobble.motion.make import make_clip
 from hobble.motion.options import ClipMotion
 from hobble.motion.read import MOST_BYTES, MOST_HEADER, MOST_JOINTS, read_bvh
@@ -33,8 +32,6 @@ from hobble.terrain.heightmaps import read_heights
 
 from .conftest import MB, SKELETON, refused, write
 from .damage import change_text
-
-LINKS = load_skeleton(SKELETON).skeleton.link_names
 
 
 def clip(path: Path) -> Clip:
@@ -47,13 +44,6 @@ def status(path: Path) -> Any:
 
 def phase(path: Path) -> Any:
     return read_phase(path, SourceTime(200, 60.0), 200)
-
-
-def severity(path: Path) -> Any:
-    standing = Clip(
-        "a", load_skeleton(SKELETON).skeleton, 60.0, np.eye(4)[np.zeros((9, 31), int)], np.zeros((9, 3))
-    )
-    return clip_severity(standing, path, None, {"source_frames": 9, "source_fps": 60.0, "source": "a.bvh"})
 
 
 HEADER = "HIERARCHY\nROOT Hips\n{\nOFFSET 0 0 0\nCHANNELS 1 Xposition\n"
@@ -84,45 +74,24 @@ def star(joints: int) -> str:
 STUDY = Study("s", "limp", ("a", "b"), tuple(ShownFilm(i, "one part", ("a",), (5.0,)) for i in range(1, 6)))
 
 
-def answers(path: Path) -> list[FilmAnswer]:
-    return read_answers(path, STUDY)
-
-
-def answer(film: int) -> dict[str, Any]:
-    marks = dict.fromkeys(("fluidity", "progress", "realism"), "fair")
-    return {"film": film, "noticed": "yes", **marks, "parts": ["a"]}
-
-
-def saved(**changes: Any) -> str:
-    """A file of answers, of which the second is changed."""
-    rows = list(map(answer, range(1, 6)))
-    rows[1] |= changes
-    return json.dumps({"study": "s", "answers": rows})
-
-
-def films(**changes: Any) -> str:
-    """A films.json, of which the first film is changed."""
-    film = {"film": 1, "kind": "one part", "parts": ["a"], **changes}
-    return json.dumps({"study": "s", "configuration": "limp", "parts": ["a"], "films": [film]})
-
+MARKS = dict.fromkeys(("fluidity", "progress", "realism"), "fair")
+ANSWER = {"film": 1, "noticed": "yes", **MARKS, "parts": ["a"]}
+FILM = {"film": 1, "kind": ["one part"], "parts": ["a"]}
+FILMS = json.dumps({"study": "s", "configuration": "limp", "parts": ["a"], "films": [FILM]})
 
 READERS: dict[str, tuple[str, Callable[[Path], Any]]] = {
-    "status": ("a.txt", status), "severity": ("a.txt", severity), "phase": ("a.phase", phase),
-    "bvh": ("a.bvh", read_bvh), "clip": ("a.bvh", clip), "answers": ("a.json", answers),
-    "study": ("films.json", read_study), "json": ("a.json", read_json), "image": ("a.png", read_heights),
-    "array": ("a.npy", read_heights),
+    "status": ("a.txt", status), "phase": ("a.phase", phase), "bvh": ("a.bvh", read_bvh),
+    "answers": ("a.json", lambda path: read_answers(path, STUDY)), "study": ("films.json", read_study),
+    "json": ("a.json", read_json), "image": ("a.png", read_heights), "clip": ("a.bvh", clip),
 }  # fmt: skip
 BLANKS, DOUBT = " " * 6000, "it is in doubt which joints are which parts"
 # What a file holds, or a function that makes it -> its reader, and what is said of it.
 FILES: dict[str, tuple[str, str | bytes | Callable[[], str | bytes], str]] = {
     "blanks before a link": ("status", f"frames:10\n1-10 {BLANKS}x\n", "line 2: 'x' does not read as"),
-    "blanks after a link": ("status", f"frames:10\n1-10 A{BLANKS}[\n", "line 2: 'A "),
-    "2 billion hurt": ("severity", "frames:2000000000\n1-2000000000 LeftUpLeg-LeftLeg[5];\n", "line 1"),
     "2 million phases": ("phase", "0\n" * 2_000_000, "larger than 0.2"),
     "a star of 300 joints": ("clip", lambda: star(300), DOUBT),
     "HIERARCHY 2,000 times": ("clip", lambda: "HIERARCHY " * 2000 + star(1)[9:], "'HIERARCHY' is no joint"),
     "2 billion frames": ("bvh", BODY.replace("9", "2000000000", 1), "declares 2000000000 frames"),
-    "300,000 joints": ("bvh", lambda: joints(5_000, 295_000) + END % 1, "more than 4096 joints"),
     "300,000 joints deep": ("bvh", lambda: joints(5_000, 295_000, True) + END % 1, "more than 4096 joints"),
     "the longest chain of joints": (
         "clip", lambda: joints(MOST_JOINTS - 1, 0, True).replace("Xposition", "Zrotation") + TURNS, DOUBT
@@ -135,15 +104,13 @@ FILES: dict[str, tuple[str, str | bytes | Callable[[], str | bytes], str]] = {
     "a frame of one line": ("bvh", lambda: BODY + "1 " * 2 * MB, "declares 9 frames and has 2097152"),
     "a number of one line": ("bvh", lambda: BODY + "1" * 9 * MB + "\n1\n", "line 10: a line of more"),
     "50,000 answers": (
-        "answers", json.dumps({"study": "s", "answers": [answer(1)] * 50_000}), "film 1 is answered twice"
+        "answers", json.dumps({"study": "s", "answers": [ANSWER] * 50_000}), "film 1 is answered twice"
     ),
-    "a film that is a list": ("answers", saved(film=[1]), "answer 2: film: "),
-    "a kind that is a list": ("study", films(kind=["one part"]), "films.0.kind: "),
+    "a kind that is a list": ("study", FILMS, "films.0.kind: "),
     "an integer in JSON": ("json", "9" * 20_000, "not valid JSON"),
     "deep JSON": ("json", "[" * 200_000, "not valid JSON"),
     "a large image": ("image", lambda: png(60_000), "a.png: "),
     "an image of 81 million pixels": ("image", lambda: png(9_000), "a.png: "),
-    "an array of a terabyte": ("array", lambda: npy((10**6, 10**6)), "not an array file"),
 }  # fmt: skip
 
 
@@ -155,13 +122,6 @@ def test_it_is_refused_in_seconds(what: str, tmp_path: Path) -> None:
     refused(lambda: read(path), name, says, mb=1000 if "300,000" in what else 300, letters=5000)
 
 
-def test_a_slow_frame_rate_cannot_make_a_clip_too_long(tmp_path: Path, tiny_bvh: str) -> None:
-    head, _, rest = tiny_bvh.partition("Frames: ")
-    rows = rest.split("\n", 2)[2].strip().split("\n") * 20
-    path = write(tmp_path / "a.bvh", f"{head}Frames: {len(rows)}\nFrame Time: 10\n" + "\n".join(rows) + "\n")
-    refused(lambda: clip(path), "a.bvh: 3600 frames at 0.1 a second", "source_fps")
-
-
 def test_endless_files_are_refused(tmp_path: Path) -> None:
     with open(tmp_path / "large.bvh", "wb") as file:
         file.truncate(MOST_BYTES + 1)
@@ -171,39 +131,17 @@ def test_endless_files_are_refused(tmp_path: Path) -> None:
     says = {"large": "larger than 1024 MB", "pipe": "a pipe", "zero": "a device", "folder": "not a file"}
     for name, what in says.items():
         refused(lambda n=name: read_bvh(tmp_path / f"{n}.bvh"), f"{name}.bvh: ", what, mb=64)
-    assert len(read_bytes(write(tmp_path / "a", bytes(MB)), MB)) == MB
-    with pytest.raises(InputError, match="larger than 1 MB"):
-        read_bytes(write(tmp_path / "a", bytes(MB + 1)), MB)
 
 
-STATUS = (
-    "frames:300\n1-300 RightUpLeg-RightLeg[10];\n50-200 LeftShoulder-LeftArm[5];LeftUpLeg-LeftLeg[2.5];\n"
-    "120-260 LeftUpLeg-LeftLeg[7];\n"
-)
-
-
-def whole_severity(path: Path) -> np.ndarray:
-    found = read_status(path, LINKS)
-    if found.frames > 100_000:  # the stage compares this with the clip before it makes room for it
-        return np.zeros(1)
-    return severity_matrix(found, LINKS)[0]
-
-
-@pytest.mark.parametrize("kind", ["bvh", "status"])
-def test_a_damaged_text_gives_a_sound_result_or_one_message(tmp_path: Path, tiny_bvh: str, kind: str) -> None:
-    path, text = tmp_path / f"a.{kind}", tiny_bvh if kind == "bvh" else STATUS
-    read: Callable[[Path], np.ndarray] = whole_severity if kind == "status" else lambda p: clip(p).positions
-    messages, sound = list[str](), 0
-    for number in range(60 if kind == "bvh" else 300):
-        write(path, change_text(Random(number), text).encode(errors="surrogateescape"))
+def test_a_damaged_clip_gives_a_sound_result_or_one_message(tmp_path: Path, tiny_bvh: str) -> None:
+    path, messages, sound = tmp_path / "a.bvh", list[str](), 0
+    for number in range(60):
+        write(path, change_text(Random(number), tiny_bvh).encode(errors="surrogateescape"))
         try:
-            found = read(path)
+            assert np.isfinite(clip(path).positions).all(), number
+            sound += 1
         except InputError as error:
             messages.append(str(error))
-        else:
-            assert np.isfinite(found).all(), number
-            assert kind == "bvh" or 0 <= found.min() <= found.max() <= 10, number
-            sound += 1
     assert [m for m in messages if not (m.startswith(str(path)) and m.isprintable() and len(m) < 2000)] == []
     assert min(sound, len(messages)) > (sound + len(messages)) / 5
 
@@ -222,12 +160,8 @@ def zipped(path: Path, data: bytes, kind: int = zipfile.ZIP_STORED) -> Path:
 
 HEADERS = {
     "more than the file holds": str({"descr": "<f8", "fortran_order": False, "shape": (10**12,)}),
-    "a dictionary that does not end": "{",
     "brackets that do not end": "(" * 9000,
-    "a type in brackets": "{'descr': ('<f8',), 'fortran_order': False, 'shape': (8,)}",
-    "a length of 100 digits": "{'descr': '<f8', 'fortran_order': False, 'shape': (1%s,)}" % ("0" * 99),
     "a type of a terabyte": "{'descr': 'V1000000000000', 'fortran_order': False, 'shape': (8,)}",
-    "objects": "{'descr': '|O', 'fortran_order': False, 'shape': (8,)}",
 }
 
 
@@ -239,25 +173,6 @@ def test_a_hostile_array_header_is_refused(tmp_path: Path, what: str) -> None:
         refused(lambda r=read: r(path), "a.npz: damaged", mb=64, letters=400)
     path = write(tmp_path / "a.npy", array)
     refused(lambda: read_heights(path), "a.npy: not an array file", mb=64, letters=400)
-
-
-def test_arrays_of_one_byte_numbers_are_limited_in_memory(tmp_path: Path) -> None:
-    """A megabyte of compressed bytes that unpacks to a gigabyte of one-byte heights or weights."""
-    path, side = tmp_path / "a.npz", 9000
-    np.savez_compressed(path, heights=np.zeros((side, side), np.int8))
-    refused(lambda: read_heights(path), "a.npz: 81000000 heights, more than 67108864")
-    arrays = {"Xmean": np.zeros(9), "W0": np.zeros((1, side, side), np.int8)}
-    declared = {"W0": ArrayOf((1, side, side), "fiu")}
-    refused(lambda: read_arrays("a.npz", arrays, declared), "81000000 numbers; 1 to 67108864 are allowed")
-
-
-def test_a_layer_of_the_release_that_is_too_large_is_refused(tmp_path: Path) -> None:
-    """Sparse files of many gigabytes."""
-    for name in ("Xmean", "Xstd", "Ymean", "Ystd", "b0_000"):
-        write(tmp_path / f"{name}.bin", bytes(4 << 16))
-    with open(tmp_path / "W0_000.bin", "wb") as file:
-        file.truncate(4 << 32)
-    refused(lambda: load_network(tmp_path), "b0_000.bin: 65536 x 65536 weights", mb=600)
 
 
 def test_a_zip_bomb_is_not_unpacked(tmp_path: Path) -> None:
@@ -281,8 +196,6 @@ def test_entries_that_share_bytes_are_not_read_as_often_as_they_are_listed(tmp_p
     path.write_bytes(data[:start] + 400 * entry + record)
     for read in (load_npz, load_network, read_heights):
         refused(lambda r=read: r(path), "a.npz: damaged", "its entries overlap", mb=64)
-    path = zipped(tmp_path / "b.npz", npy((4, 4), bytes(128)), zipfile.ZIP_LZMA)
-    refused(lambda: load_npz(path), "b.npz: damaged", "compressed in a way that NumPy does not use")
 
 
 def png(side: int) -> bytes:
@@ -296,28 +209,15 @@ def png(side: int) -> bytes:
     return b"\x89PNG\r\n\x1a\n" + data
 
 
-@pytest.mark.parametrize(("kind", "value"), [(3, (7, 8)), (2, "none"), (7, b"\xff")])
-def test_any_no_data_value_of_a_geotiff_is_handled(tmp_path: Path, kind: int, value: Any) -> None:
-    from PIL import Image, TiffImagePlugin
-
-    tags = TiffImagePlugin.ImageFileDirectory_v2()
-    tags.tagtype[42113] = kind
-    tags[42113] = value
-    Image.fromarray(np.eye(4, dtype=np.uint8)).save(tmp_path / "a.tif", tiffinfo=tags)
-    refused(lambda: read_heights(tmp_path / "a.tif"), "a.tif: not an image that can be read")
-
-
 def test_a_heightmap_is_read_as_its_name_says_whatever_it_holds(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     from PIL import Image
 
     eps = b"%!PS-Adobe-3.0 EPSF-3.0\n%%BoundingBox: 0 0 9 9\n%%EndComments\n(pwned) (w) file\n%%EOF\n"
-    contents = [eps, zipped(tmp_path / "z", b"1 2\n3 4\n").read_bytes()]
-    for kind in ("BMP", "GIF", "PDF"):
-        made = io.BytesIO()
-        Image.new("L", (4, 4)).save(made, kind)
-        contents.append(made.getvalue())
+    made = io.BytesIO()
+    Image.new("L", (4, 4)).save(made, "BMP")
+    contents = [eps, made.getvalue(), zipped(tmp_path / "z", b"1 2\n3 4\n").read_bytes()]
     started: list[Any] = []
     monkeypatch.setattr("subprocess.Popen.__init__", lambda *a, **k: started.append(a))
     for suffix in (".png", ".tif", ".tiff", ".npy", ".npz", ".txt"):
@@ -328,22 +228,15 @@ def test_a_heightmap_is_read_as_its_name_says_whatever_it_holds(
     assert started == []
 
 
-def multiplied(item: str, list_of: str) -> str:
-    """Each list holds the one before it nine times."""
-    lists = (f"a{i}: &a{i} {list_of}\n" % ", ".join([f"*a{i - 1}"] * 9) for i in range(1, 12))
-    return f"a0: &a0 {item}\n" + "".join(lists)
-
-
+# Each list holds the one before it nine times.
+MULTIPLIED = "a0: &a0 [x]\n" + "".join(f"a{i}: &a{i} [{f'*a{i - 1}, ' * 9}]\n" for i in range(1, 12))
 YAML: dict[str, tuple[str | bytes, str]] = {
-    "aliases that multiply": (multiplied("[x, x]", "[%s]"), "alias"),
-    "merges that multiply": (multiplied("{k: v}", "{<<: [%s]}"), "alias"),
-    "a list that holds itself": ("a: &a [*a]\n", "alias"),
+    "aliases that multiply": (MULTIPLIED, "alias"),
     "deep brackets": ("a: " + "[" * 100_000, "a.yaml"),
     "much text": ("x" * (5 * MB), "larger than 4 MB"),
     "a call": ("a: !!python/object/apply:os.system ['touch pwned']\n", "line 1"),
     "a wrong date": ("a: 2001-99-99\n", "not valid YAML"),
     "no text": (b"\xff\xfe", "not a text file"),
-    "a key given twice": ("a: 1\na: 2\n", "line 2"),
     "an integer of 20,000 digits": ("a: 1\nb: " + "9" * 20_000, "line 2: an integer of"),
 }
 
@@ -373,28 +266,10 @@ def test_nothing_is_unpickled(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
     objects = np.array([Payload(), 1], dtype=object)
     np.savez(tmp_path / "a.npz", heights=objects, rotations=objects, W0=objects)
     np.save(tmp_path / "a.npy", objects)
-    for name in ("bare.npz", "bare.npy", "bare.json", "bare.yaml", "bare.bvh", "bare.txt"):
-        write(tmp_path / name, pickle.dumps(Payload()))
-    readers: dict[str, list[Callable[[Path], Any]]] = {
-        ".npz": [load_npz, load_clip, load_network, read_heights],
-        ".npy": [read_heights],
-        ".json": [read_json],
-        ".yaml": [read_yaml, load_skeleton],
-        ".bvh": [read_bvh],
-        ".txt": [
-            read_heights,
-            lambda path: read_status(path, LINKS),
-            lambda path: read_gait_keys(path, SourceTime(9, 60.0), 9),
-        ],
-    }
+    write(tmp_path / "bare.npz", pickle.dumps(Payload()))
+    write(tmp_path / "bare.npy", pickle.dumps(Payload()))
     for path in sorted(tmp_path.glob("*.*")):
-        for read in readers[path.suffix]:
+        for read in (load_npz, load_clip, load_network, read_heights):
             with pytest.raises(InputError, match=re.escape(path.name)):
                 read(path)
     assert not (tmp_path / "pwned").exists()
-
-
-def test_rules_run_scripts_and_nothing_else(root: Path) -> None:
-    """No name ever reaches a shell. (ruff forbids what could run a file's content in the source.)"""
-    rules = [path.read_text() for path in sorted((root / "workflow").rglob("*.smk"))]
-    assert not [text for text in rules if re.search(r"^\s*(shell|run)\s*:", text, re.M)]

@@ -15,7 +15,6 @@ import pytest
 
 from . import throws
 from .lab import Lab
-from .same import same
 
 pytestmark = [pytest.mark.workflow, pytest.mark.slow]
 CLIPS = ("walk-straight-1_hurt1", "uneven-1")
@@ -63,13 +62,3 @@ def test_no_random_fault_damages_a_result() -> None:
     for what, found in counts.items():
         print(f"- {what}: {', '.join(f'{count} {happened}' for happened, count in sorted(found.items()))}")
     assert throws.FAULT not in counts["In all"]
-
-
-def test_same_ignores_times_and_nothing_else(tmp_path: Path) -> None:
-    a, b = tmp_path / "a/responsivity.json", tmp_path / "b/responsivity.json"
-    for path, time, laps in ((a, 1, 2), (b, 9, 2)):
-        path.parent.mkdir(exist_ok=True)
-        path.write_text(f'{{"milliseconds": {{"total": {time}}}, "laps": {laps}}}')
-    assert same(a.parent, b.parent)
-    b.write_text('{"milliseconds": {"total": 1}, "laps": 3}')
-    assert not same(a.parent, b.parent)

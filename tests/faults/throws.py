@@ -36,10 +36,9 @@ class Throw:
 def judged(
     bench: Bench, what: str, end: End, *said: str, killed: bool = False, mend: Callable[[], Any] | None = None
 ) -> Throw:
-    """What happened to a job with a fault, and then to the same job without it.
+    """What happened to a job with a fault, and then to the same job after `mend`, or with new inputs.
 
     said: pieces of the message with which it may have been refused. killed: whether it may have been killed.
-    mend: takes the fault away; by default all inputs are copied anew.
     """
 
     def fault(how: object) -> Throw:

@@ -6,7 +6,8 @@ from pathlib import Path
 import pytest
 
 from tests.checkout import Workflow
-from tests.workflow.small_project import DATASET
+
+DATASET = "skeleton: s\nfolder: mine\nmirror: true\nheld_out: [b]\n"
 
 
 @pytest.fixture(scope="session")

@@ -1,6 +1,5 @@
 """A new measurement needs two files, a network a folder, a channel a folder and its name in the list."""
 
-import csv
 import json
 import re
 import shutil
@@ -21,7 +20,7 @@ HIPS = '''"""How high the hips of the captured figure are."""
 from hobble.core.section import Positive, Section
 from hobble.measures.compare import ComparisonAddition
 from hobble.measures.measure import Cost, Measure
-from hobble.report.parts import Column, PageSection, Paragraph, SectionPart, Table
+from hobble.report.parts import Column, PageSection, SectionPart, Table
 
 
 class Options(Section):
@@ -42,8 +41,7 @@ MEASURE = Measure(
 def section(found, material):
     rows = [[row["clip"], row["highest"]] for row in found["clips"]]
     table = Table("hips", [Column("clip"), Column.number("highest, cm")], rows)
-    parts = [SectionPart(10, table), SectionPart(0, Paragraph("How high <they> are."))]
-    return PageSection("hips", parts, title="Hips", order=15)
+    return PageSection("hips", [SectionPart(0, table)], title="How high <they> are.", order=15)
 
 
 def compared(all_measured, published):
@@ -53,10 +51,6 @@ def compared(all_measured, published):
 
 def tables(compared):
     return {"hips": compared["hips"]}
-
-
-def compared_section(compared):
-    return PageSection("hips", [SectionPart(0, Paragraph("Hips of all."))], order=15)
 '''
 RUN = """from hobble.measures.measure import MeasureInputs, Outcome
 from hobble.rows.clip_rows import captured_stretches
@@ -162,13 +156,7 @@ def test_they_go_from_the_rows_to_the_pages(extended: Workflow) -> None:
     assert found["every"] == 2
     assert sorted(row["clip"] for row in found["clips"]) == found["known"]
     assert all(70 < row["highest"] < 110 for row in found["clips"])
-    with open(results / "evaluation/hips/clips.csv", newline="") as file:
-        assert sorted(row["clip"] for row in csv.DictReader(file)) == found["known"]
-    stages = json.loads((results / "pipeline.json").read_text())["stages"]
-    evaluation = next(stage for stage in stages if stage["stage"] == "evaluation")
-    assert "hips" in [rule["rule"] for rule in evaluation["rules"]]
-    assert page.index('<section id="accuracy"') < page.index('<section id="hips">')
+    assert (results / "evaluation/hips/clips.csv").read_text().startswith("clip,frames,highest")
     assert "How high &lt;they&gt; are." in page
-    compared = extended.folder / "results/compare"
-    assert (compared / "tables/hips.csv").read_text().splitlines()[0] == "configuration,highest"
-    assert "Hips of all." in (compared / "report.html").read_text()
+    compared = extended.folder / "results/compare/tables/hips.csv"
+    assert compared.read_text().splitlines()[0] == "configuration,highest"

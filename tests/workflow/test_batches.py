@@ -63,7 +63,7 @@ class Job:
             output=Named(batch=str(self.batch)),
             params=Named(clips=clips, times=self.times),
         )
-        writes = {"npz": "motion/{clip}.npz", "json": "motion/{clip}.json", "other": "motion/{mirror}.npz"}
+        writes = {"npz": "motion/{clip}.npz", "json": "motion/{clip}.json"}
         try:
             make_each(job, self.make, writes=writes)
         except SystemExit as end:
@@ -72,7 +72,6 @@ class Job:
 
     def make(self, piece: Any, log: logging.Logger) -> None:
         self.made.append(piece.name)
-        assert piece.output.keys() == {"npz", "json"}, "this data set has no mirrors"
         text = "".join(Path(file).read_text() for file in [piece.input["source"], *piece.input["notes"]])
         if "torn" in text:
             raise InputError(piece.input["source"], "is torn")
@@ -183,25 +182,3 @@ def test_what_is_damaged_is_made_again(job: Job) -> None:
     assert job.run() == 0
     assert job.made == ["a", "b"]
     whole(job)
-
-
-def test_the_batch_has_links_to_the_files_or_copies(job: Job, monkeypatch: pytest.MonkeyPatch) -> None:
-    assert {path.stat().st_nlink for path in job.outputs} == {2}
-
-    def refused(*arguments: object) -> None:
-        raise PermissionError(1, "Operation not permitted")
-
-    monkeypatch.setattr(os, "link", refused)
-    assert job.run() == 0
-    assert {path.stat().st_nlink for path in job.outputs} == {1}
-    whole(job)
-
-
-def test_a_full_disk_ends_the_job_with_one_message(job: Job, monkeypatch, capfd) -> None:
-    def full(piece: Any, log: logging.Logger) -> None:
-        raise InputError(piece.output["npz"], "the disk is full") from OSError(28, "No space left on device")
-
-    monkeypatch.setattr(job, "make", full)
-    job.times = 2
-    assert job.run() == 1
-    assert capfd.readouterr().err.count("the disk is full") == 1

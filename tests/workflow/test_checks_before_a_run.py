@@ -8,11 +8,10 @@ import pytest
 from hobble.core.errors import HobbleError
 from hobble.workflow import project as targets
 from hobble.workflow.project import Project, check_targets
-from tests.workflow.small_project import DATASET
+from tests.workflow.conftest import DATASET
 
 IMPOSSIBLE = {
     DATASET + "clips: {b: , a_mirror: }\n": "a_mirror: names that end in _mirror, .* are reserved",
-    DATASET.replace("[b]", "[z]"): "held_out names clips that do not exist: z",
     DATASET.replace("[b]", "[a, b, c]"): "no clip without injury is left to train on",
     "skeleton: s\nfolder: empty\n": "empty: no such folder",
 }
@@ -34,12 +33,8 @@ def unchecked(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_impossible_targets_are_reported_before_training(base: Path, unchecked: None) -> None:
     (base / "config/eyes.yaml").write_text("extends: hurt\nnetwork_of: one\n")
     questionnaire = "questionnaire/questionnaire.html"
-    for target, message in {
-        "results/one/stimuli": "configuration one has no `channels`",
-        f"results/one/{questionnaire}": r"configuration one has no channel injury.*\[injury\]",
-    }.items():
-        with pytest.raises(HobbleError, match=message):
-            check_targets(Project(base, {}), [target])
+    with pytest.raises(HobbleError, match=r"configuration one has no channel injury.*\[injury\]"):
+        check_targets(Project(base, {}), [f"results/one/{questionnaire}"])
     fine = ("hurt/stimuli", f"hurt/{questionnaire}", "one/export/pfnn")
     check_targets(Project(base, {}), [f"results/{target}" for target in fine])
 
@@ -52,19 +47,10 @@ LOCAL = DATASET + "database: {local_phases: true}\n"
     ("text", "dataset", "message"),
     [
         (SYMMETRIC + "network: {kind: mann}", DATASET, "lame: training.symmetric: a network of kind mann"),
-        (SYMMETRIC + "network: {control_points: 5}", DATASET, "it needs an even number of .*, not 5"),
-        (
-            SYMMETRIC,
-            DATASET.replace("mirror: true\n", ""),
-            "data set mine has no mirrored clips.* `mirror",
-        ),
+        (SYMMETRIC, DATASET.replace("mirror: true\n", ""), "data set mine has no mirrored clips.* `mirror"),
         (SYMMETRIC + "network: {kind: plain}", DATASET, ""),
         ("network: {kind: local}", DATASET, "local needs local phases, and data set mine has none.*s: true}"),
-        (
-            "network: {kind: mann}",
-            LOCAL,
-            "mann cannot use local phases, and data set mine has them.*false}",
-        ),
+        ("network: {kind: mann}", LOCAL, "mann cannot use local phases, and data set mine has them.*false}"),
         ("network: {kind: local}", LOCAL, ""),
     ],
 )
@@ -77,44 +63,25 @@ def test_a_data_set_has_what_the_network_needs(
         check_targets(Project(base, {}), ["results/lame/report.html"])
 
 
-LISTED = "skeleton: s\nfolder: mine\nclips: {a: , b: {%s}}\n"
-WALKER = "skeleton: s\nsynthetic: {frames: 600}\nclips: {b: {%s}}\n"
+ENTRIES = {
+    "skeleton: s\nfolder: mine\nclips: {b: {channels: {injury: 'LeftLeg-LeftFoot[11]'}}}\n": "channels.*11",
+    "skeleton: s\nsynthetic: {frames: 600}\nclips: {b: {recipe: wlak}}\n": "recipe: no such recipe: wlak",
+}
 
 
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        (
-            LISTED % "channels: {injury: 'LeftLeg-LeftFoot[11]'}",
-            "clips.b.channels.injury: severity 11 of LeftLeg-LeftFoot is not a number from 0",
-        ),
-        (
-            LISTED % "channels: {injury: 'LeftLeg-NoSuch[4]'}",
-            "no such link: LeftLeg-NoSuch. Did you mean LeftLeg-LeftFoot",
-        ),
-        (LISTED % "channels: {injury: ''}", "clips.b.channels.injury: names no link"),
-        (WALKER % "recipe: wlak", "clips.b.recipe: no such recipe: wlak. There are walk-straight, walk, "),
-    ],
-)
-def test_wrong_names_in_clip_entries_are_reported_before_anything_runs(
-    complete: Path, text: str, message: str
-) -> None:
-    (complete / "config/datasets/mine.yaml").write_text(text)
-    with pytest.raises(HobbleError, match=f"data set mine: .*{message}"):
-        check_targets(Project(complete, {}), ["results/one/report.html"])
+def test_wrong_names_in_clip_entries_are_reported_before_anything_runs(complete: Path) -> None:
+    for text, message in ENTRIES.items():
+        (complete / "config/datasets/mine.yaml").write_text(text)
+        with pytest.raises(HobbleError, match=f"data set mine: clips.b.{message}"):
+            check_targets(Project(complete, {}), ["results/one/report.html"])
 
 
 def test_a_skeleton_that_cannot_be_mirrored_is_reported_before_anything_runs(complete: Path) -> None:
     rig = complete / "config/skeletons/s.yaml"
     rig.write_text(rig.read_text().replace("RightFoot", "OtherFoot"))
-    for mirror in (False, True):
-        text = DATASET.replace("mirror: true", f"mirror: {str(mirror).lower()}") + "clips: {a: , b: }\n"
-        (complete / "config/datasets/mine.yaml").write_text(text)
-        if not mirror:
-            check_targets(Project(complete, {}), ["results/one/report.html"])
-    with pytest.raises(
-        HobbleError, match="skeleton s cannot be mirrored: LeftFoot is the left heel and OtherF"
-    ):
+    (complete / "config/datasets/mine.yaml").write_text(DATASET + "clips: {a: , b: }\n")
+    says = "skeleton s cannot be mirrored: LeftFoot is the left heel and OtherF"
+    with pytest.raises(HobbleError, match=says):
         check_targets(Project(complete, {}), ["results/one/report.html"])
 
 
@@ -122,11 +89,9 @@ def test_a_skeleton_that_cannot_be_mirrored_is_reported_before_anything_runs(com
     ("text", "message"),
     [
         ("channels: [injury]", r"its channels must be \[\], not"),
-        ("training: {sections: 5}", r"its training\.sections must be 10, not 5"),
         ("training: {passes: 19}", r"its training\.passes must be 20 or more, not 19"),
         ("network: {kind: matching}", "so its network must be"),
         ("training: {learning_rate: 1.0e-3, batch: 64}", None),
-        ("", None),
     ],
 )
 def test_an_impossible_continuation_is_reported_before_anything_runs(
@@ -137,9 +102,3 @@ def test_an_impossible_continuation_is_reported_before_anything_runs(
     refused = pytest.raises(HobbleError, match=f"configuration other continues from one, .*{message}")
     with refused if message else contextlib.nullcontext():
         check_targets(Project(complete, {}), ["results/other/report.html"])
-
-
-def test_every_shipped_data_set_passes(root: Path) -> None:
-    project = Project(root, {"mocap": "nowhere"})
-    names = ("synthetic", "synthetic-ava", "tiny", "cmu")
-    check_targets(project, [f"results/datasets/{name}/x" for name in names])

@@ -6,40 +6,14 @@ from pathlib import Path
 import pytest
 import yaml
 
-from hobble.workflow.datasets import LEAST_BATCHES, batch_of
 from hobble.workflow.demands import (
     WEEK_MINUTES,
-    bvh_seconds,
     job_request,
     measure_request,
     sentences_about_plan,
     training_request,
 )
 from hobble.workflow.project import Project
-
-CLIPS = 40
-MANY = "skeleton: holden31\nfolder: many\nmirror: true\nheld_out: [clip-00]\n"
-
-
-def bvh(path: Path, rows: int, promised: int, frame_time: str = "0.01") -> Path:
-    head = f"HIERARCHY\nROOT Hips\nMOTION\nFrames: {promised}\nFrame Time: {frame_time}\n"
-    path.write_text(head + "0.00 1.00 2.00\n" * rows)
-    return path
-
-
-@pytest.mark.workflow
-def test_a_stage_has_a_job_for_each_batch_of_clips(workflow, tmp_path) -> None:
-    (workflow.folder / "config/datasets/many.yaml").write_text(MANY)
-    (workflow.folder / "config/many.yaml").write_text("extends: holden\ndataset: many\nchannels: [injury]\n")
-    (tmp_path / "many").mkdir()
-    for number in range(CLIPS):
-        bvh(tmp_path / f"many/clip-{number:02}.bvh", 100, 100, frame_time=f"0.0100{number:02}")
-    planned = workflow.planned("--config", f"mocap={tmp_path}", "--", "results/many/report.html")
-    stages = ("motion_clips", "labels_clips", "channel_clips", "terrain_fits", "database_clips")
-    used = len({batch_of(f"clip-{number:02}", LEAST_BATCHES) for number in range(CLIPS)})
-    assert {rule: planned.pop(rule) for rule in stages} == dict.fromkeys(stages, used)
-    # Whatever is not in a batch is there once for the data set, the configuration or a measurement.
-    assert {rule for rule, count in planned.items() if count > 1} == {"measure"}, planned
 
 
 @pytest.mark.workflow
@@ -85,14 +59,6 @@ def test_requests_grow_with_motion_and_attempt(root: Path) -> None:
     measured = measure_request(holden, "accuracy")
     again = measure_request(holden, "accuracy", attempt=3)
     assert again.mem_mb == pytest.approx(3 * measured.mem_mb, abs=2)
-
-
-def test_the_length_of_a_clip_is_counted_from_its_rows(tmp_path) -> None:
-    assert bvh_seconds(bvh(tmp_path / "a.bvh", 500, 2_000_000_000)) == pytest.approx(5.0)
-    assert bvh_seconds(bvh(tmp_path / "b.bvh", 500, 500, "1e9")) <= 500
-    assert bvh_seconds(bvh(tmp_path / "c.bvh", 0, 500)) is None
-    assert bvh_seconds(bvh(tmp_path / "d.bvh", 5, 5, "1.2.3")) is None
-    assert bvh_seconds(tmp_path / "not there.bvh") is None
 
 
 def test_a_plan_says_how_long_its_trainings_take_and_names_a_faster_recipe(root: Path) -> None:

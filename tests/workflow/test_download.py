@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from hobble.core.errors import HobbleError
-from hobble.workflow.project import Project, check_targets
+from hobble.workflow.project import Project
 
 FAR = """
 skeleton: s
@@ -21,11 +21,6 @@ def test_missing_clips_are_downloaded(base: Path) -> None:
     (base / "config/datasets/far.sha256").write_text(f"{'a' * 64}  2_1.bvh\n{'B' * 64} *2_2.bvh\n\n")
     project = Project(base, {})
     assert project.dataset("far").source("2_1") == str(base / "data/downloaded/far/2_1.bvh")
-    assert (
-        project.dataset("far").label_files("2_1")
-        == project.dataset("far").channel_files("2_1", "injury")
-        == []
-    )
     assert project.dataset("far").download("2_2") == {
         "url": "https://host/002/2_2.bvh",
         "sha256": "b" * 64,
@@ -41,10 +36,7 @@ def test_missing_clips_are_downloaded(base: Path) -> None:
 BAD = (
     ("https://host/", "ftp://host/", r"download: url: must be an address like"),
     ("{clip}", "{name}", r"download: url: must contain \{clip\}; only"),
-    ("{clip}", "{clip.x}", "download: url: "),
     ("{clip}", "{clip:a>400000000}", "padding to a width of up to 99"),
-    ("{clip}", "{clip", "download: url: "),
-    ("far.sha256", "../far.sha256", "checksums: must be a relative path"),
     ("clips: {'2_1': }\n", "", "needs a list of its `clips` and a `folder`"),
 )
 
@@ -63,13 +55,8 @@ def test_a_bad_address_or_checksum_is_reported(base: Path) -> None:
 
 def test_every_clip_of_the_cmu_set_has_a_checksum_and_an_address(root: Path) -> None:
     project = Project(root, {"mocap": "nowhere"})
-    check_targets(project, ["results/datasets/cmu/motion/02_01.npz"])
     assert len(project.dataset("cmu").listed) == 68
     assert project.dataset("cmu").download("02_01")["url"].endswith("/cmu-mocap/master/data/002/02_01.bvh")
-    assert project.dataset("cmu").download("105_16")["url"].endswith("/105/105_16.bvh")
-    assert all(
-        len(project.dataset("cmu").download(clip)["sha256"]) == 64 for clip in project.dataset("cmu").listed
-    )
 
 
 @pytest.mark.shared

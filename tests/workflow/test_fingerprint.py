@@ -13,33 +13,25 @@ from hobble.workflow import fingerprint as fp
 @pytest.fixture
 def source(tmp_path: Path) -> Path:
     """A script and a package with every kind of text and code."""
-    package = tmp_path / "src" / "pkg"
-    package.mkdir(parents=True)
-    (package / "__init__.py").write_text('"""Package."""\n')
-    (package / "near.py").write_text("from pkg.far import f\n\ndef g():\n    return f(1)\n")
-    (package / "far.py").write_text(FAR)
-    (package / "options.py").write_text(OPTIONS)
-    (package / "other.py").write_text("x = 1\n")
-    (package / "typed.py").write_text("T = int\n")
-    frame = tmp_path / "src/hobble/workflow"
-    frame.mkdir(parents=True)
-    for folder in (frame, frame.parent):
-        (folder / "__init__.py").write_text("")
-    (frame / "job.py").write_text("x = 1\n")
-    (tmp_path / "script.py").write_text(
-        "from hobble.workflow.job import x\nfrom pkg import near\nprint(near.g())\n"
-    )
+    for file, text in {
+        "src/pkg/__init__.py": '"""Package."""\n',
+        "src/pkg/near.py": "from pkg.far import f\n\ndef g():\n    return f(1)\n",
+        "src/pkg/far.py": FAR,
+        "src/pkg/options.py": OPTIONS,
+        "src/pkg/other.py": "x = 1\n",
+        "src/hobble/__init__.py": "",
+        "src/hobble/workflow/__init__.py": "",
+        "src/hobble/workflow/job.py": "x = 1\n",
+        "script.py": "from hobble.workflow.job import x\nfrom pkg import near\nprint(near.g())\n",
+    }.items():
+        (tmp_path / file).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / file).write_text(text)
     return tmp_path
 
 
 FAR = """
 import logging
-from typing import TYPE_CHECKING
-
 from pkg.options import Options
-
-if TYPE_CHECKING:
-    from pkg.typed import T
 
 log = logging.getLogger("far")
 KIND = "walk"
@@ -51,7 +43,7 @@ def f(x: int) -> int:
     if x > 9:
         raise ValueError(f"{x} is too large")
     log.info("%d comes", x)
-    assert x != 7, "seven"
+    assert x != 7
     return Options(kind=KIND).double() + 1
 """
 
@@ -75,11 +67,6 @@ def mark(root: Path) -> str:
     return fp.fingerprint(root / "script.py", root / "src")
 
 
-def test_a_fingerprint_follows_imports_but_not_infrastructure(source: Path) -> None:
-    found = fp.imported_files(source / "script.py", source / "src")
-    assert {path.name for path in found} == {"__init__.py", "near.py", "far.py", "options.py"}
-
-
 CHANGES = (
     ("script.py", "near.g()", "near.g() + 1"),
     ("src/pkg/far.py", "x != 7", "x != 8"),
@@ -90,12 +77,10 @@ HARMLESS = (
     ("src/pkg/far.py", "# why", "# because"),
     ("src/pkg/far.py", "Doc.", "Other words."),
     ("src/pkg/far.py", "is too large", "is more than 9"),
-    ("src/pkg/far.py", '"seven"', '"not seven"'),
     ("src/pkg/far.py", "%d comes", "here comes %d"),
     ("src/pkg/far.py", "x: int", "x: float"),
     ("src/pkg/options.py", "how often", "times"),
     ("src/pkg/options.py", "kind: str", "kind: str\n    more: int = 3"),
-    ("src/pkg/typed.py", "int", "float"),
     ("src/pkg/other.py", "x = 1", "x = 2"),
     ("src/hobble/workflow/job.py", "x = 1", "x = 2"),
 )

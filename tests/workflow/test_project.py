@@ -1,6 +1,5 @@
 """Which clips a configuration gets, in which part of the split, and what is compared."""
 
-import json
 from pathlib import Path
 
 import pytest
@@ -8,7 +7,7 @@ import pytest
 from hobble.channels import channel
 from hobble.core.errors import HobbleError
 from hobble.workflow.project import RESERVED, Project, check_targets
-from tests.workflow.small_project import DATASET
+from tests.workflow.conftest import DATASET
 
 
 def test_mirrors_go_with_their_originals_and_hurt_clips_to_injured_networks(base: Path) -> None:
@@ -65,24 +64,6 @@ def test_severities_of_0_count_as_healthy_and_an_entry_replaces_the_file(base: P
     (base / "config/datasets/mine.yaml").write_text(text)
     assert healthy() == [False, True, False]
     assert Project(base, {}).dataset("mine").channel_files("a", "injury") == []
-
-
-@pytest.mark.parametrize("name", ["Walk Forward", "walk, slow (2)", "gå+走"])
-def test_a_clip_with_any_file_name_can_have_an_entry(base: Path, name: str) -> None:
-    (base / f"data/mine/{name}.bvh").write_text("")
-    text = f"{DATASET.replace('[b]', json.dumps([name]))}clips: {{a: , {json.dumps(name)}: {{gait: jog}}}}\n"
-    (base / "config/datasets/mine.yaml").write_text(text)
-    project = Project(base, {})
-    assert project.dataset("mine").entry(name).gait == "jog"
-    assert project.configuration("hurt").splits[name + "_mirror"] == "held_out"
-    assert project.dataset("mine").source(name) == str(base / f"data/mine/{name}.bvh")
-
-
-def test_network_of_reads_the_other_configurations_files(root: Path) -> None:
-    project = Project(root, {})
-    assert project.configuration("ava-m").network("weights.npz") == "results/ava/network/weights.npz"
-    assert project.configuration("holden-xt").start_checkpoint() == ["results/holden/network/checkpoint.npz"]
-    assert project.configuration("holden").start_checkpoint() == []
 
 
 def test_a_comparison_has_its_configurations(complete: Path) -> None:

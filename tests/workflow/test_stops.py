@@ -7,11 +7,11 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
-from pathlib import Path
 
-import numpy as np
 import psutil
 import pytest
+
+from tests.faults.same import same
 
 pytestmark = pytest.mark.workflow
 
@@ -51,11 +51,6 @@ def ended(jobs: list[psutil.Process], within: float) -> bool:
     return not running(jobs)
 
 
-def same_network(one: Path, other: Path) -> bool:
-    a, b = np.load(one / WEIGHTS), np.load(other / WEIGHTS)
-    return all(np.array_equal(a[name], b[name]) for name in a.files)
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("number", "to_all"), [(signal.SIGINT, True), (signal.SIGTERM, False), (signal.SIGKILL, False)]
@@ -71,7 +66,7 @@ def test_jobs_end_with_their_run_and_the_same_command_gives_the_same_bits(
     assert process.wait(timeout=20) == (-signal.SIGKILL if number == signal.SIGKILL else 1)
     assert "Traceback" not in (copied.folder / "said.txt").read_text()
     copied.run("-c2", WEIGHTS)
-    assert same_network(finished.folder, copied.folder)
+    assert same(finished.folder / WEIGHTS, copied.folder / WEIGHTS)
     if number != signal.SIGKILL:
         assert not list(copied.folder.rglob("*.part"))
 

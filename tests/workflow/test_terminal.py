@@ -86,19 +86,6 @@ def test_a_failure_is_printed_once_and_listed_in_the_summary(tmp_path: Path) -> 
     ]
 
 
-def test_jobs_of_a_stopped_run_do_not_count_as_failed() -> None:
-    run = Run()
-    run.say("run_info", "", stats={"training": 1, "total": 1})
-    run.job(1, "training")
-    run.say(None, "Terminating processes on user request, this might take some time.")
-    run.say("job_error", "", logging.ERROR, jobid=1, rule_name="training", log=[])
-    run.terminal.close()
-    assert run.lines[1:] == [
-        "Stopping the running jobs.",
-        "0 of 1 jobs done in 0 s, then stopped. The same command continues from here.",
-    ]
-
-
 def test_a_dry_run_lists_its_jobs_by_stage_with_reasons(monkeypatch: pytest.MonkeyPatch) -> None:
     told = []
     monkeypatch.setattr(plugin, "ABOUT_PLAN", [lambda jobs: told.append(jobs) or ["It takes long."]])
