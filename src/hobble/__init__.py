@@ -25,9 +25,10 @@ def load(path: str | Path, **options: Any) -> ProceduralAnimation:
 
     options: those of `hobble.runtime.ProceduralAnimation.load`.
     """
-    from hobble.runtime.animation import ProceduralAnimation  # here: every job of the workflow imports hobble
-
-    return ProceduralAnimation.load(path, **options)
+    # No `import`: every job of the workflow imports hobble, and would depend on the runtime.
+    animation = importlib.import_module("hobble.runtime.animation")
+    character: ProceduralAnimation = animation.ProceduralAnimation.load(path, **options)
+    return character
 
 
 def results(configuration: str, folder: str | Path = "results") -> dict[str, pandas.DataFrame]:
@@ -61,9 +62,9 @@ def _published() -> dict[str, pandas.DataFrame]:
     import pandas
 
     from hobble.core.files import read_yaml
-    from hobble.report.gather import PUBLISHED
 
-    found = read_yaml(PUBLISHED)
+    # No `import`: every job would depend on the page.
+    found = read_yaml(importlib.import_module("hobble.report.gather").PUBLISHED)
     lists = {
         name: rows for name, rows in found.items() if isinstance(rows, list) and isinstance(rows[0], dict)
     }

@@ -1,8 +1,6 @@
 """The files of clips in a user's folder: which are found, left out or refused."""
 
 import os
-import re
-import shutil
 from pathlib import Path
 
 import pytest
@@ -43,19 +41,15 @@ def test_a_mirror_beside_its_original_is_left_out(base: Path, mirror: bool) -> N
     (base / "data/mine/a_mirror_footsteps.txt").write_text("1 2\n")
     clips = Project(base, {}).dataset("mine")
     assert list(clips.entries) == ["a", "b", "c"]
-    said = [] if mirror else ["1 files in .* are mirrors of other clips .a_mirror.*used. With `mirror: true`"]
-    assert all(
-        re.search(wanted, note) for wanted, note in zip(said, clips.notes_on_unused_files(), strict=True)
-    )
+    notes = clips.notes_on_unused_files()
+    assert ["are mirrors of other clips (a_mirror" in note for note in notes] == [True] * (not mirror)
 
 
 def test_a_status_file_without_a_clip_is_reported_with_the_nearest_name(base: Path) -> None:
     (base / "data/mine/orphan.bvh").write_text("")
     (base / "data/mine/orphn_injuries.txt").write_text("frames:9\n1-9 LeftLeg-LeftFoot[4];\n")
     (note,) = Project(base, {}).dataset("mine").notes_on_unused_files()
-    assert (
-        "orphn_injuries.txt belongs to no clip and is not read. If it belongs to orphan, rename it." in note
-    )
+    assert "orphn_injuries.txt belongs to no clip and is not read. If it belongs to orphan, rename" in note
 
 
 def test_two_files_of_one_clip_are_refused_with_both(base: Path) -> None:
@@ -63,18 +57,6 @@ def test_two_files_of_one_clip_are_refused_with_both(base: Path) -> None:
     (base / "data/mine/old/a.BVH").write_text("")
     with pytest.raises(HobbleError, match=r"old/a\.BVH: a second file of clip a; the first is .*mine/a\.bvh"):
         _ = Project(base, {}).dataset("mine").entries
-
-
-def test_a_clip_depends_on_the_skeleton_that_it_is_retargeted_from(complete: Path, root: Path) -> None:
-    shutil.copy(root / "config/skeletons/mixamo55.yaml", complete / "config/skeletons")
-    joints = ("Hips", "Spine2", "LeftHandThumb1", "LeftHandThumb2", "LeftUpLeg")
-    header = (
-        "HIERARCHY\n" + "".join(f"JOINT mixamorig:{name}{{\r\n" for name in joints) + "MOTION\nJOINT Neck1\n"
-    )
-    (complete / "data/mine/b.bvh").write_text(header)
-    project = Project(complete, {})
-    assert [Path(f).name for f in project.dataset("mine").clip_skeleton_files("b")] == ["mixamo55.yaml"]
-    assert project.dataset("mine").clip_skeleton_files("a") == []
 
 
 @pytest.mark.parametrize("name", ["a.bvh", "map.txt"])

@@ -6,13 +6,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from hobble.workflow.demands import (
-    WEEK_MINUTES,
-    job_request,
-    measure_request,
-    sentences_about_plan,
-    training_request,
-)
+from hobble.workflow.demands import WEEK_MINUTES, job_request, sentences_about_plan, training_request
 from hobble.workflow.project import Project
 
 
@@ -39,8 +33,6 @@ def test_cluster_profiles_have_the_settings_of_the_default_one(root: Path, name:
         del defaults["disk_mb"]
     assert {key: ours.get(key) for key in default} == default
     assert ours["default-resources"].items() >= defaults.items()
-    assert ("disk_mb" in ours["default-resources"]) == ("disk_mb" in defaults)
-    assert name == "s3" or ours["retries"] == 2
 
 
 def test_requests_grow_with_motion_and_attempt(root: Path) -> None:
@@ -50,15 +42,11 @@ def test_requests_grow_with_motion_and_attempt(root: Path) -> None:
     again = job_request("hurt", data, ["jog-1"], attempt=2)
     assert short < long
     assert again == pytest.approx((2 * long.mem_mb, 2 * long.runtime), abs=1)
-    assert job_request("hurt", data, ["jog-1_hurt1"]) == long
     assert job_request("hurt", project.dataset("synthetic-ava"), ["jog-1"]).mem_mb > long.mem_mb
     both = job_request("hurt", data, ["jog-1", "jog-2"])
     assert both == pytest.approx((long.mem_mb, short.runtime + long.runtime), abs=1)
     assert training_request(ava).mem_mb > training_request(holden).mem_mb
     assert training_request(ava, attempt=10_000).runtime == WEEK_MINUTES
-    measured = measure_request(holden, "accuracy")
-    again = measure_request(holden, "accuracy", attempt=3)
-    assert again.mem_mb == pytest.approx(3 * measured.mem_mb, abs=2)
 
 
 def test_a_plan_says_how_long_its_trainings_take_and_names_a_faster_recipe(root: Path) -> None:

@@ -40,12 +40,6 @@ def test_each_bad_file_is_refused_with_its_place_and_the_others_are_made(
     assert [path.stem for path in made] == ["uneven-1"]
 
 
-def test_a_plan_takes_few_lines_and_all_of_snakemakes_with_p(workflow: Workflow) -> None:
-    target = "results/datasets/tiny/channels/injury/walk-straight-1.npz"
-    assert len(workflow.run("-n", target).splitlines()) < 20
-    assert "rule synthetic_clips:" in workflow.run("-np", target)
-
-
 def test_a_bad_configuration_is_refused_before_planning(workflow: Workflow) -> None:
     override = "trainnig={passes: 1}"
     text = workflow.run("-np", "results/test/report.html", "--config", override, ok=False)

@@ -94,6 +94,12 @@ def test_only_code_changes_a_fingerprint(source: Path) -> None:
         assert (mark(source) != before) is ((file, old, new) in CHANGES), (old, new)
 
 
+def test_motion_depends_on_its_own_room_and_those_before_it(root: Path) -> None:
+    files = fp.imported_files(root / "workflow/scripts/motion_clips.py", root / "src")
+    rooms = {path.relative_to(root / "src/hobble").parts[0] for path in files}
+    assert rooms <= {"__init__.py", "core", "figure", "motion"}
+
+
 @pytest.mark.parametrize("measure", all_measures(), ids=lambda measure: measure.name)
 def test_a_measurement_depends_neither_on_the_page_nor_on_other_measurements(
     root: Path, measure: Measure

@@ -10,9 +10,7 @@ from pathlib import Path
 import psutil
 import pytest
 
-from hobble.core.errors import InputError
 from hobble.workflow import lifetime
-from hobble.workflow.job import with_true_advice
 
 SCRIPT = """
 import os, time
@@ -64,24 +62,6 @@ def test_an_error_is_one_line_and_its_traceback_is_in_the_log(tmp_path: Path) ->
         assert "\n" not in said
         assert "words for the log" in path.read_text()
         assert "Traceback" in path.read_text()
-
-
-AGAIN = "; the same command makes it again."
-ADVICE = {
-    "results/d/database/plain/statistics.npz": f"Delete results/d/database/plain{AGAIN}",
-    "results/c/network/weights.npz": f"Delete results/c/network/weights.npz{AGAIN}",
-    "data/heights.npz": "Replace it by a good copy.",
-    "results/c/checkpoints/0/checkpoint.npz": "Delete it; the next run makes it again.",
-}
-
-
-def test_the_advice_to_delete_names_what_a_rule_makes() -> None:
-    inputs = ["results/d/database/plain", "results/c/network/weights.npz", "data/heights.npz"]
-    for path, advice in ADVICE.items():
-        error = InputError(path, "damaged", line=3, fix="Delete it; the next run makes it again.")
-        assert str(with_true_advice(error, inputs)) == f"{path}, line 3: damaged. {advice}"
-    other = InputError("a.bvh", "too short", fix="Use a longer clip.")
-    assert with_true_advice(other, inputs) is other
 
 
 DEAF = "while True:\n        try: time.sleep(60)\n        except BaseException: pass"

@@ -25,17 +25,12 @@ def test_a_module_makes_the_same_in_its_place(workflow, finished, tmp_path, plac
     text = IMPORTING.format(checkout=workflow.folder, prefix=prefix, place=place)
     (tmp_path / "Snakefile").write_text(text)
     motion = f"{place}results/datasets/tiny/batches/motion/uneven-1"
+    how = {**workflow.how(), "cwd": tmp_path, "capture_output": True, "text": True}
     for target in ("-n", motion):
-        done = subprocess.run(
-            workflow.command("-c2", target),
-            **{**workflow.how(), "cwd": tmp_path},
-            capture_output=True,
-            text=True,
-        )
+        done = subprocess.run(workflow.command("-c2", target), **how)
         assert done.returncode == 0, done.stderr
-    assert (tmp_path / motion / "motion/uneven-1.npz").read_bytes() == (
-        finished.folder / "results/datasets/tiny/motion/uneven-1.npz"
-    ).read_bytes()
+    ours = finished.folder / "results/datasets/tiny/motion/uneven-1.npz"
+    assert (tmp_path / motion / "motion/uneven-1.npz").read_bytes() == ours.read_bytes()
 
 
 def test_snakemakes_own_report_shows_the_pages(copied) -> None:

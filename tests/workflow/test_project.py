@@ -6,7 +6,7 @@ import pytest
 
 from hobble.channels import channel
 from hobble.core.errors import HobbleError
-from hobble.workflow.project import RESERVED, Project, check_targets
+from hobble.workflow.project import Project, check_targets
 from tests.workflow.conftest import DATASET
 
 
@@ -46,8 +46,6 @@ def test_a_hurt_version_has_the_mood_of_its_clip(base: Path) -> None:
     assert database.endswith("mine/database/injury+mood"), "in the order of the list of channels"
     people = project.configuration("both").measure_params("recognition")["people"]
     assert {clip for clip, person in people.items() if person == "ann"} == {c for c in both if c[0] in "ac"}
-    assert {person for clip, person in people.items() if clip[0] == "b"} == {"b"}
-    assert project.configuration("both").measure_params("accuracy")["people"] == {}
 
 
 def test_severities_of_0_count_as_healthy_and_an_entry_replaces_the_file(base: Path) -> None:
@@ -79,17 +77,8 @@ def test_a_comparison_has_its_configurations(complete: Path) -> None:
     assert project.configuration("one").resolved() == Project(complete, {}).configuration("one").resolved()
 
 
-@pytest.mark.parametrize("names", [["one", "two"], ["one", "one"], [], [1], {"a": "one"}], ids=str)
+@pytest.mark.parametrize("names", [["one", "one"], [1]], ids=str)
 def test_configurations_that_cannot_be_compared_are_refused(complete: Path, names: object) -> None:
     project = Project(complete, {"compare": names})
-    check_targets(project, ["results/one/report.html"])
-    message = "two.yaml: no such file" if names == ["one", "two"] else "must be a list of names, each once, "
-    with pytest.raises(HobbleError, match=message):
+    with pytest.raises(HobbleError, match="must be a list of names, each once, "):
         check_targets(project, ["results/compare/report.html"])
-
-
-@pytest.mark.parametrize("name", RESERVED)
-def test_names_of_results_folders_are_reserved(base: Path, name: str) -> None:
-    (base / f"config/{name}.yaml").write_text("extends: one\n")
-    with pytest.raises(HobbleError, match=f"no configuration can be called {name}"):
-        Project(base, {})

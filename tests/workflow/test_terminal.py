@@ -9,9 +9,7 @@ import pytest
 import snakemake_logger_plugin_hobble as plugin
 from snakemake_logger_plugin_hobble import PROGRESS_SECONDS, Terminal
 
-CALLED = (
-    "RuleException:\nCalledProcessError in file x.smk, line 3:\nCommand 'set -euo pipefail;  python s.py'"
-)
+CALLED = "RuleException:\nCalledProcessError in file x.smk, line 3:\nCommand 'set -euo pipefail; python s.py'"
 
 
 class Run:
@@ -53,8 +51,7 @@ def test_a_run_prints_its_plan_some_progress_and_a_summary_once() -> None:
     run.job(30, "training", configuration="holden")
     run.clock += 170
     run.finish(30, 31, 31)
-    for _ in range(2):
-        run.terminal.close()
+    run.terminal.close()
     assert run.lines[:2] == ["31 jobs: 30 motion_clips, 1 training", "29/31 jobs, 30 s: motion_clips"]
     assert run.lines[-1] == "31 of 31 jobs done in 3 min 20 s."
     assert len(run.lines) <= 2 + 200 / PROGRESS_SECONDS
@@ -69,9 +66,7 @@ def test_a_failure_is_printed_once_and_listed_in_the_summary(tmp_path: Path) -> 
     for number, log in enumerate((said, silent)):
         run.job(number, "motion_clips", str(log), clip="ab"[number])
         run.say("error", CALLED, logging.ERROR)
-        run.say(
-            "job_error", "Error in rule", logging.ERROR, jobid=number, rule_name="motion_clips", log=[log]
-        )
+        run.say("job_error", "", logging.ERROR, jobid=number, rule_name="motion_clips", log=[log])
     run.say("error", "WorkflowError:\nconfig/nope.yaml: no such file", logging.ERROR)
     run.say(None, "Exiting because a job execution failed. Look below for error messages", logging.ERROR)
     run.terminal.close()
@@ -100,8 +95,7 @@ def test_a_dry_run_lists_its_jobs_by_stage_with_reasons(monkeypatch: pytest.Monk
     run.job(2, "training", "results/c/logs/training/training.log", reason=reason, configuration="c")
     run.say("run_info", "Job stats: ...", stats=stats)
     run.say(None, "Reasons:\n    (check individual jobs above for details)\n    code: training")
-    for _ in range(2):
-        run.terminal.close()
+    run.terminal.close()
     assert run.lines == [
         "Job stats:",
         "stage     job           count  reason",
@@ -121,24 +115,14 @@ def test_a_long_job_shows_its_share_its_errors_and_its_log_while_the_time_moves(
     run.say("run_info", "", stats={"training": 1, "total": 65})
     run.finish(0, 51, 65)
     run.job(1, "training", str(log), configuration="holden")
-    for said in (
-        "",
-        "INFO begin",
-        "INFO pass 1: 34 % done, 8 min left, error 0.41",
-        "INFO pass 2: 36 % done, 7 min left",
-    ):
+    for said in ("begin", "pass 1: 34 % done, 8 min left, error 0.41", "pass 2: 36 % done, 7 min left"):
         with log.open("a") as file:
-            file.write(f"2026-01-01 00:00:00,000 {said}\n" if said else "")
+            file.write(f"2026-01-01 00:00:00,000 INFO {said}\n")
         run.clock += PROGRESS_SECONDS
         run.terminal.tick()
     assert run.lines[1:] == [
         f"training holden: its log is {log}",
         "51/65 jobs, 30 s: training",
-        "51/65 jobs, 1 min: training",
-        "51/65 jobs, 1 min 30 s: training holden 34 % done, 8 min left, error 0.41",
-        "51/65 jobs, 2 min: training holden 36 % done, 7 min left",
+        "51/65 jobs, 1 min: training holden 34 % done, 8 min left, error 0.41",
+        "51/65 jobs, 1 min 30 s: training holden 36 % done, 7 min left",
     ]
-    run.finish(1, 52, 65)
-    run.clock += PROGRESS_SECONDS
-    run.terminal.tick()
-    assert len(run.lines) == 6, "nothing runs"

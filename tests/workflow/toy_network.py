@@ -9,8 +9,6 @@ from hobble.models.blend import BlendedNetwork, BlendedOptions, TrainableBlend
 
 
 class ToyOptions(BlendedOptions):
-    """The keys of every kind with layers."""
-
     network: ClassVar[str] = "hobble.models.toy:Toy"
 
     kind: Literal["toy"] = "toy"
@@ -41,8 +39,6 @@ class Toy(BlendedNetwork):
 
 @dataclass(frozen=True)
 class TrainableToy(TrainableBlend):
-    """The network in training."""
-
     def shares(self, gate, x, p, masks):
         return p.new_ones(len(p), 1)
 
