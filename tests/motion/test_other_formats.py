@@ -96,7 +96,6 @@ def write_gltf(
     ("name", "how"), [("a.glb", {}), ("a.gltf", {"interpolation": "CUBICSPLINE"}), ("a.glb", {"posed": True})]
 )
 def test_a_gltf_file_gives_the_motion_of_the_bvh_file(tmp_path, walk, bvh, make, name, how):
-    """The rest pose is that of its skin, if it has one."""
     from_bvh, report = make(bvh(walk))
     from_gltf, other = make(write_gltf(tmp_path / name, walk, **how))
     assert (other["source_fps"], other["rig"], other["unit"]) == (120.0, report["rig"], 100.0)

@@ -1,10 +1,12 @@
 """Files of many programs are read; broken files are refused with file and line."""
 
+import re
+
 import numpy as np
 import pytest
 
 from hobble.core.errors import InputError
-from hobble.motion.read import read_bvh
+from hobble.motion.read import check_angles, read_bvh
 
 SMALL = """HIERARCHY
 ROOT Hips
@@ -76,6 +78,7 @@ def swap(old: str, new: str):
     return lambda text: text.replace(old, new)
 
 
+XYZ = "3 Xposition Yposition Zposition"
 BROKEN = {
     "empty": (lambda s: "", "empty", None),
     "binary": (lambda s: b"HIERARCHY\n\0\1\2" + s.encode(), "binary", None),
@@ -96,6 +99,7 @@ BROKEN = {
     "bad offset": (swap("OFFSET 1 -2e1 3.5", "OFFSET 1 -2e1"), "OFFSET needs three numbers", 8),
     "no offset": (swap("\t\tOFFSET 1 -2e1 3.5\n", ""), "no OFFSET", 17),
     "frame time nought": (swap("0.0333333", "0"), "Frame Time is 0 s; it must be", 22),
+    "moved only": (lambda s: re.sub(" 7 8 .*", "", re.sub("6 X.*|3 Y.*", XYZ, s)), "no joint has rot", None),
     "strange word": (swap("OFFSET 0 0 0", "OFSET 0 0 0"), "'OFSET'", 4),
 }  # fmt: skip
 
@@ -105,7 +109,7 @@ def test_a_malformed_file_is_refused_with_its_line(written, what):
     change, message, line = BROKEN[what]
     path = written(change(SMALL))
     with pytest.raises(InputError) as raised:
-        read_bvh(path)
+        check_angles(read_bvh(path))
     assert message in str(raised.value)
     assert str(path) in str(raised.value)
     assert line in (None, raised.value.line)
