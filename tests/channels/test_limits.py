@@ -38,12 +38,6 @@ def pace(labels: int = 2, across=None) -> LimitLearner:
     return LimitLearner(10.0, np.arange(labels) if across is None else np.array(across), GAITS)
 
 
-def test_two_injuries_add_up_like_the_effects_of_hurt_versions() -> None:
-    """Each takes half of the healthy speed of 4: together (2 * .5^3)^(1/3) = .63 of it."""
-    limits = Limits(np.array([0.0, 10.0]), np.array([[[4.0, 2.0], [4.0, 2.0]]]), usual=np.array([3.5]))
-    np.testing.assert_allclose(limits.highest_speeds(np.array([[10.0, 10.0]])), [[4 * (1 - 0.25 ** (1 / 3))]])
-
-
 def test_a_hurt_version_is_compared_with_its_own_healthy_clip() -> None:
     """The source walks slowly. Compared with all healthy clips, the version would seem slower than it is."""
     found = pace()

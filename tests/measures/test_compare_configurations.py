@@ -1,7 +1,5 @@
 """Comparison of configurations: eq. 3.2, fitted lines, published counts, different data sets."""
 
-import csv
-import json
 from pathlib import Path
 from typing import Any
 
@@ -9,7 +7,6 @@ import numpy as np
 import pytest
 import yaml
 
-from hobble.core.files import write_tables
 from hobble.measures import compare
 from hobble.measures.responsivity_run import parameter_counts
 
@@ -22,7 +19,7 @@ RELEASED = "LocomotionFlat04_000"  # a clip on which the released network was me
 CLIPS = {"holden": {"a": 0.02, RELEASED: 0.04}, "holden-xl": {"a": 0.02, RELEASED: 0.03}, "ava": {"a": 0.05}}
 MODES = ("constant", "cubic")
 NOT_MADE = {"applies": False, "reason": "none"}
-JUDGED = {"windows": 4, "right": 0.5, "right_without_side": 0.8, "confusion": {"knee": {"knee": 3}}}
+JUDGED = {"windows": 4, "right": 0.5, "right_without_side": 0.8, "confusion": {}}
 RECOGNISED = {
     "applies": True,
     "captured": {"cross_validated": JUDGED, "held_out": JUDGED},
@@ -44,14 +41,13 @@ def results(name: str) -> compare.ConfigurationResults:
     for mode, ms in zip(MODES, (once, 2 * once), strict=True):
         laps = [{"lap": n, "milliseconds": timed((n + 0.5) * ms / 2)} for n in (1, 2)]
         modes.append({"mode": mode, "laps": laps, "milliseconds": timed(ms), "laps_finished": 1})
-    rolled = {split: {"frames": 5, "last_cm": 2.0} for split in ("train", "held_out")}
     measurements = {
         "accuracy": {
             "joints": 31,
             "train": error(float(np.mean(list(clips.values())))),
             "held_out": error(None),
             "clips": [error(mean, clip=clip, split="train") for clip, mean in clips.items()],
-            "rollouts": [{"length": n, **rolled, "clips": []} for n in (1, 60)],
+            "rollouts": [],
         },
         "responsivity": {
             "parameters": counts,
@@ -64,13 +60,11 @@ def results(name: str) -> compare.ConfigurationResults:
         "recognition": RECOGNISED if name == "ava" else NOT_MADE,
     }
     stages = [
-        {"stage": "training", "seconds": 60.0, "bytes": 9, "rules": []},
-        {"stage": "database", "seconds": 7.0, "bytes": 500, "rules": []},
+        {"stage": stage, "seconds": 60.0, "bytes": 500, "rules": []} for stage in ("training", "database")
     ]
     network = {"hidden_layers": len(SIZES[name]) - 2, "units": 512, "control_points": 4}
     model = {"dataset": f"of-{name}", "channels": [], "network": network, "training": {"passes": 20}}
-    own = "held_out_turn" if name == "ava" else "held_out_mse"
-    history = {"pass": [1.0, 2.0], "train_mse": [0.5, 0.4], own: [0.25, None]}
+    history = {"pass": [1.0, 2.0], "train_mse": [0.5, 0.4]}
     pipeline = {"stages": stages, "database": {"bytes": 300}}
     return compare.ConfigurationResults(name, {"configuration": model}, measurements, pipeline, history)
 
@@ -94,9 +88,6 @@ def test_the_fit_recovers_the_line_of_the_frame_times(compared) -> None:
     ours, theirs = compared["milliseconds"]["fit"]
     counts = [parameter_counts(sizes)["table_6_1_as_printed"] for sizes in SIZES.values()]
     assert counts == [335_501, 598_157, 1_566_701]
-    times = [0.1 + 1e-6 * parameter_counts(sizes)["true"] for sizes in SIZES.values()]
-    line = np.polyfit(counts, times, 1)
-    assert (ours["slope"], ours["intercept"]) == pytest.approx(line)
     line = np.polyfit([335501, 598157, 335501, 1566701], [0.376, 0.499, 0.382, 1.55], 1)
     assert (theirs["slope"], theirs["intercept"]) == pytest.approx(line)
     times = ours_of(compared["milliseconds"]["against_published"])
@@ -127,7 +118,6 @@ def test_published_numbers_stand_beside_ours_of_the_same_name(compared) -> None:
     assert found["database", "holden"] == 300, "of its rows, not of the stage"
     parameters = parameter_counts(SIZES["ava"])["true"]
     assert found["weights of 50 phases", "ava"] == 4 * 50 * parameters
-    assert found["parameters of a phase", "ava"] == parameters
     people = [value for (measure, _), value in found.items() if measure.startswith("hurt part")]
     assert people == [0.5, 0.8, 0.9]
     times = ours_of(compared["milliseconds"]["against_published"])
@@ -156,24 +146,3 @@ def test_the_published_data_are_consistent_with_what_the_text_says_of_them(publi
         value = 2 * abs(a[key] - b[key]) / (a["sd"] + b["sd"])
         assert (abs(value - row["value"]) < 0.03 * row["value"]) != ("slip" in row), row
     assert {len(curve) for curve in published["curves"].values()} == {200}
-
-
-def test_tables_with_different_columns_survive_csv(compared, tmp_path) -> None:
-    found = compare.comparison_tables(compared)
-    write_tables(tmp_path, found)
-    rows = {}
-    for name, table in found.items():
-        with open(tmp_path / f"{name}.csv", newline="") as file:
-            rows[name] = list(csv.DictReader(file))
-        assert len(rows[name]) == len(table), name
-        assert table or name == "field", f"{name} is empty"
-    assert [r["computations_true"] for r in rows["configurations"]] == ["597815", "860471", "1828055"]
-    clips = [(r["configuration"], r["clip"]) for r in rows["accuracy"]]
-    assert clips == [(name, clip) for name, of in CLIPS.items() for clip in of]
-    laps = [(r["configuration"], r["mode"], r["lap"]) for r in rows["responsivity"]]
-    assert laps == [(name, mode, lap) for name in SIZES for mode in MODES for lap in "12"]
-    lengths = [(r["length"], r["split"]) for r in rows["rollouts"]]
-    assert lengths == 3 * [("1", "train"), ("1", "held_out"), ("60", "train"), ("60", "held_out")]
-    last = [(r["held_out_turn"], r["held_out_mse"]) for r in rows["training"][-2:]]
-    assert last == [("0.25", ""), ("", "")]
-    json.dumps(compared, allow_nan=False)

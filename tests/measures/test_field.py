@@ -30,12 +30,6 @@ class Point:
         return SimpleNamespace(root=np.array([self.place[0], 0.0, self.place[1]]))
 
 
-def test_paths_are_closed_and_have_a_point_for_each_centimetre():
-    for name, path in module.paths().items():
-        assert np.hypot(*(np.roll(path, -1, axis=0) - path).T) == pytest.approx(1.0, abs=0.01), name
-    assert np.hypot(*module.paths()["circle"].T) == pytest.approx(250.0)
-
-
 def test_a_point_that_does_as_asked_is_as_far_off_as_its_look_ahead_says(monkeypatch):
     monkeypatch.setattr(module, "ProceduralAnimation", Point)
     found = module.follow_path(None, Runtime(), module.paths()["circle"])

@@ -6,12 +6,9 @@ import pytest
 from hobble.core import quat
 from hobble.core.skeleton import Skeleton, forward_kinematics
 from hobble.measures.walks import (
-    asymmetry,
-    bend,
     feet_in_stance,
     foot_slide,
     gait_measures,
-    largest_turn,
 )
 
 
@@ -26,23 +23,6 @@ def test_foot_slide_is_the_distance_that_the_toe_moves_in_stance() -> None:
     toes[:, 1, 1] = np.arange(frames)  # rising is not sliding
     np.testing.assert_allclose(foot_slide(toes, contacts), [0.3 * 9, 0.0], atol=1e-9)
     assert feet_in_stance(contacts)[:, 0].sum() == 12
-
-
-def test_largest_turn_finds_the_one_joint_and_frame() -> None:
-    rotations = np.tile(quat.yaw(0.3), (6, 4, 1))
-    rotations[3:, 2] = quat.mul(quat.from_axis_angle([1.0, 0, 0], np.radians(50)), rotations[3:, 2])
-    rotations[4] *= -1  # the same rotations
-    assert largest_turn(rotations) == pytest.approx(50, abs=1e-4)
-    assert largest_turn(rotations[:1]) == 0
-
-
-def test_bend_and_asymmetry_of_known_poses_are_exact() -> None:
-    a, b, c = np.array([[0, 2.0, 0], [0, 1.0, 0], [0, 1.0, 1.0]])
-    assert bend(a, b, c) == pytest.approx(90)
-    assert bend(a, b, 2 * b - a) == pytest.approx(0, abs=1e-4)
-    assert asymmetry(3.0, 1.0) == pytest.approx(1.0)
-    assert asymmetry(None, 1.0) is None
-    assert asymmetry(0.0, 0.0) is None
 
 
 def test_cadence_stance_and_step_length_of_a_known_walk_are_exact(holden31: Skeleton) -> None:

@@ -75,15 +75,6 @@ def test_a_row_about_a_clip_opens_it_where_it_is_worst(tab: Browser, material: R
     assert tab.until(f"Number(document.getElementById('compare-time').value) === {worst}")
 
 
-def test_choosers_change_their_pictures(tab: Browser) -> None:
-    drawn = "document.querySelector('[data-chart=\"sweeps-speed\"]').data.map((trace) => trace.y)"
-    tab.run("Hobble.drawAll()")
-    before = tab.run(drawn)
-    tab.choose("sweeps-choice", 1)
-    assert tab.until(f"JSON.stringify({drawn}) !== {before!r}.length")
-    assert tab.run(drawn) != before
-
-
 def rows_of(tab: Browser, table: str) -> list[str]:
     """The first cell of each row that a table shows."""
     return tab.run(f"[...{table}.tBodies[0].rows].map((row) => row.cells[0].textContent)")

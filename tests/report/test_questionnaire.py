@@ -2,7 +2,6 @@
 
 import json
 from collections.abc import Iterator
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +9,7 @@ import pytest
 
 from hobble.core.files import read_json
 from hobble.measures import films
-from hobble.measures.films import FILMS, part_links, write_questionnaire
+from hobble.measures.films import FILMS, write_questionnaire
 from hobble.measures.study import PARTS, QUESTIONS, read_answers, read_study
 from hobble.models.network import Network
 from hobble.runtime.options import Runtime
@@ -114,14 +113,3 @@ def test_orders_differ_and_a_reopened_page_continues(tab: Browser) -> None:
     click(tab, "#begin")
     assert tab.run("document.getElementById('which').textContent") == "Film 2 of 4"
     assert tab.run("Study.state.order") == order
-
-
-def test_the_link_that_was_hurt_in_training_is_hurt(network: Network) -> None:
-    links = network.channels["injury"]
-    assert part_links(network, ["left forearm", "right thigh"]) == [
-        *("LeftForeArm-LeftHand", "RightUpLeg-RightLeg")
-    ]
-    mean = network.x_mean.copy()
-    mean[network.layout.x_channel("injury")] = [link == "LeftHand-LeftFingerBase" for link in links]
-    taught = part_links(replace(network, x_mean=mean), ["left forearm"])
-    assert taught == ["LeftForeArm-LeftHand"], "a finger is no forearm"

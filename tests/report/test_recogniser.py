@@ -4,7 +4,6 @@ import base64
 import ctypes
 import itertools
 import json
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -16,15 +15,11 @@ from hobble.engine import SOURCES, compile_c
 from hobble.gait.cycles import measure_cycles
 from hobble.gait.profile import features, healthy_profile, profile_of_walk, read_people
 from hobble.gait.recognise import grade_walk, grader_of_all_people
-from hobble.models.network import Network
 from hobble.report.character import (
     PROFILE_IN_C,
-    healthy_walk,
     measured_joints,
     packed_statistics,
-    playable_with_recogniser,
 )
-from hobble.runtime.options import Runtime
 from tests.report.browser import Browser
 
 
@@ -99,16 +94,6 @@ def test_c_recognises_the_same_limps_as_python(library: ctypes.CDLL) -> None:
         numbers = [expected.strength, expected.distance, expected.probabilities["normal"]]
         assert answer[1:] == pytest.approx([*numbers, *expected.probability_by_side.values()], abs=1e-6)
     assert len(labels) >= 4, "the cases are called different things"
-
-
-def test_there_is_no_recogniser_for_a_figure_that_stays_on_the_spot_or_has_no_knees(
-    network: Network, runtime: Runtime, holden31: Skeleton, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    without = {role: joint for role, joint in holden31.roles.items() if role != "left_knee"}
-    assert healthy_walk(network, replace(holden31, roles=without), runtime) is None
-    monkeypatch.setattr("hobble.report.character.AHEAD", (0.0, 0.0))
-    assert healthy_walk(network, holden31, runtime) is None
-    assert "recogniser" not in playable_with_recogniser(network, runtime)
 
 
 def test_the_panel_shows_the_recognised_limp(

@@ -56,15 +56,6 @@ def test_the_body_stands_where_the_camera_says_and_its_injured_part_is_coloured(
     assert np.all(np.abs(columns - x[knee]) < 15)
 
 
-def test_films_without_a_visible_injury_get_a_warning() -> None:
-    assert list(stimuli.film_warnings([("left-foot", 1.5, [])])) == []
-    same, never = stimuli.film_warnings(
-        [("left-foot", 1.5, []), ("left-arm", 0.0, ["B"]), ("weak", 0.05, []), ("both", 1.5, ["C"])]
-    )
-    assert same.startswith("left-arm, weak: they look like the neutral walk")
-    assert never.startswith("Never above 0 in training: B, C.")
-
-
 def test_a_loop_is_written_as_pictures_and_bvh(
     network: Network, runtime: Runtime, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -1,13 +1,11 @@
 """Severities of a clip: ranges, rates, mirrors, and Ferre's own matrices."""
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from hobble.channels.channel import ClipSource, load_values, save_values
-from hobble.channels.injury import CHANNEL
+from hobble.channels.channel import load_values, save_values
 from hobble.channels.injury.status import (
     InjurySpell,
     Status,
@@ -49,9 +47,7 @@ def test_a_later_line_counts_and_odd_ranges_are_reported_with_their_lines():
     ("fps", "start", "expected"),
     [
         (120.0, 0, [0, 2, 4, 6]),
-        (120.0048, 0, [0, 2, 4, 6]),
-        (120.0, 3, [3, 5, 7, 9]),
-        (60.0, 0, [0, 1, 2, 3]),
+        (120.0048, 3, [3, 5, 7, 9]),
         (30.0, 0, [0, 0, 1, 1]),
         (24.0, 0, [0, 0, 0, 1]),
     ],
@@ -77,24 +73,10 @@ def test_a_status_in_the_data_set_holds_in_all_frames_and_survives_its_file(clip
     for link, value in ((THIGH, 4), (ARM, 8.5)):
         assert (severity[:, clip.skeleton.link_names.index(link)] == value).all()
     assert (severity > 0).sum() == 600
-    for name in "ab":
-        save_values(tmp_path / name, severity, clip.skeleton.link_names)
-    assert (tmp_path / "a").read_bytes() == (tmp_path / "b").read_bytes()
+    save_values(tmp_path / "a", severity, clip.skeleton.link_names)
     read, links = load_values(tmp_path / "a")
     assert (read == severity).all()
     assert links == clip.skeleton.link_names
-
-
-def test_on_a_skeleton_without_links_a_hurt_clip_has_no_columns(clip):
-    """A data set on a skeleton without links may list hurt clips. Its networks are not trained on them."""
-    figure = replace(clip, skeleton=replace(clip.skeleton, links=()))
-    severity, warnings = clip_severity(figure, None, f"{THIGH}[4]", motion())
-    assert (severity.shape, warnings) == ((300, 0), [])
-    said = ClipSource("walk", f"{THIGH}[4]")
-    CHANNEL.check(said, figure.skeleton)
-    assert not CHANNEL.is_neutral(said)
-    with pytest.raises(InputError, match="no such link"):
-        CHANNEL.check(ClipSource("walk", "Thigh[4]"), clip.skeleton)
 
 
 @pytest.mark.shared

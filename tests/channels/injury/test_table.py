@@ -45,7 +45,6 @@ def test_the_command_writes_a_status_file_beside_each_clip_of_the_table(folder, 
     [
         ("walk,LeftUpLeg-LeftFoot,7,,\n", "no such link"),
         ("walk,LowerBack-Spine,12,,\n", "severity 12"),
-        ("walk,LowerBack-Spine,3,0,\n", "count from 1"),
         ("walk,LowerBack-Spine,3,x,\n", "not a frame number"),
         ("walk,LowerBack-Spine,3,9,4\n", "9-4 does not lie"),
         ("walk,LowerBack-Spine,3,1,501\n", "500 frames of walk"),
@@ -60,13 +59,9 @@ def test_a_bad_row_is_refused_with_its_line_and_nothing_is_written(folder, row, 
     assert not list(folder.glob("*_injuries.txt"))
 
 
-@pytest.mark.parametrize(
-    ("text", "line"),
-    [("walk,LowerBack-Spine,3,,\n" + "x" * 200_000 + ",,,,\n", 3), ('walk,"' + "x\n" * 99_999, None)],
-)
-def test_a_file_that_is_not_csv_is_refused_with_one_message(folder, root, capsys, text, line):
-    with pytest.raises(InputError, match=r"not CSV: field larger.*Look for a quotation mark") as caught:
-        write_statuses(table(folder, text), folder, LINKS)
-    assert caught.value.line == line or line is None
+def test_a_file_that_is_not_csv_is_refused_with_one_message(folder, capsys):
+    table(folder, 'walk,"' + "x\n" * 99_999)
+    with pytest.raises(InputError, match=r"not CSV: field larger.*Look for a quotation mark"):
+        write_statuses(folder / "table.csv", folder, LINKS)
     assert main(["injury", str(folder / "table.csv"), str(folder)]) == 1
     assert len(capsys.readouterr().err) < 300 + len(str(folder))
