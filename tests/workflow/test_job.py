@@ -4,7 +4,6 @@ import os
 import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import psutil
@@ -72,9 +71,7 @@ def test_a_job_that_ignores_signals_ends_soon_after_its_run(tmp_path: Path) -> N
     process = started(tmp_path / "job.log", DEAF, run.pid)
     assert process.poll() is None
     run.kill()  # not waited for, because a zombie does not count as a run either
-    before = time.monotonic()
-    assert process.wait(timeout=10) == -signal.SIGKILL
-    assert time.monotonic() - before < 5
+    assert process.wait(timeout=5) == -signal.SIGKILL
     assert process.stdout.read() == ""
     run.wait()
 
