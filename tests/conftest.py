@@ -111,7 +111,7 @@ def pytest_collection_finish(session: pytest.Session) -> None:
     if worker != "gw0" or not any(wanted & set(getattr(i, "fixturenames", ())) for i in session.items):
         return
     folder = shared_folder(session.config)
-    if folder.exists():  # HOBBLE_RUN has one
+    if folder.exists() or session.config.option.collectonly:  # HOBBLE_RUN has one, or no test runs
         return
     made = copy_of(ROOT, folder)
     script = '"$@" > said 2>&1; echo $? > status.part; mv status.part status'
