@@ -5,9 +5,9 @@ import pytest
 
 from hobble.channels.channel import ClipSource
 from hobble.channels.guarding import CHANNEL
+from hobble.hurt import Hurt
 from hobble.hurt.effects import part_of_link
 from hobble.hurt.hurt_clip import hurt_clip
-from hobble.hurt.options import Hurt
 from hobble.hurt.version import ARMS, SEVERITY_TOLERANCE, UNCUT_SECONDS, hurt_version, schedule_severities
 from hobble.labels.clip_labels import LabelReport
 from hobble.labels.label import mirror_labels

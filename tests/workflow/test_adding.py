@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from hobble.channels.channel import load_values
 from tests.checkout import Workflow
 
 pytestmark = pytest.mark.workflow
@@ -132,10 +133,8 @@ def test_they_go_from_the_rows_to_the_pages(extended: Workflow) -> None:
     results, data = extended.folder / "results/toy", extended.folder / "results/datasets/tiny"
 
     # The channel.
-    values = [
-        json.loads((data / f"channels/toy/walk-straight-{n}.json").read_text())["values"] for n in (1, 2)
-    ]
-    assert [value.keys() for value in values] == [{"one"}, set()]
+    values = [load_values(data / f"channels/toy/walk-straight-{n}.npz")[0] for n in (1, 2)]
+    assert [value.any(axis=0).tolist() for value in values] == [[True, False], [False, False]]
     channels = json.loads((data / "database/toy+injury/manifest.json").read_text())["layout"]["channels"]
     assert channels == [["toy", 2], ["injury", 30]]
     command = [sys.executable, "-c", WALK, str(results / "network/weights.npz")]

@@ -1,4 +1,4 @@
-from hobble.hurt.options import HURT_CHANNEL
+from hobble.hurt import HURT_CHANNEL
 
 
 rule hurt_clips:

@@ -6,7 +6,7 @@ from hobble.channels.channel import write_report as write_channel_report
 from hobble.core.clip import load_clip, load_clip_report, save_clip
 from hobble.core.declared import load_report
 from hobble.core.files import write_json
-from hobble.hurt.options import HURT_CHANNEL, Hurt
+from hobble.hurt import HURT_CHANNEL, Hurt
 from hobble.hurt.version import hurt_version
 from hobble.labels.clip_labels import LabelReport, load_labels, save_labels
 from hobble.labels.label import mirror_labels, write_report

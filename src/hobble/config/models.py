@@ -12,7 +12,7 @@ from hobble.core.clip_files import CLIP_NAME_RULE, is_valid_clip_name
 from hobble.core.section import FrameRange, Gait, Ground, Positive, PositiveFloat, RelativePath, Section
 from hobble.core.skeleton import SkeletonData
 from hobble.database.options import DatabaseOptions
-from hobble.hurt.options import Hurt
+from hobble.hurt import Hurt
 from hobble.labels.options import LabelOptions
 from hobble.measures.measure import all_measures, joined_options
 from hobble.models import DEFAULT_KIND, options_of_kind

@@ -16,9 +16,9 @@ from hobble.core.clip import Clip
 from hobble.core.errors import HobbleError
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
+from hobble.hurt import Hurt
 from hobble.hurt.effects import part_of_link
 from hobble.hurt.hurt_clip import HurtClip, hurt_clip
-from hobble.hurt.options import Hurt
 from hobble.labels.clip_labels import LabelReport, Labels
 from hobble.labels.label_files import whole_frame
 from hobble.labels.phase import find_cycles

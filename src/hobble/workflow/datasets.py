@@ -44,7 +44,7 @@ from hobble.core.clip_files import (
 from hobble.core.errors import HobbleError, InputError
 from hobble.core.files import check_regular, read_text
 from hobble.core.section import Section
-from hobble.hurt.options import HURT_CHANNEL, Hurt
+from hobble.hurt import HURT_CHANNEL, Hurt
 from hobble.synthetic.generate_clip import WRITTEN_LABEL_SUFFIXES
 
 LEAST_BATCHES = 12  # a data set with more clips than this has at least this many batches
