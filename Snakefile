@@ -1,5 +1,4 @@
-# This workflow turns motion-capture clips into a character that can be hurt. Its usual target is the report of a
-# configuration: results/<configuration>/report.html
+# From motion capture to a character that can be hurt. The usual target is results/<configuration>/report.html
 import sys
 from functools import partial
 
@@ -19,8 +18,6 @@ except Exception as error:
 
 # Jobs read this variable, so that they end when this run of Snakemake ends.
 lifetime.set_run_variable()
-
-
 about_plan = partial(sentences_about_plan, project)
 snakemake_logger_plugin_hobble.ABOUT_PLAN.append(about_plan)
 
@@ -36,10 +33,8 @@ onstart:
         except HobbleError as error:
             raise WorkflowError(str(error)) from None
         lifetime.end_jobs_on_signal()
-        jobs = [
-            (job.rule.name, job.wildcards_dict)
-            for job in workflow.dag.needrun_jobs()
-        ]
+        needed = workflow.dag.needrun_jobs()
+        jobs = [(job.rule.name, job.wildcards_dict) for job in needed]
         for sentence in about_plan(jobs):
             logger.warning(sentence)
 
