@@ -23,9 +23,10 @@ def load(path: str | Path, **options: Any) -> ProceduralAnimation:
 
     options: those of `hobble.runtime.ProceduralAnimation.load`.
     """
-    from hobble.runtime.animation import ProceduralAnimation  # here: every job of the workflow imports hobble
-
-    return ProceduralAnimation.load(path, **options)
+    # No `import`: every job of the workflow imports hobble, and would depend on the runtime.
+    animation = importlib.import_module("hobble.runtime.animation")
+    character: ProceduralAnimation = animation.ProceduralAnimation.load(path, **options)
+    return character
 
 
 def __getattr__(name: str) -> Any:
