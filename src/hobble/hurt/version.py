@@ -81,17 +81,17 @@ def schedule_severities(
 
 
 def schedule_guarding(frames: int, fps: float, options: Hurt, clip: str) -> tuple[Array, Array]:
-    """How much the body guards in a hurt version: frames, and the values (0 to 1) between which it changes.
+    """How much the body guards in a hurt version: frames (K,), and the values (K,), 0 to 1, in these frames.
 
-    Each stretch has a value in one half and its opposite in the other half. So a network sees every link
-    with much and with little guarding.
+    Between these frames the value changes evenly. The values in the two halves of a stretch add up to 1, so a
+    network sees every link with much and with little guarding.
     """
-    edges = np.linspace(0, frames, 1 + 2 * _stretch_count(frames, options.seconds * fps))
+    stretches = _stretch_count(frames, options.seconds * fps)
+    edges = np.linspace(0, frames, 1 + 2 * stretches)
     pause = min(0.5 * GUARDING_CHANGE_SECONDS * fps, 0.25 * edges[1])
     knots = np.stack([edges[:-1] + pause, edges[1:] - pause], axis=1)
-    values = [guarding_of_clip(clip, i // 2) for i in range(len(knots))]
-    halves = [1.0 - value if i % 2 else value for i, value in enumerate(values)]
-    return knots.ravel(), np.repeat(halves, 2)
+    values = np.array([guarding_of_clip(clip, i) for i in range(stretches)])
+    return knots.ravel(), np.repeat(np.stack([values, 1.0 - values], axis=1), 2)
 
 
 def _make_deck(skeleton: Skeleton, options: Hurt) -> list[int]:

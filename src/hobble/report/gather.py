@@ -126,7 +126,7 @@ def results(configuration: str, folder: str | Path = "results") -> dict[str, pan
     import pandas  # slow, and reports do without
 
     if configuration == "published":
-        return _published()
+        return {name: pandas.DataFrame(rows) for name, rows in _published().items()}
     base = Path(folder) / configuration
     parts = ["tables"] if configuration == "compare" else ["evaluation", "network"]
     files = {
@@ -139,13 +139,10 @@ def results(configuration: str, folder: str | Path = "results") -> dict[str, pan
     return {name: pandas.read_csv(file) for name, file in files.items() if file.stat().st_size}
 
 
-def _published() -> dict[str, pandas.DataFrame]:
-    """The figures of published.yaml, a data frame for each list and for each group of columns."""
-    import pandas
-
+def _published() -> dict[str, Any]:
+    """Name -> rows of a table: each list of published.yaml, and each group of columns."""
     found = read_yaml(PUBLISHED)
     lists = {
         name: rows for name, rows in found.items() if isinstance(rows, list) and isinstance(rows[0], dict)
     }
-    groups = {name: found[name] for name in ("clip_means", "clip_sds", "laps", "curves")}
-    return {name: pandas.DataFrame(rows) for name, rows in {**lists, **groups}.items()}
+    return {**lists, **{name: found[name] for name in ("clip_means", "clip_sds", "laps", "curves")}}
