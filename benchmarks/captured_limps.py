@@ -19,7 +19,7 @@ from hobble.gait.profile import NO_CYCLE
 from hobble.measures.limp_run import INJURY, Walk, compare_held_out, healthy_reference, walk_figures
 from hobble.models.load import load_network
 from hobble.models.network import Network
-from hobble.runtime.options import Runtime
+from hobble.runtime import Runtime
 
 
 def captured_limp(path: Path, network: Network) -> Walk:

@@ -25,8 +25,8 @@ from hobble.measures.responsivity import Options as Laps
 from hobble.measures.responsivity_run import measure_responsivity
 from hobble.models.load import load_network
 from hobble.models.network import Network
+from hobble.runtime import Runtime
 from hobble.runtime.animation import ProceduralAnimation
-from hobble.runtime.options import Runtime
 
 TURNS, FRAMES = 60, 60  # stretches of each network, frames of a stretch
 CROWD = 200

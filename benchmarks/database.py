@@ -204,10 +204,10 @@ def training(folder: Path, memory_mb: int, rounds: int) -> None:
     profits from what the other has read.
     """
     from hobble.models.pfnn import PfnnOptions
+    from hobble.training import Training
     from hobble.training.batches import HostRows
     from hobble.training.checkpoint import new_state, step_for, use_threads
     from hobble.training.optimiser import Update
-    from hobble.training.options import Training
 
     use_threads(int(os.environ.get("OMP_NUM_THREADS", "2")))
     options = Training(memory_mb=memory_mb)

@@ -30,8 +30,8 @@ from hobble.engine import EXAMPLES, SOURCES, compile_c, compile_wasm
 from hobble.engine.hob import character_bytes
 from hobble.models.load import load_network
 from hobble.models.network import Network
+from hobble.runtime import Runtime
 from hobble.runtime.animation import ProceduralAnimation
-from hobble.runtime.options import Runtime
 
 ROOT = Path(__file__).resolve().parents[1]
 OPTIONS = ("-O3", "-march=x86-64-v3")

@@ -18,7 +18,7 @@ from hobble.measures.accuracy_run import RollOutCrowd, RollOutInputs
 from hobble.measures.walks import CrowdTarget, generate_walks
 from hobble.models.load import load_network
 from hobble.models.network import Network
-from hobble.runtime.options import Runtime
+from hobble.runtime import Runtime
 
 RUNTIME = Runtime(mode="cubic")
 FRAMES = 120

@@ -32,10 +32,10 @@ from hobble.measures.responsivity import Options as Laps
 from hobble.measures.responsivity_run import measure_responsivity
 from hobble.models.load import load_network
 from hobble.models.pfnn import PfnnOptions
-from hobble.runtime.options import Runtime
+from hobble.runtime import Runtime
 from hobble.runtime.waypoints import TRACK, Waypoint
+from hobble.training import Training
 from hobble.training.batches import HeldOutErrors
-from hobble.training.options import Training
 from hobble.training.train import train, write_weights
 
 LENGTHS = (1, 10, 60)

@@ -21,13 +21,13 @@ import yaml
 from hobble.core.clip import Clip
 from hobble.core.errors import HobbleError
 from hobble.labels.label import label_clip, mirror_labels
+from hobble.motion import ClipMotion
 from hobble.motion.edit import mirror_clip
 from hobble.motion.make import make_clip
-from hobble.motion.options import ClipMotion
 from hobble.synthetic.generate_clip import write_clip
+from hobble.terrain import HeightSampling
 from hobble.terrain.clip_fits import clip_fits
 from hobble.terrain.heightmaps import heightmaps
-from hobble.terrain.options import HeightSampling
 from hobble.terrain.patches import Patches, draw_patches
 from hobble.workflow.datasets import plain
 from hobble.workflow.project import Project

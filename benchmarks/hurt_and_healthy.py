@@ -22,8 +22,8 @@ from hobble.measures.measure import MeasureInputs
 from hobble.measures.responsivity import Options as Laps
 from hobble.measures.responsivity_run import measure_responsivity
 from hobble.models.load import load_network
-from hobble.runtime.options import Runtime
-from hobble.training.options import Training
+from hobble.runtime import Runtime
+from hobble.training import Training
 
 LENGTHS = (1, 10, 60, 300)
 

@@ -14,12 +14,12 @@ import yaml
 
 from hobble.core.clip import Clip, load_clip
 from hobble.core.processors import processor_name
+from hobble.labels import LabelOptions
 from hobble.labels.footfall import find_landings, find_stance_contacts, find_still_joints, find_swings
 from hobble.labels.gait import automatic_gait
 from hobble.labels.label import label_clip
-from hobble.labels.options import LabelOptions
+from hobble.motion import ClipMotion
 from hobble.motion.make import make_clip
-from hobble.motion.options import ClipMotion
 from hobble.synthetic.generate_clip import Synthetic, write_clip
 
 ROOT = Path(__file__).resolve().parents[1]

@@ -53,16 +53,16 @@ from hobble.gait.recognise import (
     shares_of_answers,
 )
 from hobble.hurt.hurt_clip import hurt_clip
+from hobble.labels import LabelOptions
 from hobble.labels.clip_labels import Labels
 from hobble.labels.label import label_clip
-from hobble.labels.options import LabelOptions
 from hobble.measures.limp_run import limp_distance, walk_figures
 from hobble.models.load import load_network
 from hobble.models.network import Network
+from hobble.motion import ClipMotion
 from hobble.motion.make import make_clip
-from hobble.motion.options import ClipMotion
 from hobble.motion.skeleton_file import load_skeleton
-from hobble.runtime.options import Runtime
+from hobble.runtime import Runtime
 from hobble.synthetic.generate_clip import walk_from_plan
 from hobble.synthetic.plan import Segment
 

@@ -19,7 +19,7 @@ from hobble.database.write import write_database
 from hobble.measures.accuracy_run import measure_accuracy
 from hobble.measures.measure import MeasureInputs
 from hobble.models.pfnn import PfnnOptions
-from hobble.training.options import Training
+from hobble.training import Training
 from hobble.training.train import run
 
 DTYPES = ("float32", "float16")

@@ -21,7 +21,7 @@ from hobble.models.load import load_network
 from hobble.report.character import packed_comparisons, playable_with_recogniser
 from hobble.report.gather import gather
 from hobble.report.page import render_report
-from hobble.runtime.options import Runtime
+from hobble.runtime import Runtime
 
 REPORTS = {"motion": "motion", "labels": "labels", "channels": "channels/injury"}
 TABLES = {"rows": "database/clips", "terrain": "terrain/clips"}

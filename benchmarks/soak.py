@@ -21,8 +21,8 @@ from hobble.core.quat import Array
 from hobble.measures.walks import SHORTEST_STANCE, STANCE
 from hobble.models.load import load_network
 from hobble.models.network import Network
+from hobble.runtime import Runtime
 from hobble.runtime.animation import ProceduralAnimation
-from hobble.runtime.options import Runtime
 
 FPS = 60
 GAITS = ("walk", "jog", "crouch")

@@ -22,9 +22,9 @@ from hobble.measures.walks import feet_in_stance, foot_slide, largest_turn
 from hobble.models.load import load_network
 from hobble.models.network import Network
 from hobble.models.pfnn import OPTIONS
+from hobble.runtime import Runtime
 from hobble.runtime.animation import ProceduralAnimation
 from hobble.runtime.feet import leg_joints, sole_heights
-from hobble.runtime.options import Runtime
 
 FPS = 60
 # kind of target -> (speed in cm a frame, whether to face a random direction, gait)

@@ -24,19 +24,19 @@ from scipy.ndimage import map_coordinates
 from hobble.core.clip import Clip
 from hobble.core.errors import HobbleError
 from hobble.core.processors import processor_name
-from hobble.database.options import DatabaseOptions
+from hobble.database import DatabaseOptions
+from hobble.labels import LabelOptions
 from hobble.labels.clip_labels import Labels as ClipLabels
 from hobble.labels.label import label_clip, mirror_labels
-from hobble.labels.options import LabelOptions
+from hobble.motion import ClipMotion
 from hobble.motion.edit import mirror_clip
 from hobble.motion.make import make_clip
-from hobble.motion.options import ClipMotion
 from hobble.motion.skeleton_file import load_skeleton
 from hobble.synthetic.generate_clip import Synthetic, write_clip
+from hobble.terrain import HeightSampling, Terrain
 from hobble.terrain import patches as search
 from hobble.terrain.clip_fits import clip_fits
 from hobble.terrain.heightmaps import heightmaps
-from hobble.terrain.options import HeightSampling, Terrain
 from hobble.terrain.patches import Patches, draw_patches
 
 SKELETONS = Path(__file__).resolve().parents[1] / "config/skeletons"

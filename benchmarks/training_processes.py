@@ -23,9 +23,9 @@ from hobble.core.processors import processor_name
 import torch
 from training import fresh
 
+from hobble.training import Training
 from hobble.training.checkpoint import step_for, use_threads
 from hobble.training.optimiser import Adam, Update
-from hobble.training.options import Training
 from hobble.training.processes import ALONE, Processes, join_processes
 
 SECONDS = 1.0

@@ -99,7 +99,7 @@ def test_a_bug_is_one_line_with_the_file_and_a_log(folder, tmp_path, monkeypatch
 
 
 def test_a_reader_that_has_read_enough_ends_the_command_quietly(folder):
-    command = [sys.executable, "-m", "hobble.cli", "look", str(folder)]
+    command = [sys.executable, "-m", "hobble.motion", "look", str(folder)]
     done = subprocess.run(f"{shlex.join(command)} | true", shell=True, capture_output=True, text=True)
     assert done.stderr == ""
 

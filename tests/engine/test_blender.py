@@ -16,8 +16,8 @@ from hobble.engine import compile_library
 from hobble.engine.export import write_blender_addon
 from hobble.engine.hob import character_bytes
 from hobble.figure.gltf import write_glb
+from hobble.runtime import Runtime
 from hobble.runtime.animation import ProceduralAnimation
-from hobble.runtime.options import Runtime
 from tests.engine.networks import network_of
 
 # A Python with the module bpy, if it is not this one.

@@ -19,9 +19,9 @@ from hobble.engine import EXAMPLES, SOURCES, compile_c
 from hobble.engine.export import export_engine
 from hobble.engine.hob import character_bytes
 from hobble.engine.traces import SITUATIONS, trace
+from hobble.runtime import Runtime
 from hobble.runtime.animation import ProceduralAnimation
 from hobble.runtime.generated import restore_bone_lengths
-from hobble.runtime.options import Runtime
 from tests.engine.networks import network_of
 
 WARNINGS = ("-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic")

@@ -24,8 +24,8 @@ from hobble.core.files import load_npz, read_json, read_yaml
 from hobble.labels.label_files import SourceTime, read_phase
 from hobble.measures.study import ShownFilm, Study, read_answers, read_study
 from hobble.models.load import load_network
+from hobble.motion import ClipMotion
 from hobble.motion.make import make_clip
-from hobble.motion.options import ClipMotion
 from hobble.motion.read import MOST_BYTES, MOST_HEADER, MOST_JOINTS, read_bvh
 from hobble.motion.skeleton_file import load_skeleton
 from hobble.terrain.heightmaps import read_heights

@@ -8,11 +8,11 @@ import pytest
 
 from hobble.core.clip import Clip
 from hobble.core.skeleton import Skeleton
+from hobble.labels import LabelOptions
 from hobble.labels.clip_labels import Labels
 from hobble.labels.label import label_clip
-from hobble.labels.options import LabelOptions
+from hobble.motion import ClipMotion
 from hobble.motion.make import make_clip
-from hobble.motion.options import ClipMotion
 from hobble.motion.skeleton_file import find_skeleton, skeleton_folder
 from hobble.synthetic.generate_clip import walk_from_plan
 from hobble.synthetic.plan import Segment

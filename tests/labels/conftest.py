@@ -9,7 +9,7 @@ import pytest
 from hobble.core import quat
 from hobble.core.clip import Clip
 from hobble.core.skeleton import Skeleton
-from hobble.labels.options import LabelOptions
+from hobble.labels import LabelOptions
 
 
 @pytest.fixture

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from hobble.core.clip import Clip
+from hobble.labels import LabelOptions as Options
 from hobble.labels.clip_labels import Labels
 from hobble.labels.label import label_clip, mirror_labels
-from hobble.labels.options import LabelOptions as Options
+from hobble.motion import ClipMotion
 from hobble.motion.make import make_clip
-from hobble.motion.options import ClipMotion
 
 SUFFIXES = (".phase", ".gait", "_footsteps.txt", "_gait.txt")
 PFNN = ["pfnn/LocomotionFlat04_000", "pfnn/LocomotionFlat09_000"]

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from hobble.core.declared import load_report
+from hobble.labels import LabelOptions
 from hobble.labels.clip_labels import LabelReport, load_labels, save_labels
 from hobble.labels.label import label_clip, write_report
 from hobble.labels.label_files import SourceTime, footsteps_text, gait_text
-from hobble.labels.options import LabelOptions
 
 MOTION = {"source_frames": 1200, "source_fps": 120.0, "source_start": 0}
 FOOTSTEPS = "141 201\n261 321\n381 441 *\n501 561\n621 681\n741"

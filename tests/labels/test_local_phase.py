@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from hobble.core.clip import Clip
+from hobble.labels import LabelOptions
 from hobble.labels.label import label_clip, mirror_labels
 from hobble.labels.local_phase import MIRRORED_PARTS, local_phases
-from hobble.labels.options import LabelOptions
 from hobble.models.local.predictor import next_phases
 from hobble.motion.edit import mirror_clip
 from hobble.rows.build_rows import cycle_frames

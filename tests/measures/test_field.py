@@ -9,7 +9,7 @@ import pytest
 from hobble.measures import field_run as module
 from hobble.measures.field import Options, hints, rows, section
 from hobble.motion.skeleton_file import find_skeleton, load_skeleton
-from hobble.runtime.options import Runtime
+from hobble.runtime import Runtime
 from hobble.synthetic.generate_clip import generate_walk
 
 

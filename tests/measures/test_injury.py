@@ -10,7 +10,7 @@ import pytest
 from hobble.measures import injury_run as module
 from hobble.measures.injury_run import SEVERITIES, second_sweep
 from hobble.measures.walks import CrowdTarget, generate_walks
-from hobble.runtime.options import Runtime
+from hobble.runtime import Runtime
 
 RUNTIME = Runtime(steering=1.0)
 KNEE = "LeftUpLeg-LeftLeg"

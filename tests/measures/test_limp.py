@@ -14,7 +14,7 @@ from hobble.measures import limp_run as module
 from hobble.measures.limp import gallery_chart
 from hobble.measures.limp_run import SEVERITIES, Walk, measure_limps
 from hobble.measures.walks import spearman
-from hobble.runtime.options import Runtime
+from hobble.runtime import Runtime
 
 LEFT_KNEE, RIGHT_KNEE = "LeftUpLeg-LeftLeg", "RightUpLeg-RightLeg"
 FRAMES = 480

@@ -19,7 +19,7 @@ from hobble.measures.recognition_run import HEALTHY, NONE, STEP, WINDOW, manner_
 from hobble.models.network import Network
 from hobble.report.parts import Paragraph
 from hobble.rows.clip_rows import Captured
-from hobble.runtime.options import Runtime
+from hobble.runtime import Runtime
 from tests.measures.made_up import captured_walk
 
 RUNTIME = Runtime(steering=1.0)

@@ -8,7 +8,7 @@ import pytest
 from hobble.measures.measure import flat_rows
 from hobble.measures.responsivity import Options
 from hobble.measures.responsivity_run import lap_starts, measure_responsivity
-from hobble.runtime.options import Runtime
+from hobble.runtime import Runtime
 from hobble.runtime.waypoints import Waypoint
 
 RUNTIME = Runtime(steering=1.0)

@@ -11,8 +11,8 @@ from hobble.core import quat
 from hobble.core.bvh import write_bvh
 from hobble.core.clip import Clip
 from hobble.core.skeleton import Skeleton, aim_bone, local_rotations, rest_positions, two_bone_knee
+from hobble.motion import ClipMotion
 from hobble.motion.make import make_clip
-from hobble.motion.options import ClipMotion
 
 
 def make_walk(skeleton: Skeleton, frames: int, fps: float, name: str = "walk") -> Clip:

@@ -23,8 +23,8 @@ from hobble.core.bvh import write_bvh
 from hobble.core.clip import Clip
 from hobble.core.errors import HobbleError
 from hobble.core.skeleton import Skeleton, local_rotations, path_to_root
+from hobble.motion import ClipMotion
 from hobble.motion.make import load_source, make_clip
-from hobble.motion.options import ClipMotion
 from hobble.motion.read import read_bvh
 from hobble.motion.skeleton_file import load_skeleton
 

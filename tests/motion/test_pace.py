@@ -10,8 +10,8 @@ from scipy.ndimage import gaussian_filter1d
 from hobble.core import quat
 from hobble.core.clip import Clip
 from hobble.core.errors import InputError
+from hobble.motion import ClipMotion
 from hobble.motion.look import summarise_clips
-from hobble.motion.options import ClipMotion
 
 
 def on_a_curve(walk: Clip) -> Clip:

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from hobble.core.clip import Clip
+from hobble.motion import ClipMotion
 from hobble.motion.axes import degrees_between
 from hobble.motion.edit import resample
 from hobble.motion.make import load_source
-from hobble.motion.options import ClipMotion
 from hobble.motion.read import read_bvh
 from hobble.motion.retarget import plan, retarget_clip
 from hobble.motion.rig import joint_pairs

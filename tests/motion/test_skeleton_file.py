@@ -7,8 +7,8 @@ import pytest
 
 from hobble.cli.clips import skeleton_draft
 from hobble.core.errors import InputError
+from hobble.motion import ClipMotion
 from hobble.motion.make import make_clip
-from hobble.motion.options import ClipMotion
 from hobble.motion.skeleton_file import load_skeleton
 
 

@@ -13,7 +13,7 @@ from hobble.models.load import load_network
 from hobble.models.network import Network
 from hobble.report.character import playable_data
 from hobble.report.gather import ReportMaterial, gather
-from hobble.runtime.options import Runtime
+from hobble.runtime import Runtime
 from tests.checkout import Workflow
 from tests.report.browser import Browser, opened
 

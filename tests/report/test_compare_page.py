@@ -16,7 +16,7 @@ from hobble.models.network import Network
 from hobble.report import page as pages
 from hobble.report.character import playable_data
 from hobble.report.gather import PUBLISHED, ReportMaterial
-from hobble.runtime.options import Runtime
+from hobble.runtime import Runtime
 from tests.report.browser import Browser, opened
 
 

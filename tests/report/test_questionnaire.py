@@ -12,7 +12,7 @@ from hobble.measures import films
 from hobble.measures.films import FILMS, write_questionnaire
 from hobble.measures.study import PARTS, QUESTIONS, read_answers, read_study
 from hobble.models.network import Network
-from hobble.runtime.options import Runtime
+from hobble.runtime import Runtime
 from tests.report.browser import Browser, opened
 
 SHORT = FILMS[3:7]

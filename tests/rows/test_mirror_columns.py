@@ -6,8 +6,8 @@ import pytest
 from hobble.channels import channel
 from hobble.core.errors import HobbleError
 from hobble.core.skeleton import Skeleton
+from hobble.labels import LabelOptions
 from hobble.labels.label import label_clip, mirror_labels
-from hobble.labels.options import LabelOptions
 from hobble.motion.edit import mirror_clip
 from hobble.rows.build_rows import build_clip_rows
 from hobble.rows.clip_rows import ClipRows, Pairs, pair_batches

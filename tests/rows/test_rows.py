@@ -12,16 +12,16 @@ from hobble.core import quat
 from hobble.core.clip import Clip
 from hobble.core.errors import InputError
 from hobble.core.skeleton import Skeleton
+from hobble.labels import LabelOptions
 from hobble.labels.label import label_clip
-from hobble.labels.options import LabelOptions
+from hobble.motion import ClipMotion
 from hobble.motion.make import make_clip
-from hobble.motion.options import ClipMotion
 from hobble.rows.build_rows import build_clip_rows
 from hobble.rows.clip_rows import ClipRows, pair_batches
 from hobble.rows.layout import GAITS, RowLayout
+from hobble.terrain import HeightSampling, Terrain
 from hobble.terrain.clip_fits import clip_fits, cycle_frames
 from hobble.terrain.heightmaps import TerrainMap
-from hobble.terrain.options import HeightSampling, Terrain
 from hobble.terrain.patches import draw_patches
 
 NAME = "LocomotionFlat09_000"

@@ -7,9 +7,9 @@ import pytest
 
 from hobble.core.clip import Clip
 from hobble.core.skeleton import Skeleton
-from hobble.database.options import DatabaseOptions
+from hobble.database import DatabaseOptions
+from hobble.terrain import HeightmapOptions, HeightSampling, Terrain
 from hobble.terrain.heightmaps import heightmaps
-from hobble.terrain.options import HeightmapOptions, HeightSampling, Terrain
 from hobble.terrain.patches import Patches, draw_patches
 
 CELL = 3.937007874

@@ -8,17 +8,17 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from hobble.labels import LabelOptions
 from hobble.labels.label import label_clip
-from hobble.labels.options import LabelOptions
+from hobble.motion import ClipMotion
 from hobble.motion.make import make_clip
-from hobble.motion.options import ClipMotion
 from hobble.motion.root import RootFrames
+from hobble.terrain import Terrain
 from hobble.terrain.clip_fits import clip_fits, heights_under, sample_points
 from hobble.terrain.cycle_ground import (
     distances,
     fit_surfaces,
 )
-from hobble.terrain.options import Terrain
 from hobble.terrain.patches import Patches
 
 from .conftest import database, figure, options, some_patches, walk

@@ -16,10 +16,10 @@ from hobble.database.write import write_database
 from hobble.models.pfnn import PfnnOptions
 from hobble.rows.clip_rows import ClipRows
 from hobble.rows.layout import RowLayout
+from hobble.training import Training
 from hobble.training.augment import Augmentation, RollOut
 from hobble.training.batches import SampleBatch
 from hobble.training.checkpoint import State
-from hobble.training.options import Training
 from hobble.training.train import run, train
 
 SPLITS = {"walk": "train", "hop": "train", "turn": "held_out"}

@@ -16,10 +16,10 @@ import torch
 from hobble.database.reader import Database
 from hobble.models import network_options
 from hobble.models.blend import TrainableBlend
+from hobble.training import Training
 from hobble.training import train as module
 from hobble.training.augment import OtherPaces, OtherPoses, RollOut
 from hobble.training.batches import HostRows, SampleBatch
-from hobble.training.options import Training
 from hobble.training.processes import ALONE, Processes, join_processes
 
 WINDOW = Database.chunks_per_window

@@ -17,7 +17,7 @@ import pytest
 from hobble.core.errors import HobbleError
 from hobble.core.files import load_npz
 from hobble.database.write import write_database
-from hobble.training.options import Machines
+from hobble.training import Machines
 from hobble.workflow.training_processes import on_machines, train_together
 
 from .conftest import SPLITS, Recipe, clip_rows

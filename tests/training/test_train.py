@@ -19,10 +19,10 @@ from hobble.models.load import load_network
 from hobble.models.matching import MatchingOptions
 from hobble.models.network import TrainingFacts
 from hobble.rows.clip_rows import save_clip_rows
+from hobble.training import Training
 from hobble.training.batches import HeldOutErrors, HostRows
 from hobble.training.checkpoint import State, write_history
 from hobble.training.optimiser import Adam, Update
-from hobble.training.options import Training
 from tests.models.matching.example import FRAMES, clip
 
 from .conftest import run_in

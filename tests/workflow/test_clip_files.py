@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 
 from hobble.core.errors import HobbleError
+from hobble.motion import ClipMotion
 from hobble.motion.make import load_source
-from hobble.motion.options import ClipMotion
 from hobble.motion.read import read_bvh
 from hobble.motion.skeleton_file import load_skeleton
 from hobble.workflow.project import Project

@@ -1,4 +1,4 @@
-from hobble.database.options import Merging, RowOptions
+from hobble.database import Merging, RowOptions
 
 
 rule database_clips:

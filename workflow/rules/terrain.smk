@@ -1,4 +1,4 @@
-from hobble.terrain.options import PatchOptions, FitOptions, HeightSampling
+from hobble.terrain import PatchOptions, FitOptions, HeightSampling
 
 
 rule terrain_patches:

@@ -1,4 +1,4 @@
-from hobble.training.options import Recipe
+from hobble.training import Recipe
 
 
 rule training:

@@ -5,7 +5,7 @@ A row holds the network's input X, output Y and phase P for one frame.
 
 from hobble.channels.channel import load_values
 from hobble.core.clip import load_clip
-from hobble.database.options import RowOptions
+from hobble.database import RowOptions
 from hobble.labels.clip_labels import load_labels
 from hobble.rows.build_rows import build_clip_rows
 from hobble.rows.clip_rows import save_clip_rows, save_summary, summary_of_rows

@@ -6,7 +6,7 @@ It is refused if a clip in training and a held-out clip show the same motion.
 from pathlib import Path
 
 from hobble.core.clip import load_clip, load_clip_report
-from hobble.database.options import Merging
+from hobble.database import Merging
 from hobble.database.write import refuse_split_pairs, write_database
 from hobble.motion.duplicates import clip_digest, duplicate_pairs
 from hobble.workflow.job import Inputs, job

@@ -2,7 +2,7 @@
 
 from hobble.engine.export import export_engine
 from hobble.models.load import load_network
-from hobble.runtime.options import Runtime
+from hobble.runtime import Runtime
 from hobble.workflow.job import job
 
 with job(snakemake) as log:

@@ -1,8 +1,8 @@
 """Creates results/<configuration>/export/character.glb: the body with bones and animations."""
 
 from hobble.models.load import load_network
+from hobble.runtime import Runtime
 from hobble.runtime.generated import export_glb
-from hobble.runtime.options import Runtime
 from hobble.workflow.job import job
 
 with job(snakemake) as log:

@@ -4,7 +4,7 @@ from pathlib import Path
 
 from hobble.models.load import load_network
 from hobble.report.bundle import export_web
-from hobble.runtime.options import Runtime
+from hobble.runtime import Runtime
 from hobble.workflow.job import job
 
 with job(snakemake) as log:

@@ -1,8 +1,8 @@
 """Generates the motion of each scripted scenario (npz and BVH) with a trained network."""
 
 from hobble.models.load import load_network
+from hobble.runtime import Runtime
 from hobble.runtime.generated import generate_scenarios
-from hobble.runtime.options import Runtime
 from hobble.workflow.job import job
 
 with job(snakemake) as log:

@@ -5,9 +5,9 @@ They are computed from the motion, or taken from hand-made label files.
 
 from hobble.core.clip import load_clip, load_clip_report
 from hobble.core.declared import load_report
+from hobble.labels import LabelOptions
 from hobble.labels.clip_labels import LabelReport, load_labels, save_labels
 from hobble.labels.label import label_clip, mirror_labels, write_report
-from hobble.labels.options import LabelOptions
 from hobble.workflow.job import make_each
 
 

@@ -2,7 +2,7 @@
 
 from hobble.measures.films import write_limp_picture
 from hobble.models.load import load_network
-from hobble.runtime.options import Runtime
+from hobble.runtime import Runtime
 from hobble.workflow.job import job
 
 with job(snakemake) as log:

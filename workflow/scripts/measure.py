@@ -9,7 +9,7 @@ from pathlib import Path
 
 from hobble.core.files import write_json, write_tables
 from hobble.measures.measure import MeasureInputs
-from hobble.runtime.options import Runtime
+from hobble.runtime import Runtime
 from hobble.workflow.job import Inputs, job
 
 with job(snakemake) as log:

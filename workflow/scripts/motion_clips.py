@@ -6,9 +6,9 @@ The clips are checked, retargeted to the data set's skeleton and resampled at 60
 from hobble.core.clip import load_clip, save_clip
 from hobble.core.files import write_json
 from hobble.core.messages import group_messages, in_words
+from hobble.motion import ClipMotion
 from hobble.motion.edit import mirror_clip, mirror_report
 from hobble.motion.make import make_clip
-from hobble.motion.options import ClipMotion
 from hobble.workflow.job import make_each
 
 doubts = []  # (clip, stage, sentence) of all clips of this job

@@ -5,7 +5,7 @@ from pathlib import Path
 from hobble.measures.films import write_questionnaire
 from hobble.models.load import load_network
 from hobble.report.stimuli import film_warnings
-from hobble.runtime.options import Runtime
+from hobble.runtime import Runtime
 from hobble.workflow.job import job
 
 with job(snakemake) as log:

@@ -8,7 +8,7 @@ from hobble.models.load import load_network
 from hobble.report.character import packed_comparisons, playable_with_recogniser
 from hobble.report.gather import gather
 from hobble.report.page import render_report
-from hobble.runtime.options import Runtime
+from hobble.runtime import Runtime
 from hobble.workflow.job import Inputs, job
 
 with job(snakemake):

@@ -9,7 +9,7 @@ from hobble.measures.measure import all_measures
 from hobble.models.load import load_network
 from hobble.report.character import playable_with_recogniser
 from hobble.report.page import render_comparison
-from hobble.runtime.options import Runtime
+from hobble.runtime import Runtime
 from hobble.workflow.job import job
 
 with job(snakemake):

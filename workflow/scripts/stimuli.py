@@ -2,7 +2,7 @@
 
 from hobble.models.load import load_network
 from hobble.report.stimuli import film_warnings, write_stimuli
-from hobble.runtime.options import Runtime
+from hobble.runtime import Runtime
 from hobble.workflow.job import job
 
 with job(snakemake) as log:

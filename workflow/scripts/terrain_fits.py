@@ -4,8 +4,8 @@ import functools
 
 from hobble.core.clip import load_clip
 from hobble.labels.clip_labels import load_labels
+from hobble.terrain import FitOptions, HeightSampling
 from hobble.terrain.clip_fits import clip_fits, save_fits
-from hobble.terrain.options import FitOptions, HeightSampling
 from hobble.terrain.patches import load_patches
 from hobble.workflow.job import make_each
 

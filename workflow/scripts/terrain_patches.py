@@ -1,7 +1,7 @@
 """Creates patches of ground, cut from random places of a data set's heightmaps."""
 
+from hobble.terrain import PatchOptions
 from hobble.terrain.heightmaps import heightmaps
-from hobble.terrain.options import PatchOptions
 from hobble.terrain.patches import draw_patches, save_patches
 from hobble.workflow.job import job
 

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from hobble.models import network_options
-from hobble.training.options import Machines, Training
+from hobble.training import Machines, Training
 from hobble.training.train import run
 from hobble.workflow.job import Inputs, job
 from hobble.workflow.training_processes import on_machines, train_together

@@ -10,8 +10,8 @@ from hobble.core.errors import HobbleError, InputError
 from hobble.core.section import PhaseMode
 from hobble.measures import study
 from hobble.models.load import load_network
+from hobble.runtime import Runtime
 from hobble.runtime.generated import write_motions
-from hobble.runtime.options import Runtime
 
 
 @command(

@@ -31,15 +31,15 @@ from hobble.core.errors import InputError
 from hobble.core.files import write_text
 from hobble.hurt.combine import PARTS, combine_clips
 from hobble.hurt.hurt_clip import hurt_clip
+from hobble.labels import LabelOptions
 from hobble.labels.clip_labels import GAITS, Labels
 from hobble.labels.label import label_clip
 from hobble.labels.label_files import SourceTime, footsteps_text, gait_text
-from hobble.labels.options import LabelOptions
+from hobble.motion import accept
 from hobble.motion.edit import loop_clip, mirror_clip, resample
 from hobble.motion.limbs import Doubt, find_body
 from hobble.motion.look import draw_retargeting, format_table, summarise_clips
 from hobble.motion.make import clip_problems, load_source, make_clip
-from hobble.motion.options import accept
 from hobble.motion.other_formats import read_motion
 from hobble.motion.read import decode_channels
 from hobble.motion.skeleton_file import draft_skeleton_file, find_skeleton, load_skeleton, skeleton_folder

@@ -14,7 +14,7 @@ from hobble.config.load_configuration import validate
 from hobble.core.clip_files import clips_in
 from hobble.core.errors import HobbleError, keep_traceback
 from hobble.core.messages import group_messages, in_words
-from hobble.motion.options import ClipMotion
+from hobble.motion import ClipMotion
 from hobble.motion.other_formats import MOTION_SUFFIXES
 
 MOTION_KEYS = tuple(name for name in ClipMotion.model_fields if name != "frames")

@@ -11,9 +11,9 @@ from hobble.core.errors import HobbleError, InputError
 from hobble.gait.cycles import measure_clip
 from hobble.gait.profile import EFFECTS, NO_CYCLE, RIGHT, SOURCE, effects_of_people, healthy_profile
 from hobble.gait.recognise import Answer, WalkComparison, compare_clip, shares_of_answers
+from hobble.motion import ClipMotion
 from hobble.motion.edit import resample
 from hobble.motion.make import load_source
-from hobble.motion.options import ClipMotion
 from hobble.motion.read import read_bvh
 from hobble.motion.skeleton_file import find_skeleton, load_skeleton, skeleton_folder
 

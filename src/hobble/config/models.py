@@ -11,18 +11,18 @@ from hobble.channels import CHANNEL_NAMES, channel
 from hobble.core.clip_files import CLIP_NAME_RULE, is_valid_clip_name
 from hobble.core.section import FrameRange, Gait, Ground, Positive, PositiveFloat, RelativePath, Section
 from hobble.core.skeleton import SkeletonData
-from hobble.database.options import DatabaseOptions
+from hobble.database import DatabaseOptions
 from hobble.hurt import Hurt
-from hobble.labels.options import LabelOptions
+from hobble.labels import LabelOptions
 from hobble.measures.measure import all_measures, joined_options
 from hobble.models import DEFAULT_KIND, options_of_kind
 from hobble.models.model import Options
-from hobble.motion.options import Download, MotionOptions
+from hobble.motion import Download, MotionOptions
 from hobble.report import ReportOptions
-from hobble.runtime.options import Runtime
+from hobble.runtime import Runtime
 from hobble.synthetic.generate_clip import Synthetic
-from hobble.terrain.options import Terrain
-from hobble.training.options import Training
+from hobble.terrain import Terrain
+from hobble.training import Training
 
 if TYPE_CHECKING:  # a type checker cannot follow the class that is made below
     Evaluation = Section

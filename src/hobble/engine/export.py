@@ -8,7 +8,7 @@ from hobble.engine import EXAMPLES, SOURCES
 from hobble.engine.hob import character_bytes
 from hobble.engine.traces import FRAMES, SITUATIONS, trace
 from hobble.models.network import Network
-from hobble.runtime.options import Runtime
+from hobble.runtime import Runtime
 
 
 def export_engine(folder: str | Path, network: Network, runtime: Runtime, wasm: str | Path) -> None:

@@ -20,11 +20,11 @@ from hobble.core.errors import HobbleError
 from hobble.core.quat import Array
 from hobble.models.network import STORAGES, Network, inverse_or_0
 from hobble.rows.layout import BODY
+from hobble.runtime import Runtime
 from hobble.runtime.bounds import Bounds
 from hobble.runtime.character import start_characters
 from hobble.runtime.controller import FPS
 from hobble.runtime.feet import foot_parts, leg_joints, rest_facing, sole_heights
-from hobble.runtime.options import Runtime
 
 MAGIC, VERSION, ORDER_MARK = b"HOBBLE\r\n", 4, 0x01020304
 HEADER, ENTRY, ALIGNMENT = 64, 40, 64

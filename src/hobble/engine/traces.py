@@ -20,9 +20,9 @@ from hobble.channels import channel
 from hobble.channels.shown import channel_display
 from hobble.core.quat import Array
 from hobble.models.network import Network
+from hobble.runtime import Runtime
 from hobble.runtime.animation import ProceduralAnimation
 from hobble.runtime.ground import Heightmap
-from hobble.runtime.options import Runtime
 
 SEED = 7  # of the variation
 MAGIC, VERSION, FRAMES = b"HOBTRACE", 2, 600

@@ -10,11 +10,11 @@ import numpy as np
 from hobble.core.clip import Clip
 from hobble.core.files import write_json
 from hobble.core.quat import Array
+from hobble.labels import LabelOptions as Options
 from hobble.labels.clip_labels import GAITS, LabelReport, Labels, label_curves
 from hobble.labels.footfall import find_landings, find_stance_contacts, find_still_joints, find_swings
 from hobble.labels.gait import automatic_gait, overwrite_crouch
 from hobble.labels.label_files import SourceTime, read_footsteps, read_gait, read_gait_keys, read_phase
-from hobble.labels.options import LabelOptions as Options
 from hobble.labels.phase import (
     dropped_frames,
     find_cycles,

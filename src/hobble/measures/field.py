@@ -14,7 +14,7 @@ from hobble.measures.compare import ComparisonAddition, ConfigurationResults
 from hobble.measures.measure import Row
 from hobble.report import parts
 from hobble.report.parts import Compared, Hint, PageSection, SectionPart
-from hobble.runtime.options import Runtime
+from hobble.runtime import Runtime
 
 if TYPE_CHECKING:
     from hobble.report.gather import ReportMaterial

@@ -18,9 +18,9 @@ from hobble.measures.walks import in_world, record
 from hobble.models.load import load_network
 from hobble.models.network import Network
 from hobble.rows.clip_rows import captured_stretches, headings, rotate_by_yaw
+from hobble.runtime import Runtime
 from hobble.runtime.animation import ProceduralAnimation
 from hobble.runtime.caller_targets import Pose, world_rotations
-from hobble.runtime.options import Runtime
 
 if TYPE_CHECKING:
     from hobble.measures.field import Options

@@ -32,8 +32,8 @@ from hobble.report.parts import embedded
 from hobble.report.raster import FPS, BodyRenderer, Camera, Picture, webp
 from hobble.report.stimuli import draw_loop
 from hobble.report.templates import load_template, own_file
+from hobble.runtime import Runtime
 from hobble.runtime.generated import make_loop
-from hobble.runtime.options import Runtime
 
 INJURY = "injury"  # the channel
 SPEEDS = {"walk": 2.5, "jog": 6.0}  # gait -> target speed, cm a frame

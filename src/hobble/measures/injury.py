@@ -19,7 +19,7 @@ from hobble.measures.compare import ComparisonAddition, ConfigurationResults
 from hobble.measures.measure import Cost, Measure, flatten
 from hobble.measures.shown import STRIP_HEIGHT, STRIP_WIDTH, grouped, line, strip, strips, with_spoken_names
 from hobble.report import parts
-from hobble.runtime.options import Runtime
+from hobble.runtime import Runtime
 
 if TYPE_CHECKING:
     from hobble.report.gather import ReportMaterial

@@ -23,7 +23,7 @@ from hobble.measures import walks
 from hobble.measures.measure import MeasureInputs, Outcome
 from hobble.models.load import load_network
 from hobble.models.network import Network
-from hobble.runtime.options import Runtime
+from hobble.runtime import Runtime
 
 INJURY = "injury"  # the channel
 SEVERITIES = np.arange(11.0)

@@ -17,7 +17,7 @@ from hobble.core.section import PositiveFloat
 from hobble.measures.measure import Cost, Measure, SampleOptions, sample_sentence
 from hobble.measures.shown import STRIP_HEIGHT, STRIP_WIDTH, grouped, line, strip, strips, with_spoken_names
 from hobble.report import parts
-from hobble.runtime.options import Runtime
+from hobble.runtime import Runtime
 
 if TYPE_CHECKING:
     from hobble.report.gather import ReportMaterial

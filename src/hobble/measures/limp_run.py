@@ -30,7 +30,7 @@ from hobble.models.load import load_network
 from hobble.models.network import Network
 from hobble.rows.clip_rows import ClipRows, captured_stretches, headings
 from hobble.rows.layout import GAITS
-from hobble.runtime.options import Runtime
+from hobble.runtime import Runtime
 
 INJURY = "injury"  # the channel
 NO_CYCLE = "the network's healthy character does not walk a whole cycle"

@@ -33,7 +33,7 @@ from pydantic import Field, create_model
 
 from hobble.core.files import Json, read_json, read_yaml
 from hobble.core.section import Section
-from hobble.runtime.options import Runtime
+from hobble.runtime import Runtime
 
 Row = Mapping[str, object]  # a row of a CSV table: column -> number, text or None
 

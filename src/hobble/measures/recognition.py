@@ -16,7 +16,7 @@ from hobble.measures.compare import ComparisonAddition, ConfigurationResults, pu
 from hobble.measures.measure import Cost, Measure, Row, SampleOptions, sample_sentence
 from hobble.measures.shown import grouped, with_spoken_names
 from hobble.report import parts
-from hobble.runtime.options import Runtime
+from hobble.runtime import Runtime
 
 if TYPE_CHECKING:
     from hobble.report.gather import ReportMaterial

@@ -27,7 +27,7 @@ from hobble.models.load import load_network
 from hobble.models.network import Network
 from hobble.rows.clip_rows import Captured
 from hobble.rows.layout import GAITS
-from hobble.runtime.options import Runtime
+from hobble.runtime import Runtime
 
 WINDOW, STEP = 60, 15  # frames: length of a window (about a cycle), and from one start to the next
 AHEAD = 0.9  # a window is straight if at least this share of its mean velocity points forward

@@ -19,7 +19,7 @@ from hobble.measures.measure import Row
 from hobble.measures.shown import ours_and_published
 from hobble.report import parts
 from hobble.report.parts import Chart, Compared, Hint, KeyFigure, PageSection, SectionPart, Trace
-from hobble.runtime.options import Runtime
+from hobble.runtime import Runtime
 
 if TYPE_CHECKING:
     from hobble.report.gather import ReportMaterial

@@ -20,9 +20,9 @@ from hobble.measures.measure import MeasureInputs, Outcome, flat_rows
 from hobble.measures.walks import FPS, largest_turn, mean_of_known
 from hobble.models.load import load_network
 from hobble.models.network import Network
+from hobble.runtime import Runtime
 from hobble.runtime.animation import ProceduralAnimation
 from hobble.runtime.controller import STEPS
-from hobble.runtime.options import Runtime
 from hobble.runtime.waypoints import TRACK, Waypoint
 
 if TYPE_CHECKING:

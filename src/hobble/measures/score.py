@@ -23,9 +23,9 @@ from hobble.labels.footfall import find_stance_contacts
 from hobble.labels.gait import automatic_gait
 from hobble.measures import motion_quality as quality
 from hobble.measures.motion_quality import FOOT_POINTS, FPS, joints_with
+from hobble.motion import ClipMotion
 from hobble.motion.edit import resample
 from hobble.motion.make import load_source
-from hobble.motion.options import ClipMotion
 from hobble.motion.read import read_bvh
 from hobble.motion.skeleton_file import KnownSkeleton, find_skeleton, load_skeleton, skeleton_folder
 

@@ -15,9 +15,9 @@ from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 from hobble.models.network import Network
 from hobble.rows.clip_rows import rotate_by_yaw
+from hobble.runtime import Runtime
 from hobble.runtime.animation import ProceduralAnimation
 from hobble.runtime.caller_targets import Pose
-from hobble.runtime.options import Runtime
 
 STANCE = 0.5  # a foot counts as standing if its predicted contact is at least this
 SHORTEST_STANCE = 4  # frames; a shorter contact is neither a stance nor a step

@@ -12,9 +12,9 @@ from hobble.core import quat
 from hobble.core.clip import Clip
 from hobble.core.quat import Array
 from hobble.core.smooth import lowest, smoothstep, true_runs
+from hobble.motion import Problem
 from hobble.motion.axes import UP
 from hobble.motion.body import SIDES
-from hobble.motion.options import Problem
 from hobble.motion.physics import find_balance
 from hobble.motion.rig import leg_length
 

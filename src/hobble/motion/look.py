@@ -16,11 +16,11 @@ from hobble.core.files import atomic_path
 from hobble.core.messages import group_messages, in_words
 from hobble.core.quat import Array
 from hobble.core.skeleton import path_between
+from hobble.motion import ClipMotion
 from hobble.motion.axes import UP
 from hobble.motion.duplicates import ClipDigest, clip_digest, duplicate_pairs
 from hobble.motion.edit import resample
 from hobble.motion.make import fit_skeleton, load_source, make_clip
-from hobble.motion.options import ClipMotion
 from hobble.motion.other_formats import MOTION_SUFFIXES, read_motion
 from hobble.motion.physics import standing_seconds, step_count
 from hobble.motion.retarget import ANGLES, BONES, compare_motions, most_different

@@ -15,12 +15,12 @@ import numpy as np
 from hobble.core.clip import Clip
 from hobble.core.errors import InputError
 from hobble.core.skeleton import Skeleton, rest_positions
+from hobble.motion import ACCEPT, ClipMotion, MotionOptions, Problem, accept
 from hobble.motion.axes import changed, straighten
 from hobble.motion.body import Body, body_by_roles, match_joints
 from hobble.motion.edit import facing_angle, loop_clip, repair_defects, resample, sample_times
 from hobble.motion.ground import put_on_floor, tilt_problem
 from hobble.motion.limbs import on_four_legs
-from hobble.motion.options import ACCEPT, ClipMotion, MotionOptions, Problem, accept
 from hobble.motion.other_formats import read_motion
 from hobble.motion.physics import pace_problem, rate_problem
 from hobble.motion.read import MOST_JOINT_POSES, Bvh, check_angles, decode_channels, frame_rate

@@ -13,9 +13,9 @@ import numpy as np
 from hobble.core.clip import Clip
 from hobble.core.quat import Array
 from hobble.core.smooth import gaussian, true_runs
+from hobble.motion import Problem
 from hobble.motion.axes import UP, unit
 from hobble.motion.body import SIDES
-from hobble.motion.options import Problem
 from hobble.motion.rig import leg_length
 from hobble.motion.root import facing_directions
 

@@ -31,10 +31,10 @@ from hobble.core.skeleton import (
     two_bone_knee,
 )
 from hobble.core.smooth import gaussian, lowest, smooth_above, smoothstep
+from hobble.motion import Problem
 from hobble.motion.axes import AHEAD, UP, angles_between, bend_direction, degrees_between, rest_frame, unit
 from hobble.motion.body import SIDES
 from hobble.motion.ground import steady_heels
-from hobble.motion.options import Problem
 from hobble.motion.rig import leg_length, leg_lengths
 
 # Bones of limbs, without the side: role of the joint that turns the bone -> role of the joint at its end.

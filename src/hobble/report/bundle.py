@@ -15,7 +15,7 @@ from hobble.core.files import atomic_path, write_json, write_text
 from hobble.figure.pack import packed_body
 from hobble.models.network import Network
 from hobble.report.character import playable_data
-from hobble.runtime.options import Runtime
+from hobble.runtime import Runtime
 
 WEB = Path(__file__).parent / "web"
 PLOTLY = "plotly.js-cartesian-dist-min"

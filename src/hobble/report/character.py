@@ -19,10 +19,10 @@ from hobble.gait.profile import Profile, profile_of_walk
 from hobble.gait.recognise import LEANING, PARTS, SIDES, STRENGTHS, grader_of_all_people
 from hobble.models.network import Network
 from hobble.rows.clip_rows import ClipRows, load_clip_rows, unbroken_stretches
+from hobble.runtime import Runtime
 from hobble.runtime.animation import ProceduralAnimation
 from hobble.runtime.feet import leg_joints
 from hobble.runtime.generated import restore_bone_lengths
-from hobble.runtime.options import Runtime
 
 AHEAD = (0.0, 2.5)  # target velocity, cm a frame: as fast as walking in the page's section Play
 

@@ -16,8 +16,8 @@ from hobble.core.files import write_bytes, write_json
 from hobble.core.quat import Array
 from hobble.models.network import Network
 from hobble.report.raster import GRID, BodyRenderer, Camera, Picture, webp
+from hobble.runtime import Runtime
 from hobble.runtime.generated import RepeatedWalk, export_bvh, make_loop, skeleton_in_motion
-from hobble.runtime.options import Runtime
 
 QUALITY, EFFORT = 80, 3  # of the WebP images, see `webp`
 # cm: a loop that is nearer than this to the loop of the neutral walk (`loop_distance`) looks the same. In the

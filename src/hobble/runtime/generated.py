@@ -24,9 +24,9 @@ from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton, forward_kinematics, local_rotations, two_bone_knee
 from hobble.figure.gltf import BodyMotion, write_glb
 from hobble.models.network import Network
+from hobble.runtime import Runtime
 from hobble.runtime.animation import ProceduralAnimation
 from hobble.runtime.feet import leg_joints
-from hobble.runtime.options import Runtime
 
 FPS = 60.0  # frames a second of the generated motion
 SETTLED = 6 * 60  # frames until the gait has settled; no loop begins earlier

@@ -18,6 +18,7 @@ from hobble.core.errors import InputError
 from hobble.core.files import DELETE_IT, Arrays, save_npz
 from hobble.core.quat import Array
 from hobble.motion.root import RootFrames, extend_root, root_frames
+from hobble.terrain import FitOptions, HeightSampling
 from hobble.terrain.cycle_ground import (
     CycleGround,
     Feet,
@@ -28,7 +29,6 @@ from hobble.terrain.cycle_ground import (
     is_above_other_joint,
 )
 from hobble.terrain.heightmaps import MAX_HEIGHT
-from hobble.terrain.options import FitOptions, HeightSampling
 from hobble.terrain.patches import Patches
 
 log = logging.getLogger("hobble.terrain")

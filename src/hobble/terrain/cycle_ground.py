@@ -15,7 +15,7 @@ from hobble.core.clip import Clip
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton, rest_positions
 from hobble.core.smooth import true_runs
-from hobble.terrain.options import FitOptions
+from hobble.terrain import FitOptions
 from hobble.terrain.patches import FootPoints, Patches, best_patches
 
 Mask = NDArray[np.bool_]

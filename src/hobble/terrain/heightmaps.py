@@ -12,7 +12,7 @@ import numpy as np
 from hobble.core.errors import InputError
 from hobble.core.files import load_npy, load_npz, printable, read_text
 from hobble.core.quat import Array
-from hobble.terrain import options
+from hobble.terrain import HeightmapOptions
 
 MAX_CELLS = 1 << 26  # largest number of cells of a map: 8192 x 8192, 512 MB, 322 x 322 m with cells of 3.9 cm
 MAX_TEXT_BYTES = 1 << 28  # size of the largest text file that is read
@@ -36,7 +36,7 @@ class TerrainMap:
 
 
 def heightmaps(
-    entries: Sequence[options.HeightmapOptions], files: Sequence[str | Path], *, cell: float
+    entries: Sequence[HeightmapOptions], files: Sequence[str | Path], *, cell: float
 ) -> list[TerrainMap]:
     """The heightmaps that a data set lists.
 

@@ -15,8 +15,8 @@ from hobble.core.quat import Array
 from hobble.database.reader import Database
 from hobble.rows.layout import GAITS, RowLayout, blocks_without_terrain, lower_joints
 from hobble.runtime.trajectory import joint_place
+from hobble.training import Training
 from hobble.training.batches import TRAIN, SampleBatch
-from hobble.training.options import Training
 
 # A number from 0 to 1 for each row is the fractional part of place * step of place + batch * step of batch,
 # with the row's place in the batch and the number of the batch. As the steps are irrational, these numbers

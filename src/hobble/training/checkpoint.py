@@ -21,8 +21,8 @@ from hobble.database.reader import Database
 from hobble.models.blend import BlendedOptions, TrainableBlend
 from hobble.models.model import Options
 from hobble.models.step import AutogradStep
+from hobble.training import Machines, Training
 from hobble.training.optimiser import Adam
-from hobble.training.options import Machines, Training
 from hobble.training.processes import ALONE, Processes
 
 # The columns of history.csv before the held-out errors of the blocks of Y.

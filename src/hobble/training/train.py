@@ -29,6 +29,7 @@ from hobble.models.load import load_network
 from hobble.models.model import BuiltOptions, FinishedNetwork, Options
 from hobble.models.network import TERRAIN_SIDE, Network, TrainingFacts
 from hobble.rows.layout import CONTACTS, GAITS
+from hobble.training import Training
 from hobble.training.augment import augmentations, channel_columns
 from hobble.training.batches import HELD_OUT, TRAIN, HeldOutErrors, HostRows, LossWatch, Predict
 from hobble.training.checkpoint import (
@@ -41,7 +42,6 @@ from hobble.training.checkpoint import (
     write_history,
 )
 from hobble.training.optimiser import STEPS_BETWEEN, Symmetry, Update
-from hobble.training.options import Training
 from hobble.training.processes import ALONE, Processes
 
 log = logging.getLogger("hobble.training")

@@ -20,7 +20,7 @@ from hobble.labels.local_phase import PARTS
 from hobble.measures.measure import Cost, measure_named
 from hobble.models.blend import BlendedOptions
 from hobble.rows.layout import RowLayout
-from hobble.training.options import Machines, Recipe
+from hobble.training import Machines, Recipe
 from hobble.workflow.datasets import NamedDataset, plain
 from hobble.workflow.project import NamedConfiguration, Project
 

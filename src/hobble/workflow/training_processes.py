@@ -19,7 +19,7 @@ from typing import Any
 
 from hobble.core.errors import HobbleError
 from hobble.core.section import Section
-from hobble.training.options import Machines, Training
+from hobble.training import Machines, Training
 from hobble.workflow import lifetime
 
 SLURM_VARIABLE = "SLURM_JOB_ID"  # environment variable that SLURM sets in a job

@@ -1,0 +1,8 @@
+"""An earlier name of `hobble export`, kept for a version."""
+
+import runpy
+import sys
+
+if __name__ == "__main__":
+    sys.argv.insert(1, "export")
+    runpy.run_module("hobble.cli", run_name="__main__")
