@@ -20,12 +20,20 @@ from tests.checkout import Workflow, copy_of
 # Each process of pytest has a core. More threads for matrix products would only wait for each other.
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
+BEGAN = time.monotonic()
 ROOT = Path(__file__).resolve().parents[1]
 collect_ignore = ["engine/bake_in_blender.py"]  # it runs in Blender
 
 # A busy machine is no fault of the code: in a fresh clone the first text drawn takes seconds.
 settings.register_profile("hobble", deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("hobble")
+
+
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    """Skip a slow test that begins later than MINUTES after the start, where that is set."""
+    minutes = float(os.environ.get("MINUTES", "inf"))
+    if item.get_closest_marker("slow") and time.monotonic() > BEGAN + 60 * minutes:
+        pytest.skip(f"a slow test, and {minutes:g} minutes are over")
 
 
 @pytest.fixture(scope="session")
