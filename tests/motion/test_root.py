@@ -8,7 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hobble.core import quat
-from hobble.motion.root import RootFrames, extend_root, local_pose, root_frames
+from hobble.core.skeleton import Skeleton
+from hobble.motion.root import RootFrames, extend_root, local_pose, root_frames, usual_rotations
 
 
 @settings(max_examples=15, deadline=None)
@@ -42,6 +43,17 @@ def test_root_frames_equal_those_of_the_original_rows(shared, make):
     np.testing.assert_allclose(root.turn[frames], y[:, 2], atol=1e-7)
     previous = positions[94 : 94 + n][..., [0, 2]]
     np.testing.assert_allclose(previous, x[:, 120:213].reshape(n, 31, 3)[..., [0, 2]], atol=1e-5)
+
+
+@pytest.mark.parametrize("side", ["left", "right"])
+def test_the_rotation_of_a_forearm_does_not_jump(holden31: Skeleton, side: str) -> None:
+    """It turns on in the way in which it came from the T-pose, from 60 to 220 degrees."""
+    usual = usual_rotations(holden31)[holden31.role(f"{side}_wrist")]
+    axis = quat.log(usual) / np.linalg.norm(quat.log(usual))
+    world = quat.from_axis_angle(axis, np.radians(np.linspace(60, 220, 60)))
+    assert np.abs(np.diff(quat.log(world, usual), axis=0)).max() < 0.1
+    assert np.abs(np.diff(quat.log(world), axis=0)).max() > 1
+    np.testing.assert_allclose(quat.exp(quat.log(world, usual)), world, atol=1e-9)
 
 
 def test_the_root_goes_straight_on_past_both_ends():

@@ -149,9 +149,13 @@ def positive(q: ArrayLike) -> Array:
     return np.where(q[..., :1] < 0, -q, q)
 
 
-def log(q: ArrayLike) -> Array:
-    """Axis times HALF the angle in radians (..., 3) of rotations (..., 4). q and -q give the same result."""
-    q = positive(q)
+def log(q: ArrayLike, near: ArrayLike = IDENTITY) -> Array:
+    """Axis times HALF the angle in radians (..., 3) of rotations (..., 4). q and -q give the same result.
+
+    near: (..., 4). The result jumps where q is half a turn from `near`, and the angle may be more than half a
+    turn if `near` is not the identity.
+    """
+    q = np.where(np.sum(np.asarray(q) * near, axis=-1, keepdims=True) < 0, -np.asarray(q), q)
     length = np.linalg.norm(q[..., 1:], axis=-1, keepdims=True)
     half = np.arctan2(length, q[..., :1])
     scale = np.where(length > 1e-12, half / np.maximum(length, 1e-12), 1.0)

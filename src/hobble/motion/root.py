@@ -12,7 +12,7 @@ import numpy as np
 from hobble.core import quat
 from hobble.core.clip import Clip
 from hobble.core.quat import Array
-from hobble.core.skeleton import Skeleton
+from hobble.core.skeleton import Skeleton, path_to_root, rest_positions
 from hobble.core.smooth import gaussian
 
 STEADY = 10  # frames at 60 Hz; their median velocity continues the root beyond an end of the clip
@@ -125,18 +125,43 @@ def rotations_to_root(root: RootFrames, rotations: Array, frames: Array | slice 
     return quat.mul(np.broadcast_to(to_root, rotations.shape), rotations)
 
 
+def usual_rotations(skeleton: Skeleton) -> Array:
+    """Rotations (J, 4) relative to the root of a person who stands, with upper arms down and forearms ahead.
+
+    A forearm that points ahead has turned by 120 degrees from a T-pose, so it often turns by more than 180,
+    where the axis times the angle jumps. From here, hardly any motion turns it by half a turn. Without the role
+    of an elbow, the joints of the arm have no rotation.
+    """
+    out, rest = np.tile(quat.IDENTITY, (len(skeleton.joints), 1)), rest_positions(skeleton)
+    down, ahead = np.array([0.0, -1.0, 0.0]), np.array([0.0, 0.0, 1.0])
+    for side in ("left", "right"):
+        if f"{side}_elbow" not in skeleton.roles:
+            continue  # nothing shows how this arm points
+        shoulder, elbow = (skeleton.role(f"{side}_{part}") for part in ("shoulder", "elbow"))
+        upper_arm = quat.between(rest[elbow] - rest[shoulder], down)
+        for joint in range(len(skeleton.joints)):
+            path = path_to_root(skeleton.parents, joint)
+            if elbow in path:
+                out[joint] = quat.mul(quat.between(down, ahead), upper_arm)
+            elif shoulder in path:
+                out[joint] = upper_arm
+    return out
+
+
 def local_pose(clip: Clip, root: RootFrames) -> tuple[Array, Array, Array]:
     """The pose as the network sees it, for the frames 0 .. F-2.
 
     The last frame is left out, because it has no velocity to a next frame.
 
     Returns positions (F-1, J, 3) in cm, velocities (F-1, J, 3) in cm a frame, and rotations (F-1, J, 3) as
-    axis times half the angle in radians. All are in the root coordinates of their frame.
+    axis times half the angle in radians. All are in the root coordinates of their frame. An angle may be more
+    than half a turn: it is the one that is continuous around `usual_rotations`.
     """
     frames = slice(0, len(clip) - 1)
     positions = points_to_root(root, clip.positions[frames], frames)
     velocities = vectors_to_root(root, np.diff(clip.positions, axis=0), frames)
-    rotations = quat.log(rotations_to_root(root, clip.global_rotations[frames], frames))
+    to_root = rotations_to_root(root, clip.global_rotations[frames], frames)
+    rotations = quat.log(to_root, usual_rotations(clip.skeleton))
     return positions, velocities, rotations
 
 

@@ -157,7 +157,8 @@ class RowLayout:
     y_joint_position = _Block()
     # Joint velocities of this frame in its root coordinates, cm a frame.
     y_joint_velocity = _Block()
-    # Joint rotations of this frame in its root coordinates: axis times half the angle, radians.
+    # Joint rotations of this frame in its root coordinates: axis times half the angle, radians. See
+    # `hobble.motion.root.usual_rotations`.
     y_joint_rotation = _Block()
     # Local phases in the next frame, as in X.
     y_local_phase = _Block()
