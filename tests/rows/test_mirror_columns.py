@@ -8,6 +8,7 @@ from hobble.core.errors import HobbleError
 from hobble.core.skeleton import Skeleton
 from hobble.labels import LabelOptions
 from hobble.labels.label import label_clip, mirror_labels
+from hobble.labels.local_phase import local_phases
 from hobble.motion.edit import mirror_clip
 from hobble.rows.build_rows import build_clip_rows
 from hobble.rows.clip_rows import ClipRows, Pairs, pair_batches
@@ -16,7 +17,7 @@ from hobble.synthetic.generate_clip import walk_from_plan
 from hobble.synthetic.plan import Segment
 from hobble.terrain.clip_fits import cycle_frames
 
-OPTIONS = {"window": 60, "step": 10, "facing_sigma": 20.0, "with_local_phases": True}
+OPTIONS = {"window": 60, "step": 10, "facing_sigma": 20.0}
 SEGMENTS = [Segment("walk", 120, 60, 4), Segment("walk", 110, -20, 4)]
 FRAMES = 480
 
@@ -37,14 +38,16 @@ def walked(holden31: Skeleton) -> tuple[ClipRows, ClipRows]:
     rng = np.random.default_rng(3)
     channels = {"injury": rng.uniform(0, 10, (FRAMES, 30)), "mood": rng.random((FRAMES, 5))}
     terrain = ground(*cycle_frames(labels.cycles))
-    own = build_clip_rows("walk", clip, vars(labels), channels, terrain, **OPTIONS)
+    phases = local_phases(clip, labels.contacts)
+    own = build_clip_rows("walk", clip, vars(labels), channels, terrain, local_phases=phases, **OPTIONS)
     image = mirror_clip(clip, "image")
     other, _ = mirror_labels(labels, report, image)
     turned = {name: channel(name).mirror(values, holden31) for name, values in channels.items()}
     there = ground(*cycle_frames(other.cycles))
     left, centre, right = np.split(there["heights"], 3, axis=1)
     there["heights"] = np.concatenate([right, centre, left], axis=1)
-    return own, build_clip_rows("image", image, vars(other), turned, there, **OPTIONS)
+    phases = local_phases(image, other.contacts)
+    return own, build_clip_rows("image", image, vars(other), turned, there, local_phases=phases, **OPTIONS)
 
 
 def in_both(own: ClipRows, other: ClipRows) -> tuple[Pairs, Pairs, np.ndarray, np.ndarray]:

@@ -52,6 +52,7 @@ LOCAL = DATASET + "database: {local_phases: true}\n"
         ("network: {kind: local}", DATASET, "local needs local phases, and data set mine has none.*s: true}"),
         ("network: {kind: mann}", LOCAL, "mann cannot use local phases, and data set mine has them.*false}"),
         ("network: {kind: local}", LOCAL, ""),
+        ("network: {kind: local}", LOCAL.replace("phases: true", "phases: autoencoder"), ""),
     ],
 )
 def test_a_data_set_has_what_the_network_needs(

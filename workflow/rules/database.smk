@@ -1,10 +1,34 @@
 from hobble.database import Merging, RowOptions
 
 
+# Only for data sets with `database: {local_phases: autoencoder}`.
+rule phase_autoencoder:
+    """The autoencoder that finds local phases in the motion of the training clips."""
+    input:
+        batches=lambda w: dataset(w).folders(dataset(w).autoencoder_clips, "motion"),
+    output:
+        weights="results/datasets/{dataset}/autoencoder/weights.npz",
+    log:
+        "results/datasets/{dataset}/logs/database/phase_autoencoder.log",
+    benchmark:
+        "results/datasets/{dataset}/benchmarks/database/phase_autoencoder.tsv"
+    threads: 2
+    resources:
+        mem_mb=4000,
+        runtime=60,
+    params:
+        clips=lambda w: dataset(w).autoencoder_clips,
+        code=lambda w: package.code("phase_autoencoder"),
+    script:
+        "../scripts/phase_autoencoder.py"
+
+
 rule database_clips:
     """The rows of clips and their mirrors. A row holds the input X, output Y and phase P of one frame."""
     input:
         batches=folders("motion", "labels", "channels", "terrain"),
+        # Only if an autoencoder finds the local phases.
+        autoencoder=lambda w: dataset(w).autoencoder,
     output:
         batch=directory("results/datasets/{dataset}/batches/database/{batch}"),
     log:

@@ -40,10 +40,14 @@ def local_phases(clip: Clip, contacts: np.ndarray) -> tuple[Array, Array]:
     hands = position[:, [clip.skeleton.role(f"{side}_wrist") for side in ("left", "right")], 2]
     hips = position[:, clip.skeleton.role("hips"), 2]
     signals = np.concatenate([on_ground, (hands - hips[:, None]) / SWING], axis=1)
-    analytic = _analytic(signals, clip.fps)
-    change = np.zeros((len(clip), len(PARTS)))
-    change[:-1] = np.angle(analytic[1:] * np.conj(analytic[:-1])) / (2 * np.pi)
-    return np.stack([analytic.real, analytic.imag], axis=-1), np.clip(change, -LARGEST_STEP, LARGEST_STEP)
+    return vectors_and_change(_analytic(signals, clip.fps))
+
+
+def vectors_and_change(waves: np.ndarray) -> tuple[Array, Array]:
+    """Local phases (F, 4, 2), and the change (F, 4) of their angles, of complex numbers (F, 4)."""
+    change = np.zeros(waves.shape)
+    change[:-1] = np.angle(waves[1:] * np.conj(waves[:-1])) / (2 * np.pi)
+    return np.stack([waves.real, waves.imag], axis=-1), np.clip(change, -LARGEST_STEP, LARGEST_STEP)
 
 
 def _analytic(signals: Array, fps: float) -> np.ndarray:

@@ -129,8 +129,8 @@ def usual_rotations(skeleton: Skeleton) -> Array:
     """Rotations (J, 4) relative to the root of a person who stands, with upper arms down and forearms ahead.
 
     A forearm that points ahead has turned by 120 degrees from a T-pose, so it often turns by more than 180,
-    where the axis times the angle jumps. From here, hardly any motion turns it by half a turn. Without the role
-    of an elbow, the joints of the arm have no rotation.
+    where the axis times the angle jumps. From here, hardly any motion turns it by half a turn. Without the
+    role of an elbow, the joints of the arm have no rotation.
     """
     out, rest = np.tile(quat.IDENTITY, (len(skeleton.joints), 1)), rest_positions(skeleton)
     down, ahead = np.array([0.0, -1.0, 0.0]), np.array([0.0, 0.0, 1.0])

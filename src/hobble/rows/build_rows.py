@@ -15,7 +15,7 @@ from hobble.core.clip import Clip
 from hobble.core.declared import ArrayOf, check_arrays
 from hobble.core.errors import InputError
 from hobble.core.quat import Array
-from hobble.labels.local_phase import PARTS, local_phases
+from hobble.labels.local_phase import PARTS
 from hobble.motion.root import (
     RootFrames,
     extend_root,
@@ -43,15 +43,15 @@ def build_clip_rows(
     window: int,
     step: int,
     facing_sigma: float,
-    with_local_phases: bool = False,
+    local_phases: tuple[Array, Array] | None = None,
 ) -> ClipRows:
     """Build the rows of a clip's gait cycles, one cycle after another.
 
     name: name of the clip. labels: the arrays of `hobble.labels.clip_labels.Labels`. channels: channel ->
     values (F, columns). terrain: the arrays of `hobble.terrain.clip_fits.ClipFits`. window: frames of the
     trajectory before and after the row's frame. step: frames between two samples of the trajectory.
-    facing_sigma: sigma of the Gaussian that smooths the facing direction, frames. with_local_phases: whether
-    the rows have columns of local phases.
+    facing_sigma: sigma of the Gaussian that smooths the facing direction, frames. local_phases: as
+    `hobble.labels.local_phase.local_phases` returns them; None for rows without them.
     The trajectory may reach past the ends of the clip. There the root moves straight on, and the gait of the
     first or the last frame is repeated.
     Raises InputError if labels, channels or terrain do not fit the clip, or if the clip has no frame before
@@ -60,13 +60,13 @@ def build_clip_rows(
     skeleton = clip.skeleton
     columns = tuple((name, values.shape[1]) for name, values in channels.items())
     layout = RowLayout(
-        len(skeleton.joints), window, step, columns, local_phases=len(PARTS) if with_local_phases else 0
+        len(skeleton.joints), window, step, columns, local_phases=len(PARTS) if local_phases else 0
     )
     frame, cycle = cycle_frames(labels["cycles"])
     _check(name, clip, labels, channels, terrain, frame)
     x, y = _body_columns(clip, labels, layout, frame, root_frames(clip, facing_sigma))
-    if with_local_phases:
-        vectors, change = local_phases(clip, labels["contacts"])
+    if local_phases:
+        vectors, change = local_phases
         x.append(vectors[frame])
         y += [vectors[frame + 1], change[frame]]
     # Ground heights come in three groups, left of the path, on it and right of it. Each has all samples.

@@ -500,6 +500,17 @@ class NamedDataset:
         return [clip for clip in splits if clip == original(clip)]
 
     @property
+    def autoencoder(self) -> list[str]:
+        """Path of the autoencoder that finds the local phases, in a list; [] if none does."""
+        used = self.settings.database.local_phases == "autoencoder"
+        return [f"{self.root}/autoencoder/weights.npz"] if used else []
+
+    @property
+    def autoencoder_clips(self) -> list[str]:
+        """The clips from which the autoencoder learns: without mirrors, hurt versions and held-out clips."""
+        return [clip for clip in self.listed if clip not in self.settings.held_out]
+
+    @property
     def hurt_row_step(self) -> int:
         """The number n such that training uses every n-th row of the hurt versions."""
         return self.settings.hurt.every if self.settings.hurt else 1

@@ -25,8 +25,8 @@ from hobble.workflow.datasets import NamedDataset, plain
 from hobble.workflow.project import NamedConfiguration, Project
 
 # Memory of Snakemake itself, which runs twice in a cluster job (for SLURM's step and for the script), and of
-# Python with numpy, scipy and the package.
-ENGINE_MB, PYTHON_MB = 400, 400
+# Python with numpy, scipy and the package; of PyTorch.
+ENGINE_MB, PYTHON_MB, PYTORCH_MB = 400, 400, 500
 MEMORY_MARGIN = 1.5  # requested memory / measured memory
 TIME_MARGIN = 10  # requested time / measured time, for an old and busy machine
 MEASURED_JOINTS = 31  # joints of the skeleton with which the rates were measured
@@ -87,7 +87,9 @@ def job_request(
     times = len(dataset.channels) if stage == "channels" else mirrored
     kept = KEPT_MB * times * sum(sizes) if stage in KEEPING else 0.0
     seconds = times * rate.seconds_per_1000_frames * sum(sizes) + CLIP_SECONDS * len(sizes)
-    return request(rate.mb_per_1000_frames * max(sizes) + kept, seconds, attempt, rate.least_minutes)
+    encodes = stage == "database" and dataset.settings.database.local_phases == "autoencoder"
+    megabytes = rate.mb_per_1000_frames * max(sizes) + kept + PYTORCH_MB * encodes
+    return request(megabytes, seconds, attempt, rate.least_minutes)
 
 
 def measure_request(configuration: NamedConfiguration, name: str, attempt: int = 1) -> Request:
@@ -102,13 +104,13 @@ def measure_request(configuration: NamedConfiguration, name: str, attempt: int =
 def training_request(configuration: NamedConfiguration, attempt: int = 1) -> Request:
     """The request of a training, on each of its machines.
 
-    Each process holds PyTorch (500 MB), its part of the database, the weights and the optimiser's state
+    Each process holds PyTorch, its part of the database, the weights and the optimiser's state
     (32 bytes for each parameter). A network that is built from the rows and not trained, such as motion
     matching, also has up to three copies of all rows, with 4 bytes for each number. A training that is killed
     continues from its last checkpoint.
     """
     options, machines = configuration.settings.training, machines_of(configuration)
-    needed = 500 + options.memory_mb + 32e-6 * parameter_count(configuration)
+    needed = PYTORCH_MB + options.memory_mb + 32e-6 * parameter_count(configuration)
     if configuration.is_built:
         layout = layout_of(configuration)
         needed += 12e-3 * (layout.x_size + layout.y_size) * all_thousands_of_frames(configuration.dataset)

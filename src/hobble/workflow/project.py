@@ -295,7 +295,7 @@ def _check_network(configuration: NamedConfiguration) -> None:
     """Check that the data set has local phases exactly if the network uses them, and what symmetry needs."""
     settings, dataset = configuration.settings, configuration.dataset
     where, uses = f"configuration {configuration.name}", settings.network.uses_local_phases
-    if uses != dataset.settings.database.local_phases:
+    if uses != bool(dataset.settings.database.local_phases):
         needs, there = ("needs", "has none") if uses else ("cannot use", "has them")
         raise HobbleError(
             f"{where}: a network of kind {settings.network.kind} {needs} local phases, and data set "

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 
 class LocalOptions(MannOptions):
-    """Experts gated by local phases. It needs `database: {local_phases: true}` in the data set.
+    """Experts gated by local phases. The data set needs `local_phases` in its section `database`.
 
     experts, gate_layers, gate_units: as for `mann`.
     """
