@@ -12,7 +12,6 @@ rule phase_autoencoder:
         "results/datasets/{dataset}/logs/database/phase_autoencoder.log",
     benchmark:
         "results/datasets/{dataset}/benchmarks/database/phase_autoencoder.tsv"
-    threads: 2
     resources:
         mem_mb=4000,
         runtime=60,

@@ -108,7 +108,7 @@ def wave_of(signals: Tensor) -> tuple[Tensor, Tensor, Tensor]:
 
 
 def train(clips: Iterable[Clip], seed: int = 1, steps: int = STEPS) -> PhaseAutoencoder:
-    """An autoencoder of these clips, which share a skeleton. Same seed and threads, same bits."""
+    """An autoencoder of these clips, which share a skeleton. Same seed, same bits."""
     torch.manual_seed(seed)
     network: PhaseAutoencoder | None = None
     pieces, frames, end = list[Tensor](), list[Tensor](), 0
