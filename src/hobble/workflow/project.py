@@ -349,7 +349,7 @@ def _check_dataset(project: Project, dataset: NamedDataset) -> None:
             raise HobbleError(f"{where}: hurt.links: {problem}. There are {', '.join(links) or 'none'}.")
     dataset.check_channels()
     dataset.splits(dataset.channels)  # raises HobbleError if `held_out` is wrong, or leaves no clip
-    if settings.mirror:
+    if settings.mirror or settings.database.local_phases == "autoencoder":
         from hobble.core.skeleton import Skeleton  # imports numpy, too
         from hobble.motion.edit import mirror_skeleton
 
