@@ -9,6 +9,7 @@ import numpy as np
 
 from hobble.core.clip import Clip
 from hobble.core.quat import Array
+from hobble.core.smooth import gaussian
 from hobble.motion.root import local_pose, root_frames
 
 # The parts of the body with a local phase, in the order of the columns; a part and its mirror image differ
@@ -20,7 +21,8 @@ FREQUENCIES = 2.0 ** np.arange(-1.25, 1.5, 0.125)
 WIDTH = 0.25  # standard deviation of a filter as a share of its frequency; the second harmonic is four away
 SHARPNESS = 8  # the filters count as this power of their responses, so nearly only the strongest ones do
 SWING = 40.0  # cm that a hand swings ahead and back, for an amplitude like that of a foot in a walk
-LARGEST_STEP = 0.2  # cycles a frame: a larger change of an angle is a jump
+STEADY = 4.0  # frames: standard deviation of the mean of the changes of an angle
+LARGEST_STEP = 0.1  # cycles a frame: a larger change of an angle is a jump
 
 
 def local_phases(clip: Clip, contacts: np.ndarray) -> tuple[Array, Array]:
@@ -44,9 +46,13 @@ def local_phases(clip: Clip, contacts: np.ndarray) -> tuple[Array, Array]:
 
 
 def vectors_and_change(waves: np.ndarray) -> tuple[Array, Array]:
-    """Local phases (F, 4, 2), and the change (F, 4) of their angles, of complex numbers (F, 4)."""
-    change = np.zeros(waves.shape)
-    change[:-1] = np.angle(waves[1:] * np.conj(waves[:-1])) / (2 * np.pi)
+    """Local phases (F, 4, 2), and the change (F, 4) of their angles, of complex numbers (F, 4).
+
+    The angle jumps where a part of the body rests. So the change is a mean over some frames, in which short
+    vectors count little.
+    """
+    change, turns = np.zeros(waves.shape), waves[1:] * np.conj(waves[:-1])
+    change[:-1] = np.arctan2(gaussian(turns.imag, STEADY), gaussian(turns.real, STEADY)) / (2 * np.pi)
     return np.stack([waves.real, waves.imag], axis=-1), np.clip(change, -LARGEST_STEP, LARGEST_STEP)
 
 
