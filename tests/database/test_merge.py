@@ -54,6 +54,28 @@ def test_rows_round_trip_and_files_merge_like_rows_in_memory(rows_of, tmp_path):
     assert list(Database.open(tmp_path / "two").skeleton["joints"]) == ["Hips", "Spine", "Head"]
 
 
+def test_a_network_without_local_phases_gets_rows_as_if_they_had_none(rows_of, tmp_path):
+    rng, splits = np.random.default_rng(3), {"a": "train", "b": "held_out"}
+    bare = {name: rows_of(name, 40, None, seed=i) for i, name in enumerate("ab")}
+    rows = {}
+    for name, clip in bare.items():
+        x, y = (np.hstack([v, rng.normal(size=(len(v), n))]) for v, n in ((clip.x, 8), (clip.y, 12)))
+        rows[name] = replace(clip, x=x, y=y, layout=replace(clip.layout, local_phases=4))
+        rows[name].check(name)
+        assert rows[name].layout.serves(clip.layout)
+        assert not clip.layout.serves(rows[name].layout)
+    write_database(tmp_path / "bare", bare, splits, **OPTIONS)
+    write_database(tmp_path / "left out", rows, splits, **OPTIONS)
+    assert contents(tmp_path / "bare") == contents(tmp_path / "left out")
+    kept = write_database(tmp_path / "kept", rows, splits, local_phases=True, **OPTIONS)
+    (block,) = Database.open(tmp_path / "kept").blocks("held_out", 0, 0, 1, 1)
+    assert kept.layout == rows["b"].layout
+    assert block.y.shape[1] == rows["b"].y.shape[1]
+    one = Database.open(tmp_path / "kept").statistics
+    expected = rows["a"].y[:, -12:].mean(axis=0)
+    np.testing.assert_allclose(one.y_mean[-12:], expected, rtol=1e-5)
+
+
 def test_every_row_is_stored_once_whatever_the_bucket_size(rows_of, tmp_path, monkeypatch):
     monkeypatch.setattr(write, "BUCKET_BYTES", 90_000)
     monkeypatch.setattr(write, "PART_ROWS", 17)

@@ -40,7 +40,6 @@ def test_impossible_targets_are_reported_before_training(base: Path, unchecked: 
 
 
 SYMMETRIC = "training: {symmetric: true}\n"
-LOCAL = DATASET + "database: {local_phases: true}\n"
 
 
 @pytest.mark.parametrize(
@@ -49,10 +48,6 @@ LOCAL = DATASET + "database: {local_phases: true}\n"
         (SYMMETRIC + "network: {kind: mann}", DATASET, "lame: training.symmetric: a network of kind mann"),
         (SYMMETRIC, DATASET.replace("mirror: true\n", ""), "data set mine has no mirrored clips.* `mirror"),
         (SYMMETRIC + "network: {kind: plain}", DATASET, ""),
-        ("network: {kind: local}", DATASET, "local needs local phases, and data set mine has none.*s: true}"),
-        ("network: {kind: mann}", LOCAL, "mann cannot use local phases, and data set mine has them.*false}"),
-        ("network: {kind: local}", LOCAL, ""),
-        ("network: {kind: local}", LOCAL.replace("phases: true", "phases: autoencoder"), ""),
     ],
 )
 def test_a_data_set_has_what_the_network_needs(

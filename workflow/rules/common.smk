@@ -2,7 +2,12 @@
 from hobble.channels import display_modules
 from hobble.measures.measure import all_measures, measure_named
 from hobble.workflow import demands
-from hobble.workflow.datasets import channels_of_folder, healthy_originals, plain
+from hobble.workflow.datasets import (
+    channels_of_folder,
+    has_local_phases,
+    healthy_originals,
+    plain,
+)
 from hobble.workflow.fingerprint import Contents, Package
 from hobble.workflow.project import PUBLISHED
 

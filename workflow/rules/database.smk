@@ -69,6 +69,7 @@ rule database_merge:
         splits=splits_of,
         compared=compared_clips,
         channels=lambda w: channels_of_folder(w.channels),
+        local_phases=lambda w: has_local_phases(w.channels),
         # Hurt version -> the healthy clip from which it is made.
         sources=lambda w: healthy_originals(splits_of(w)),
         # Training uses every n-th row of hurt versions; this is n.

@@ -15,7 +15,7 @@ from hobble.workflow.job import make_each
 
 
 def phases_of(clip, labels, source, autoencoder):
-    """The local phases of a clip from their source, the option `local_phases`, or None if there are none.
+    """The local phases of a clip from their source, the option `local_phases`.
 
     autoencoder: path of the autoencoder's file, in a list.
     """
@@ -23,7 +23,7 @@ def phases_of(clip, labels, source, autoencoder):
         from hobble.labels.autoencoder import load_autoencoder  # imports PyTorch
 
         return load_autoencoder(autoencoder[0], clip.skeleton).local_phases(clip)
-    return local_phases(clip, labels.contacts) if source else None
+    return local_phases(clip, labels.contacts)
 
 
 def make_rows(piece, log):

@@ -30,6 +30,7 @@ with job(snakemake) as log:
         files.each("database/clips/{clip}.npz", snakemake.params.splits),
         snakemake.params.splits,
         channels=snakemake.params.channels,
+        local_phases=snakemake.params.local_phases,
         sources=snakemake.params.sources,
         hurt_every=snakemake.params.hurt_every,
         every=options.every,

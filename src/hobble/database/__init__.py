@@ -20,10 +20,11 @@ class RowOptions(Section):
     )
     step: Positive = Field(10, description="frames between trajectory samples")
     facing_sigma: PositiveFloat = Field(20.0, description="smoothing of the facing direction, frames")
-    local_phases: bool | Literal["autoencoder"] = Field(
-        False,
-        description="add a phase of its own for each foot and hand, which networks of the kind `local` need "
-        "and no other kind can use. autoencoder: phases that a periodic autoencoder finds in the motion",
+    local_phases: Literal["contacts", "autoencoder"] = Field(
+        "contacts",
+        description="what the phases of feet and hands, which networks of the kind `local` read, come from. "
+        "contacts: contacts of the feet and swings of the hands. autoencoder: a periodic autoencoder, trained "
+        "on the motion",
     )
 
     @model_validator(mode="after")

@@ -23,6 +23,7 @@ from hobble.rows.layout import (
     TERRAIN,
     RowLayout,
     blocks_without_terrain,
+    body_inputs,
     body_layout,
     channel_inputs,
     lower_joints,
@@ -123,13 +124,14 @@ def clip_moments(rows: ClipRows, layout: RowLayout) -> tuple[Moments, Moments]:
         mean = rows.mean[part_fits].astype(np.float64)
         row_mean: Array = np.bincount(fit_row, weight * mean, len(fits)).astype(np.float64)
         spread = float(np.sum(weight * (mean - row_mean[fit_row]) ** 2))
-        x_frame = _moments_of_lowered(rows.x[part], body.x_joint_position, row_mean, spread)
+        frames = body_inputs(layout, rows.x[part])
+        x_frame = _moments_of_lowered(frames, body.x_joint_position, row_mean, spread)
         parts = {name: x_frame.columns(block) for name, block in blocks_without_terrain(body).items()}
         for name, _ in layout.channels:
             parts[name] = Moments.of_rows(channel_inputs(name, rows.channels[name][part]))
         parts[TERRAIN] = Moments.of_rows(rows.heights[part_fits], weight)
         x = x + _join_columns(*[parts[name] for name in layout.blocks("x")])
-        y = y + _moments_of_lowered(rows.y[part], layout.y_joint_position, row_mean, spread)
+        y = y + _moments_of_lowered(rows.y[part, : layout.y_size], layout.y_joint_position, row_mean, spread)
     return x, y
 
 

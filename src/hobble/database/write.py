@@ -189,7 +189,7 @@ def scatter(
             rows["frame"], rows["phase"] = used.frame[part], used.p[part]
             values = {name: used.channels[name][part] for name, _ in manifest.layout.channels}
             x = frame_inputs(manifest.layout, used.x[part], values)
-            rows["values"] = np.concatenate([x, used.y[part]], axis=1)
+            rows["values"] = np.concatenate([x, used.y[part, : manifest.layout.y_size]], axis=1)
             first_fit = used.first_fit[part]
             ground = slice(int(first_fit[0]), int(first_fit[-1] + used.fits[part][-1]))
             fits = np.concatenate([used.heights[ground], used.mean[ground, None]], axis=1)
@@ -289,6 +289,7 @@ def write_database(
     splits: Mapping[str, str],
     *,
     channels: Sequence[str],
+    local_phases: bool = False,
     sources: Mapping[str, str] | None = None,
     hurt_every: int = 1,
     every: int = 1,
@@ -300,17 +301,17 @@ def write_database(
     """Build a database in the folder `path`. Returns its manifest, which is written last.
 
     clips: clip name -> its rows, or the file with them. splits: clip name -> "train" or "held_out". channels:
-    the network's input channels, in the order of their columns. sources: name of a hurt version -> name of
-    the healthy clip from which it was computed. every: training uses only each `every`-th row of a clip, and
-    of these only each `hurt_every`-th of a hurt version. joint_weight: factor of the standardised joints in
-    the network's input. dtype: type of the numbers on disk. seed: seed of the order of the rows. chunk_bytes:
-    rough size of a chunk. The statistics are those of the training clips. The same rows and options give the
-    same bytes.
+    the network's input channels, in the order of their columns. local_phases: whether the network uses those
+    that the rows have. sources: name of a hurt version -> name of the healthy clip from which it was
+    computed. every: training uses only each `every`-th row of a clip, and of these only each `hurt_every`-th
+    of a hurt version. joint_weight: factor of the standardised joints in the network's input. dtype: type of
+    the numbers on disk. seed: seed of the order of the rows. chunk_bytes: rough size of a chunk. The
+    statistics are those of the training clips. The same rows and options give the same bytes.
     Raises HobbleError if no training clip has rows, InputError if the rows of the clips differ in columns or
     joints.
     """
     entries, first, visits = plan_clips(clips, splits, sources or {}, hurt_every, every)
-    layout, rows = first.layout.with_channels(channels), sum(entry["rows"] for entry in entries)
+    layout, rows = first.layout.with_channels(channels, local_phases), sum(entry["rows"] for entry in entries)
     manifest = Manifest(
         folder="",
         layout=layout,

@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -408,8 +408,7 @@ def check_layout(where: str | Path, rows: ClipRows, network: Network) -> None:
     Rows may have more channels than the network. where: the file of the rows, for the message.
     """
     layout = network.layout
-    same_without_channels = rows.layout.with_channels(()) == replace(layout, channels=())
-    if not same_without_channels or not set(layout.channels) <= set(rows.layout.channels):
+    if not rows.layout.serves(layout):
         raise InputError(
             where,
             f"its rows ({rows.layout}) are not those the network has learnt ({layout})",

@@ -134,7 +134,8 @@ class Pairs(NamedTuple):
 def pair_batches(rows: ClipRows, layout: RowLayout, batch: int = 2048) -> Iterator[Pairs]:
     """Yield all pairs of a row and one of its fits, about `batch` at a time.
 
-    Values are not standardised. layout: the layout of the rows, or one with fewer channels.
+    Values are not standardised. layout: the layout of the rows, or one with fewer channels or without
+    local phases.
     """
     first_fit = rows.first_fit
     start = 0
@@ -152,7 +153,7 @@ def compose_pairs(rows: ClipRows, layout: RowLayout, row: np.ndarray, fit: np.nd
     layout: see `pair_batches`. row: (n,) indices of rows. fit: (n,) indices of their fits in `rows.heights`.
     """
     x = np.empty((len(row), layout.x_size), np.float32)
-    y = rows.y[row].astype(np.float32)
+    y = rows.y[row, : layout.y_size].astype(np.float32)
     values = {name: rows.channels[name][row] for name, _ in layout.channels}
     compose(layout, frame_inputs(layout, rows.x[row], values), rows.heights[fit], rows.mean[fit, None], x, y)
     return Pairs(x, y, rows.p[row], row, 1.0 / rows.fits[row])

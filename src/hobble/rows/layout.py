@@ -84,13 +84,21 @@ class RowLayout:
         sizes |= {"local_phases": self.local_phases} if self.local_phases else {}
         return {**sizes, "channels": [list(pair) for pair in self.channels]}
 
-    def with_channels(self, names: Iterable[str]) -> RowLayout:
+    def with_channels(self, names: Iterable[str], local_phases: bool = True) -> RowLayout:
         """The layout with only the channels `names`, in the order of `names`.
 
-        Raises KeyError if the layout does not have one of these channels.
+        local_phases: whether the local phases stay. They are the last columns of Y, and in X the last ones
+        before the channels. Raises KeyError if the layout does not have one of these channels.
         """
         size = dict(self.channels)
-        return replace(self, channels=tuple((name, size[name]) for name in names))
+        kept = self.local_phases if local_phases else 0
+        return replace(self, channels=tuple((name, size[name]) for name in names), local_phases=kept)
+
+    def serves(self, network: RowLayout) -> bool:
+        """Whether rows with this layout have all columns of a network's. They may have more of them."""
+        same_motion = self.with_channels((), False) == network.with_channels((), False)
+        enough = self.local_phases >= network.local_phases
+        return same_motion and enough and set(network.channels) <= set(self.channels)
 
     @property
     def offsets(self) -> range:
@@ -226,11 +234,16 @@ def fit_column_count(layout: RowLayout) -> int:
 def frame_inputs(layout: RowLayout, body: Array, channels: Mapping[str, Array]) -> Array:
     """X without its terrain columns, (n, columns), in the order of the layout.
 
-    body: (n, columns) X without terrain and channels. channels: channel -> values (n, columns), which X holds
-    as `read_through_curve` gives them.
+    body: (n, columns) X without terrain and channels; it may have local phases that the layout lacks.
+    channels: channel -> values (n, columns), which X holds as `read_through_curve` gives them.
     """
     values = [channel_inputs(name, channels[name]) for name, _ in layout.channels]
-    return np.concatenate([body, *values], axis=1)
+    return np.concatenate([body_inputs(layout, body), *values], axis=1)
+
+
+def body_inputs(layout: RowLayout, body: Array) -> Array:
+    """The columns of `body`, as for `frame_inputs`, that the layout has."""
+    return body[:, : column_count_without_terrain(body_layout(layout))]
 
 
 def channel_inputs(name: str, values: Array) -> Array:

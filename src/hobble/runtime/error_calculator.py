@@ -65,7 +65,7 @@ def compare(character: Any, rows: ClipRows) -> Compared:
     terrain fits.
     """
     network, layout = character.network, character.network.layout
-    if rows.layout.joints != layout.joints or not set(layout.channels) <= set(rows.layout.channels):
+    if not rows.layout.serves(layout):
         raise ValueError(f"the rows ({rows.layout}) are not those that the network has learnt ({layout})")
     stretches = unbroken_stretches(rows.frame)
     chosen = np.concatenate([np.zeros(0, np.int64), *stretches])

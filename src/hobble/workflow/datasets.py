@@ -539,9 +539,17 @@ def batch_of(clip: str, count: int) -> int:
     return int.from_bytes(digest[:8], "big") % count
 
 
-def database_folder(channels: Sequence[str]) -> str:
-    """The name of the folder that holds the database with these channels."""
-    return "+".join(channels) or NO_CHANNEL
+LOCAL_PHASES = "local_phases"  # the last part of the name of a database that has them
+
+
+def database_folder(channels: Sequence[str], local_phases: bool) -> str:
+    """The name of the folder that holds the database with these channels, with local phases or without."""
+    return "+".join([*channels, *[LOCAL_PHASES] * local_phases]) or NO_CHANNEL
+
+
+def has_local_phases(folder_name: str) -> bool:
+    """Whether the database in the folder with this name has local phases."""
+    return folder_name.split("+")[-1] == LOCAL_PHASES
 
 
 def channels_of_folder(folder_name: str) -> tuple[str, ...]:
@@ -550,6 +558,7 @@ def channels_of_folder(folder_name: str) -> tuple[str, ...]:
     Raises HobbleError for a name that no database can have.
     """
     names = () if folder_name == NO_CHANNEL else tuple(folder_name.split("+"))
+    names = names[:-1] if has_local_phases(folder_name) else names
     if names != tuple(name for name in CHANNEL_NAMES if name in names):
         raise HobbleError(
             f"no database can be called {folder_name}. It is called `{NO_CHANNEL}`, or by its channels with "

@@ -163,7 +163,7 @@ def layout_of(configuration: NamedConfiguration) -> RowLayout:
     skeleton = dataset.catalogue.skeleton(dataset.settings.skeleton)
     channels = tuple((name, len(channel(name).columns(skeleton))) for name in configuration.channels)
     row_options = plain(dataset.settings, "database", ("window", "step"))
-    local_phases = len(PARTS) if dataset.settings.database.local_phases else 0
+    local_phases = len(PARTS) if configuration.settings.network.uses_local_phases else 0
     return RowLayout(len(skeleton.joints), channels=channels, local_phases=local_phases, **row_options)
 
 

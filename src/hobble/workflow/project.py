@@ -92,8 +92,9 @@ class NamedConfiguration:
 
     @property
     def database(self) -> str:
-        """Path of the folder with the rows for training, which is named after the network's channels."""
-        return f"{self.dataset.root}/database/{database_folder(self.channels)}"
+        """Path of the folder with the rows for training, which is named after what the network reads."""
+        folder = database_folder(self.channels, self.settings.network.uses_local_phases)
+        return f"{self.dataset.root}/database/{folder}"
 
     def clips_to_build_from(self) -> list[str]:
         """If the network is built: the training clips, in the order of `splits`. Else []."""
@@ -288,25 +289,19 @@ def _check_configuration(project: Project, name: str, seen: dict[str, NamedConfi
     if settings.training.continues:
         _check_continues(configuration, seen[settings.training.continues])
     if not settings.network_of:
-        _check_network(configuration)
+        _check_symmetric(configuration)
 
 
-def _check_network(configuration: NamedConfiguration) -> None:
-    """Check that the data set has local phases exactly if the network uses them, and what symmetry needs."""
+def _check_symmetric(configuration: NamedConfiguration) -> None:
+    """Check that the network can have what `training.symmetric` needs."""
     settings, dataset = configuration.settings, configuration.dataset
-    where, uses = f"configuration {configuration.name}", settings.network.uses_local_phases
-    if uses != bool(dataset.settings.database.local_phases):
-        needs, there = ("needs", "has none") if uses else ("cannot use", "has them")
-        raise HobbleError(
-            f"{where}: a network of kind {settings.network.kind} {needs} local phases, and data set "
-            f"{dataset.name} {there}. Set `database: {{local_phases: {str(uses).lower()}}}` in it."
-        )
     if settings.training.symmetric:
         why = settings.network.why_not_symmetric
         if not why and not dataset.settings.mirror:
             why = f"data set {dataset.name} has no mirrored clips, as with `mirror: true`"
         if why:
-            raise HobbleError(f"{where}: training.symmetric: {why}. Write `symmetric: false`.")
+            where = f"configuration {configuration.name}: training.symmetric"
+            raise HobbleError(f"{where}: {why}. Write `symmetric: false`.")
 
 
 def _check_continues(later: NamedConfiguration, earlier: NamedConfiguration) -> None:

@@ -62,8 +62,7 @@ def read_tables(
     parts = []
     for path in clips:
         rows = load_clip_rows(path)
-        known, bare = set(rows.layout.channels), rows.layout.with_channels(())
-        if bare != layout.with_channels(()) or not set(layout.channels) <= known:
+        if not rows.layout.serves(layout):
             raise InputError(path, f"its columns ({rows.layout}) do not fit the database ({layout})")
         kept, remaining = find_runs(rows)
         x, y = on_mean_ground(rows, layout)
@@ -89,7 +88,7 @@ def on_mean_ground(rows: ClipRows, layout: RowLayout) -> tuple[Array, Array]:
     figure on the mean of these grounds.
     """
     x = np.empty((len(rows), layout.x_size), np.float32)
-    y = rows.y.astype(np.float32)
+    y = rows.y[:, : layout.y_size].astype(np.float32)
     if not len(rows):
         return x, y
     count = rows.fits[:, None]
