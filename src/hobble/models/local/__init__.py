@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 
 class LocalOptions(MannOptions):
-    """Experts gated by local phases. The data set needs `local_phases` in its section `database`.
+    """Experts gated by local phases, see `local_phases` in a data set's section `database`.
 
     experts, gate_layers, gate_units: as for `mann`.
     """
