@@ -23,8 +23,8 @@ class RowOptions(Section):
     local_phases: Literal["contacts", "autoencoder"] = Field(
         "contacts",
         description="what the phases of feet and hands, which networks of the kind `local` read, come from. "
-        "contacts: contacts of the feet and swings of the hands. autoencoder: a periodic autoencoder, trained "
-        "on the motion",
+        "contacts: contacts of the feet and swings of the hands. autoencoder: a periodic autoencoder that is "
+        "trained on the motion",
     )
 
     @model_validator(mode="after")
