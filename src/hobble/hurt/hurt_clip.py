@@ -9,7 +9,7 @@ from hobble.core.clip import Clip
 from hobble.core.errors import HobbleError
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton, bone_axes, local_rotations, two_bone_knee
-from hobble.core.smooth import gaussian, smooth_above
+from hobble.core.smooth import gaussian, smooth_above, smoothstep
 from hobble.hurt.effects import HIGHEST_SEVERITY, LEFT, RIGHT, SIDES, Effects, effects_of_severities
 from hobble.hurt.feet import (
     HurtFoot,
@@ -34,6 +34,9 @@ from hobble.labels.clip_labels import Labels
 # impaired walks, the sound knee is bent by 8 to 10 degrees while a stiff leg swings.
 STRAIGHT_KNEE = np.radians(9.0)
 MOST_VAULT = np.radians(14.0)  # a knee straightens by at most this, so a crouching figure stays down
+# Radians of knee flexion. A knee that is bent as far as the first value is bent less to spare the leg, one that
+# is bent as far as the second, in a crouching figure, not at all.
+CROUCHED = np.radians([40.0, 90.0])
 # Radians of knee flexion. Below the first value, the bend is too small to tell in which direction the knee
 # points. Above the second value, the bend is large enough. Between them, it counts partly.
 BENT = np.radians([6.0, 18.0])
@@ -41,6 +44,10 @@ STRETCH = (0.985, 0.9985)  # least and greatest value of `Leg.longest_reach`, in
 # For the height of the hips, the horizontal distance between hip and ankle counts as at most this share of
 # the leg's length. Otherwise there would be no height at which a leg reaches a foot that is too far away.
 LEVEL_SHARE = 0.97
+
+# A leg takes over the body in the first LOADING of its stance, and hands it over in the last UNLOADING.
+LOADING, UNLOADING = 0.15, 0.4
+LEAST_LOAD = 0.02  # so that a leg alone carries the body wholly, even as it begins or ends its stance
 
 
 @dataclass(frozen=True)
@@ -118,15 +125,12 @@ def _assemble(
     """
     clip, skeleton = source.clip, source.clip.skeleton
     world = interpolate_rotations(change_body(source, changes), timing.body_frames)
-    root = interpolate_values(clip.root + shift, timing.body_frames)
+    root = interpolate_values(clip.root + shift, timing.path_frames)
     legs = [read_leg(clip, side) for side in (LEFT, RIGHT)]
     pelvis = world[:, skeleton.role("hips")]
     hips = [_hip_from_root(source, world, side) for side in (LEFT, RIGHT)]
     ankles = [interpolate_values(feet[side].ankle, timing.leg_frames[:, side]) for side in (LEFT, RIGHT)]
-    stands = [
-        interpolate_values(gaussian(1.0 - source.swinging[:, side], 2.0), timing.leg_frames[:, side])
-        for side in (LEFT, RIGHT)
-    ]
+    stands = [interpolate_values(_load(source, side), timing.leg_frames[:, side]) for side in (LEFT, RIGHT)]
     reaches = [_desired_reach(legs[side], changes, source, timing, side) for side in (LEFT, RIGHT)]
     root[:, 1] = hips_height(root, hips, ankles, reaches, stands, [leg.longest_reach for leg in legs])
     for side in (LEFT, RIGHT):
@@ -138,6 +142,20 @@ def _assemble(
         world[:, heel] = interpolate_rotations(feet[side].rotation, when)
         world[:, toe] = quat.mul(world[:, heel], interpolate_rotations(feet[side].toe_rotation, when))
     return Clip(name, skeleton, clip.fps, local_rotations(skeleton, world), root)
+
+
+def _load(source: HealthyClip, side: int) -> Array:
+    """(F,) how much a leg carries, 0 to 1.
+
+    In the last part of a stance the knee bends to leave the ground. The body does not sink with it, since the
+    other leg carries it by then.
+    """
+    load = np.zeros(len(source))
+    for stance in source.stances[side]:
+        share = np.linspace(0.0, 1.0, stance.off - stance.land + 1)  # of the stance's time
+        ramps = smoothstep(share / LOADING) * smoothstep((1 - share) / UNLOADING)
+        load[stance.land : stance.off + 1] = np.maximum(ramps, LEAST_LOAD)
+    return gaussian(load, 2.0)
 
 
 def _hip_from_root(source: HealthyClip, world: Array, side: int) -> Array:
@@ -298,8 +316,10 @@ def _desired_reach(leg: Leg, changes: Effects, source: HealthyClip, timing: Timi
     (`vault`), which lifts the hips.
     """
     when, other_when = timing.leg_frames[:, side], timing.leg_frames[:, 1 - side]
+    healthy_bend = knee_flexion(leg.reach, leg.thigh_length, leg.shank_length)
     crouch = np.radians(changes.changes["crouch"][:, side]) * (1 - source.swing_curve[:, side])
-    bend = interpolate_values(knee_flexion(leg.reach, leg.thigh_length, leg.shank_length) + crouch, when)
+    crouch = crouch * smoothstep((CROUCHED[1] - healthy_bend) / (CROUCHED[1] - CROUCHED[0]))
+    bend = interpolate_values(healthy_bend + crouch, when)
     source_vault = np.clip(changes.changes["vault"][:, side], 0.0, 1.0) * source.swing_curve[:, 1 - side]
     vault = interpolate_values(source_vault, other_when)
     bend = bend - vault * np.clip(bend - STRAIGHT_KNEE, 0.0, MOST_VAULT)

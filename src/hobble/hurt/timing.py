@@ -21,6 +21,9 @@ LEAST_SHARE = 0.57
 # A jog gets only this share of a change of stride time, because gravity sets how long its flight lasts.
 JOG_STRIDE = 0.15
 JOG_SHIFT = 0.6  # a jog gets only this share of the shifts of landing and leaving, as its stances are short
+# A body does not hurry while the hurt foot stands as much as the sound foot hurries to land. So the sound foot
+# lands further ahead of the hips. The path gets this share of an early landing.
+PATH_SHARE = 0.5
 MOST_SHIFT = 0.3  # cycles: shifts of landing and leaving stay below this
 
 
@@ -28,11 +31,12 @@ MOST_SHIFT = 0.3  # cycles: shifts of landing and leaving stay below this
 class Timing:
     """Which of F source frames is shown in each of N new frames. Frames have fractions.
 
-    body_frames: (N,) source frame that the body shows in each new frame. leg_frames: (N, 2) the same for the
-    left and the right leg. stride_ratio: (F,) new duration of a stride / old duration.
+    body_frames: (N,) source frame that the body shows in each new frame. path_frames: (N,) the frame whose
+    place on the path the body has. leg_frames: (N, 2) the same as `body_frames` for the left and the right leg. stride_ratio: (F,) new duration of a stride / old duration.
     """
 
     body_frames: Array = field(repr=False)
+    path_frames: Array = field(repr=False)
     leg_frames: Array = field(repr=False)
     stride_ratio: Array = field(repr=False)
 
@@ -57,8 +61,10 @@ def retime(source: HealthyClip, effects: Effects) -> Timing:
         shifted = [(at, float(delay[at])) for at, delay in events[1:-1]]
         landings += shifted[1::2]
         legs.append(_source_frames(shifted, cadence_times, new))
-    body = _source_frames(sorted(landings), cadence_times, new)
-    return Timing(body, np.stack(legs, axis=1), stride_ratio)
+    landings.sort()
+    body = _source_frames(landings, cadence_times, new)
+    path = _source_frames([(at, max(delay, PATH_SHARE * delay)) for at, delay in landings], cadence_times, new)
+    return Timing(body, path, np.stack(legs, axis=1), stride_ratio)
 
 
 def _source_frames(events: list[tuple[int, float]], cadence_times: Array, new: Array) -> Array:

@@ -45,7 +45,7 @@ class Guarding(ClipChannel):
     rate = 1.0
     default = 0.6
     # An effect of guarding grows with this power of it (GUARD_CHANGES in `hobble.hurt.effects`).
-    exponent = 2.6
+    exponent = 4.0
     Value = Amount
 
     def columns(self, rig: HasLinks) -> tuple[str, ...]:
