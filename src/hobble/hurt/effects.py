@@ -100,7 +100,7 @@ ADDED_CHANGES: dict[str, dict[str, float]] = {
     "foot": {
         "speed": 0.66, "stride": 1.06, "turn": 0.8, "push": 0.15, "lift": 0.4, "lift_sound": 0.3,
         "push_sound": 0.66, "strike": 1.0, "side": 5.0, "toe_out": 18.0, "out": 0.05, "vault": 0.5,
-        "off": -0.065, "off_sound": 0.05,
+        "off": -0.06,
     },
     "back": {
         "speed": 0.68, "push": 0.6, "push_sound": 0.6, "stride": 1.12, "forward": 17.0, "crouch": 9.0,
