@@ -68,7 +68,7 @@ MIXES: dict[str, dict[str, float]] = {
     "foot": {"antalgic": 0.65, "steppage": 0.35},
 }
 # Part -> factor on the mixed curves of trunk, pelvis and shoulders.
-CURVE_FACTOR: dict[str, float] = {"pelvis": 1.6, "hip": 1.6, "thigh": 1.1, "shank": 1.2, "foot": 0.9}
+CURVE_FACTOR: dict[str, float] = {"pelvis": 1.6, "hip": 1.8, "thigh": 1.1, "shank": 1.2, "foot": 0.9}
 # Part -> changes that the recordings do not show.
 # - Ratios to the healthy clip: speed; stride (time); lift (height of the swinging foot); push and strike
 #   (pitch of the foot while the heel is up and while the toe is up); arm (its swing); back and head
@@ -85,8 +85,8 @@ ADDED_CHANGES: dict[str, dict[str, float]] = {
     },
     "hip": {
         "speed": 0.66, "stride": 1.2, "turn": 0.8, "push": 0.7, "vault": 0.9, "lift": 0.75,
-        "lift_sound": 0.3, "push_sound": 0.4, "forward": 2.0, "out": 0.02, "off_sound": 0.04,
-        "width": 0.05,
+        "lift_sound": 0.3, "push_sound": 0.4, "forward": 2.0, "out": 0.02, "off_sound": 0.025,
+        "width": 0.07,
     },
     "thigh": {
         "speed": 0.58, "stride": 1.08, "turn": 0.8, "push": 0.4, "vault": 1.0, "lift": 0.1,
@@ -95,12 +95,13 @@ ADDED_CHANGES: dict[str, dict[str, float]] = {
     },
     "shank": {
         "speed": 0.62, "stride": 1.04, "turn": 0.8, "push": 0.6, "lift": 0.4, "lift_sound": 0.3,
-        "push_sound": 0.3, "strike": 0.0, "crouch": 24.0, "list": 2.0,
+        "push_sound": 0.3, "strike": 0.0, "crouch": 24.0, "list": 2.0, "off_sound": 0.04, "width": 0.07,
+        "out": 0.03,
     },
     "foot": {
-        "speed": 0.66, "stride": 1.06, "turn": 0.8, "push": 0.15, "lift": 0.4, "lift_sound": 0.3,
-        "push_sound": 0.66, "strike": 1.0, "side": 5.0, "toe_out": 18.0, "out": 0.05, "vault": 0.5,
-        "off": -0.06,
+        "speed": 0.66, "stride": 1.06, "turn": 0.8, "push": 0.12, "lift": 0.4, "lift_sound": 0.3,
+        "push_sound": 0.66, "strike": 1.0, "side": 6.0, "toe_out": 18.0, "out": 0.05, "vault": 0.5,
+        "off": -0.06, "width": 0.05,
     },
     "back": {
         "speed": 0.68, "push": 0.6, "push_sound": 0.6, "stride": 1.12, "forward": 17.0, "crouch": 9.0,
@@ -119,7 +120,7 @@ ADDED_CHANGES: dict[str, dict[str, float]] = {
 # degrees (`dip`) as the hurt foot bears weight, elbows bent by 40 to 77 degrees (`guard`), both knees
 # bent, eyes on the ground.
 GUARD_CHANGES: dict[str, float] = {
-    "forward": 27.0, "nod": 10.0, "dip": 16.0, "crouch": 10.0, "crouch_sound": 6.0, "guard": 0.95,
+    "forward": 29.0, "nod": 10.0, "dip": 16.0, "crouch": 10.0, "crouch_sound": 6.0, "guard": 0.95,
     "guard_sound": 0.75,
 }  # fmt: skip
 # The changes that are ratios.
@@ -133,7 +134,7 @@ RATIOS = (
 TIMING_FACTOR = 1.85
 # Part -> length of the step onto the hurt foot, as a ratio to the healthy clip. It replaces the ratio of the
 # profiles.
-STEP_RATIO = {"hip": 0.74, "thigh": 0.2, "shank": 0.44, "foot": 0.58}
+STEP_RATIO = {"hip": 0.74, "thigh": 0.17, "shank": 0.44, "foot": 0.55}
 
 
 @functools.cache

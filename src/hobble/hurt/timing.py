@@ -63,7 +63,9 @@ def retime(source: HealthyClip, effects: Effects) -> Timing:
         legs.append(_source_frames(shifted, cadence_times, new))
     landings.sort()
     body = _source_frames(landings, cadence_times, new)
-    path = _source_frames([(at, max(delay, PATH_SHARE * delay)) for at, delay in landings], cadence_times, new)
+    path = _source_frames(
+        [(at, max(delay, PATH_SHARE * delay)) for at, delay in landings], cadence_times, new
+    )
     return Timing(body, path, np.stack(legs, axis=1), stride_ratio)
 
 
