@@ -34,8 +34,8 @@ from hobble.labels.clip_labels import Labels
 # impaired walks, the sound knee is bent by 8 to 10 degrees while a stiff leg swings.
 STRAIGHT_KNEE = np.radians(9.0)
 MOST_VAULT = np.radians(14.0)  # a knee straightens by at most this, so a crouching figure stays down
-# Radians of knee flexion. A knee that is bent as far as the first value is bent less to spare the leg, one that
-# is bent as far as the second, in a crouching figure, not at all.
+# Radians of knee flexion. To spare a leg, its knee bends more, but less so if it is bent by more than the
+# first value already, and not at all if by more than the second. So a crouching figure does not sink.
 CROUCHED = np.radians([40.0, 90.0])
 # Radians of knee flexion. Below the first value, the bend is too small to tell in which direction the knee
 # points. Above the second value, the bend is large enough. Between them, it counts partly.

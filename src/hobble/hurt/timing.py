@@ -21,8 +21,8 @@ LEAST_SHARE = 0.57
 # A jog gets only this share of a change of stride time, because gravity sets how long its flight lasts.
 JOG_STRIDE = 0.15
 JOG_SHIFT = 0.6  # a jog gets only this share of the shifts of landing and leaving, as its stances are short
-# A body does not hurry while the hurt foot stands as much as the sound foot hurries to land. So the sound foot
-# lands further ahead of the hips. The path gets this share of an early landing.
+# While the hurt foot stands, the body hurries less than the sound foot, which so lands further ahead of the
+# hips. The path gets this share of an early landing.
 PATH_SHARE = 0.5
 MOST_SHIFT = 0.3  # cycles: shifts of landing and leaving stay below this
 
@@ -31,8 +31,9 @@ MOST_SHIFT = 0.3  # cycles: shifts of landing and leaving stay below this
 class Timing:
     """Which of F source frames is shown in each of N new frames. Frames have fractions.
 
-    body_frames: (N,) source frame that the body shows in each new frame. path_frames: (N,) the frame whose
-    place on the path the body has. leg_frames: (N, 2) the same as `body_frames` for the left and the right leg. stride_ratio: (F,) new duration of a stride / old duration.
+    body_frames: (N,) source frame that the body shows in each new frame. path_frames: (N,) the one in whose
+    place on the path the body is. leg_frames: (N, 2) the same as `body_frames` for the left and the right
+    leg. stride_ratio: (F,) new duration of a stride / old duration.
     """
 
     body_frames: Array = field(repr=False)
