@@ -1,17 +1,18 @@
 """How well limps are recognised: of left-out people, at several strengths, and in captured clips.
 
     python benchmarks/limps.py CMU_FOLDER [CLIP.bvh ...] [--network WEIGHTS.npz]
-    python benchmarks/limps.py CMU_FOLDER --sizes [--network WEIGHTS.npz]
+    python benchmarks/limps.py CMU_FOLDER [CLIP.bvh ...] --sizes [--network WEIGHTS.npz] [--patients FOLDER]
 
 Also prints how often healthy walks are called impaired, whether hurt versions of healthy walks are nearer to
 captured limps than the healthy walks are, and how large the limps of hurt versions and of a network are. With
---sizes only that.
+--sizes only that. With --patients also in which features the limps of the network are beyond those of three
+groups: the ten people, the actors of CMU 105_25 and of the CLIPs, and the patients.
 """
 
 import argparse
 import itertools
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -254,7 +255,7 @@ def sizes_of_versions(folder: Path) -> None:
         print_sizes(f"hurt versions of {clip.name}", profile_of_walk(measure_clip(clip)), walks)
 
 
-def sizes_of_network(file: Path) -> None:
+def sizes_of_network(file: Path, others: Mapping[str, list[dict[str, float]]]) -> None:
     network = load_network(file)
     cases = [(part, severity) for part in PARTS for severity in SEVERITIES]
     injuries = [{}, *({PARTS[part]: severity} for part, severity in cases)]
@@ -274,6 +275,8 @@ def sizes_of_network(file: Path) -> None:
         if 0 < guarding < 1:
             made += [(part, *pair) for part, pair in zip([*PARTS] * 2, pairs, strict=True)]
     told_from_people(made)
+    if others:
+        beyond_people(made, others)
 
 
 def profiles(network: Network, injuries: list[dict[str, float]], guarding: list[float]) -> list[Profile]:
@@ -288,6 +291,46 @@ def profiles(network: Network, injuries: list[dict[str, float]], guarding: list[
     return found
 
 
+MORE = ("speed", "stride", "step_hurt", "step_sound", "knee_hurt", "knee_sound", "hip_sound")
+
+
+def numbers(walk: Profile, healthy: Profile) -> dict[str, float]:
+    """The 21 features, and 7 effects, of a limp of the right leg."""
+    effects = measure_effects(walk, healthy)
+    return features(walk, healthy) | {name: effects[name] for name in MORE}
+
+
+def real_limps(paths: Iterable[Path]) -> list[dict[str, float]]:
+    """Of each clip with a gait cycle, compared with healthy people. The leg that stands shorter is hurt."""
+    found = []
+    for path in paths:
+        if len(walk := measure_clip(read_clip(path))):
+            limp = profile_of_walk(walk)
+            right = limp["stance_share_R"] <= limp["stance_share_L"]
+            found.append(numbers(limp if right else mirror_profile(limp), healthy_profile([])))
+    return found
+
+
+def beyond_people(
+    made: list[tuple[str, Profile, Profile]], others: Mapping[str, list[dict[str, float]]]
+) -> None:
+    """Print the features whose mean is above or below the mean of the ten people and of all others.
+
+    made: as in `told_from_people`. others: name of a group of people -> what `numbers` says of their limps.
+    """
+    people = [numbers(p[gait], p[NORMAL]) for p in read_people() for gait in GAITS[1:]]
+    own = [numbers(walk, healthy) for _, walk, healthy in made]
+    print(
+        f"  beyond the means of all groups: ten people, {', '.join(others)} (people's deviations from them)"
+    )
+    for name in own[0]:
+        mean, *groups = (np.mean([limp[name] for limp in some]) for some in (own, people, *others.values()))
+        if not min(groups) <= mean <= max(groups):
+            deviation = np.std([limp[name] for limp in people])
+            z = min((mean - group for group in groups), key=abs) / deviation
+            print(f"    {name}: {mean:.2f}, {', '.join(f'{group:.2f}' for group in groups)} ({z:+.2f})")
+
+
 def told_from_people(made: list[tuple[str, Profile, Profile]]) -> None:
     """How well a classifier tells the character's limps at 10 from those of the ten people.
 
@@ -295,12 +338,6 @@ def told_from_people(made: list[tuple[str, Profile, Profile]]) -> None:
     and 7 effects. Each person and each part of the leg are left out of its training in turn. Prints the area
     under the curve (.5: cannot tell), and the features in which the two differ most.
     """
-    more = ("speed", "stride", "step_hurt", "step_sound", "knee_hurt", "knee_sound", "hip_sound")
-
-    def numbers(walk: Profile, healthy: Profile) -> dict[str, float]:
-        effects = measure_effects(walk, healthy)
-        return features(walk, healthy) | {name: effects[name] for name in more}
-
     people = [(i, numbers(p[gait], p[NORMAL])) for i, p in enumerate(read_people()) for gait in GAITS[1:]]
     own = [(part, numbers(*pair)) for part, *pair in made]
     real, hurt = (np.array([list(each.values()) for _, each in some]) for some in (people, own))
@@ -330,10 +367,16 @@ def main() -> None:
         "--network", type=Path, metavar="WEIGHTS.npz", help="a network whose limps are measured"
     )
     parser.add_argument("--sizes", action="store_true", help="only the sizes of limps")
+    parser.add_argument("--patients", type=Path, metavar="FOLDER", help="folder of patients' walks, as .bvh")
     options = parser.parse_args()
     sizes_of_versions(options.folder)
     if options.network:
-        sizes_of_network(options.network)
+        others = {}
+        if options.patients:
+            actors = [options.folder / "105_25.bvh", *map(Path, options.clips)]
+            patients = sorted(options.patients.glob("*.bvh"))
+            others = {"actors": real_limps(actors), "patients": real_limps(patients)}
+        sizes_of_network(options.network, others)
     if options.sizes:
         return
     linear = {p: learn(*examples_of_people(rest), shrinkage=SHRINKAGE_OF_PEOPLE) for p, rest in left_out()}
