@@ -354,13 +354,26 @@ def write_database(
             limits={name: learnt.to_dict() for name, each in learners.items() if (learnt := each.learn())},
         )
         final = Path(path) / manifest.folder
-        shutil.rmtree(final, ignore_errors=True)  # the same rows of an earlier build, maybe damaged
-        os.rename(build, final)
+        if final.is_dir():  # the same rows of an earlier build, maybe damaged
+            _replace_files(build, final)
+        else:
+            os.rename(build, final)
         manifest.save(Path(path))
         for other in Path(path).iterdir():  # earlier builds, and what killed ones left
             if other.is_dir() and other.name != manifest.folder:
                 shutil.rmtree(other, ignore_errors=True)
         return manifest
+
+
+def _replace_files(new: Path, old: Path) -> None:
+    """Replace each file in the folder `old` by the one in `new`, which has the same rows.
+
+    At every moment each file is there, because the manifest may already name this folder.
+    """
+    for file in [path for path in new.rglob("*") if path.is_file()]:
+        target = old / file.relative_to(new)
+        target.parent.mkdir(exist_ok=True)
+        os.replace(file, target)
 
 
 @contextlib.contextmanager
