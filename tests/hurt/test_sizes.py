@@ -96,7 +96,7 @@ def test_the_sound_leg_carries_the_body_as_soon_as_it_stands(made, hurting, part
     clip, labels, flat = made("straight")
     hurt = hurt_clip(clip, labels, hurting(len(clip), {LEG[part]: 10.0}), flat=flat).clip
     healthy, limp = (profile_of_walk(measure_clip(one)) for one in (clip, hurt))
-    assert limp["mean knee_flexion_L"] < healthy["mean knee_flexion_L"] + 1.0  # people: 2 to 5 degrees less
+    assert limp["mean knee_flexion_L"] < healthy["mean knee_flexion_L"] + 1.5  # people: 2 to 5 degrees less
     assert limp["range hips_height"] < 0.12
 
 

@@ -68,7 +68,7 @@ MIXES: dict[str, dict[str, float]] = {
     "foot": {"antalgic": 0.65, "steppage": 0.35},
 }
 # Part -> factor on the mixed curves of trunk, pelvis and shoulders.
-CURVE_FACTOR: dict[str, float] = {"pelvis": 1.6, "hip": 1.8, "thigh": 1.1, "shank": 1.2, "foot": 0.9}
+CURVE_FACTOR: dict[str, float] = {"pelvis": 1.6, "hip": 1.9, "thigh": 1.1, "shank": 1.2, "foot": 0.9}
 # Part -> changes that the recordings do not show.
 # - Ratios to the healthy clip: speed; stride (time); lift (height of the swinging foot); push and strike
 #   (pitch of the foot while the heel is up and while the toe is up); arm (its swing); back and head
@@ -94,14 +94,14 @@ ADDED_CHANGES: dict[str, dict[str, float]] = {
         "vault_sound": 0.5,
     },
     "shank": {
-        "speed": 0.62, "stride": 1.04, "turn": 0.8, "push": 0.6, "lift": 0.4, "lift_sound": 0.3,
-        "push_sound": 0.3, "strike": 0.0, "crouch": 24.0, "list": 2.0, "off_sound": 0.04, "width": 0.07,
+        "speed": 0.62, "stride": 1.04, "turn": 0.8, "push": 0.57, "lift": 0.4, "lift_sound": 0.3,
+        "push_sound": 0.3, "strike": 0.0, "crouch": 26.0, "list": 2.0, "off_sound": 0.04, "width": 0.07,
         "out": 0.03,
     },
     "foot": {
         "speed": 0.66, "stride": 1.06, "turn": 0.8, "push": 0.12, "lift": 0.4, "lift_sound": 0.3,
-        "push_sound": 0.66, "strike": 1.0, "side": 6.0, "toe_out": 18.0, "out": 0.05, "vault": 0.5,
-        "off": -0.06, "width": 0.05,
+        "push_sound": 0.66, "strike": 1.0, "side": 6.0, "toe_out": 18.0, "out": 0.03, "vault": 0.5,
+        "off": -0.06, "width": 0.025,
     },
     "back": {
         "speed": 0.68, "push": 0.6, "push_sound": 0.6, "stride": 1.12, "forward": 17.0, "crouch": 9.0,
@@ -134,7 +134,7 @@ RATIOS = (
 TIMING_FACTOR = 1.85
 # Part -> length of the step onto the hurt foot, as a ratio to the healthy clip. It replaces the ratio of the
 # profiles.
-STEP_RATIO = {"hip": 0.74, "thigh": 0.17, "shank": 0.44, "foot": 0.55}
+STEP_RATIO = {"hip": 0.74, "thigh": 0.17, "shank": 0.44, "foot": 0.53}
 
 
 @functools.cache

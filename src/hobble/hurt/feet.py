@@ -153,10 +153,10 @@ def place_footprints(
 ) -> list[list[Array]]:
     """The new footprints of both feet that `reduce_pitch` returned: a position (3,), cm, for each stance.
 
-    Footprints move with the body, by `shift` (F, 3). Besides, the hurt foot lands less far ahead, and the
-    feet land further apart sideways.
+    Footprints move with the body, by `shift` (F, 3). Besides, the hurt foot lands less far ahead, and further
+    out: the body stays over the sound leg.
     """
-    velocity, widening = np.gradient(source.path, axis=0), effects.changes["width"].max(axis=1)
+    velocity = np.gradient(source.path, axis=0)
     placed: list[list[Array]] = []
     for side, stances in enumerate(source.stances):
         step = effects.changes["step"][:, side] - effects.changes["step"][:, 1 - side]
@@ -167,7 +167,7 @@ def place_footprints(
             # A step lasts half a cycle. Half of its change is made by this foot, the other half by the other.
             change = interpolate_curve(step, when)
             ahead = change / 2 * velocity[nearest] * source.cycle_frames[nearest] / 2
-            width = interpolate_curve(widening, when) * source.leg_length / 2
+            width = interpolate_curve(effects.changes["width"][:, side], when) * source.leg_length
             outward = quat.rotate(source.heading[nearest], np.array([OUTWARD_SIGN[side] * width, 0.0, 0.0]))
             placed[side].append(moved + np.array([ahead[0], 0.0, ahead[1]]) + outward)
     return placed
