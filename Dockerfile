@@ -5,4 +5,4 @@ COPY pyproject.toml constraints.txt setup.py README.md ./
 COPY src src
 COPY config/skeletons config/skeletons
 RUN pip install --no-cache-dir --constraint constraints.txt ".[onnx,workflow]"
-WORKDIR /work
+WORKDIR /project

@@ -143,10 +143,13 @@ def from_matrix(m: ArrayLike) -> Array:
     return positive(normalize(row))
 
 
-def positive(q: ArrayLike) -> Array:
-    """The same rotations (..., 4) with w >= 0: -q and q are the same rotation."""
+def positive(q: ArrayLike, near: ArrayLike = IDENTITY) -> Array:
+    """The same rotations (..., 4) with the sign that is nearer to `near` (..., 4): by default w >= 0.
+
+    -q and q are the same rotation.
+    """
     q = np.asarray(q)
-    return np.where(q[..., :1] < 0, -q, q)
+    return np.where(np.sum(q * near, axis=-1, keepdims=True) < 0, -q, q)
 
 
 def log(q: ArrayLike, near: ArrayLike = IDENTITY) -> Array:
@@ -155,7 +158,7 @@ def log(q: ArrayLike, near: ArrayLike = IDENTITY) -> Array:
     near: (..., 4). The result jumps where q is half a turn from `near`, and the angle may be more than half a
     turn if `near` is not the identity.
     """
-    q = np.where(np.sum(np.asarray(q) * near, axis=-1, keepdims=True) < 0, -np.asarray(q), q)
+    q = positive(q, near)
     length = np.linalg.norm(q[..., 1:], axis=-1, keepdims=True)
     half = np.arctan2(length, q[..., :1])
     scale = np.where(length > 1e-12, half / np.maximum(length, 1e-12), 1.0)
