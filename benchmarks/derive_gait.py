@@ -2,6 +2,7 @@
 
     python benchmarks/derive_gait.py people WALKS.npz [PEOPLE.npz]
     python benchmarks/derive_gait.py healthy CMU_FOLDER [HEALTHY.npz]
+    python benchmarks/derive_gait.py groups CMU_FOLDER --actor FERRE.bvh --patients PATIENTS.csv
 
 people.npz has the profiles of the people whom Jun et al. (2020) recorded (`hobble.gait.profile`). Of
 WALKS.npz it reads five arrays: `gaits`, `curves`, `scalars`, the names GAITS, CURVES and SCALARS; `curve`
@@ -10,9 +11,17 @@ WALKS.npz it reads five arrays: `gaits`, `curves`, `scalars`, the names GAITS, C
 healthy.npz says how much the features of healthy walks vary within one person: with the speed, on slight
 curves, and from one window of 4 seconds to another. The motion was obtained from mocap.cs.cmu.edu, which was
 funded by NSF EIA-0196217.
+
+groups.json has the mean limps (`hobble.gait.judge`) of two groups of other people. Actors: CMU 105_25,
+compared with the same person's healthy walks, and the clips after --actor (Ferre et al. 2019), compared with
+people's normal walks. Patients: the clips of PATIENTS.csv (columns `file` and `diagnosis`; Rueangsirarak et
+al. 2018), compared with the clips there whose diagnosis is `healthy`. The leg that stands shorter is the hurt
+one.
 """
 
 import argparse
+import csv
+import json
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
@@ -24,6 +33,7 @@ from hobble.core.errors import InputError
 from hobble.core.files import load_npz, save_npz
 from hobble.core.quat import Array
 from hobble.gait.cycles import CURVES, SCALARS, WalkCycles, measure_clip
+from hobble.gait.judge import GROUPS_FILE, numbers
 from hobble.gait.profile import (
     GAITS,
     PEOPLE_FILE,
@@ -104,16 +114,51 @@ def derive_healthy(folder: Path, out: Path) -> None:
     save_npz(out, performers=np.array(list(REFERENCE)), covariances=squares, clips=clips)
 
 
+def derive_groups(folder: Path, actors: Iterable[Path], patients: Path, out: Path) -> None:
+    rows = list(csv.DictReader(patients.read_text().splitlines()))
+    files = {row["file"]: row["diagnosis"] for row in rows}
+    clips = {name: read_clip(patients.parent / name) for name in files}
+    healthy = healthy_profile([clip for name, clip in clips.items() if files[name] == "healthy"])
+    own = healthy_profile([read_clip(folder / f"{name}.bvh") for name in REFERENCE["105"]])
+    pairs = {
+        "actors": [
+            (read_clip(folder / "105_25.bvh"), own),
+            *((read_clip(path), healthy_profile([])) for path in actors),
+        ],
+        "patients": [(clip, healthy) for name, clip in clips.items() if files[name] != "healthy"],
+    }
+    means = {}
+    for group, compared in pairs.items():
+        limps = [limp for clip, healthy in compared if (limp := numbers_of_clip(clip, healthy))]
+        means[group] = {name: round(float(np.mean([limp[name] for limp in limps])), 4) for name in limps[0]}
+    out.write_text(json.dumps(means, indent=1) + "\n")
+
+
+def numbers_of_clip(clip: Clip, healthy: Profile) -> dict[str, float] | None:
+    """The numbers of a limp; None if the clip has no cycle."""
+    if not len(cycles := measure_clip(clip)):
+        return None
+    walk = profile_of_walk(cycles)
+    pair = walk, healthy
+    if walk["stance_share_R"] > walk["stance_share_L"]:
+        pair = mirror_profile(walk), mirror_profile(healthy)
+    return numbers(*pair)
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("which", choices=("people", "healthy"))
+    parser.add_argument("which", choices=("people", "healthy", "groups"))
     parser.add_argument("source", type=Path)
     parser.add_argument("out", type=Path, nargs="?")
+    parser.add_argument("--actor", action="append", type=Path, default=[], help="a limp of an actor, as .bvh")
+    parser.add_argument("--patients", type=Path, help="table of the patients' clips, as .csv")
     options = parser.parse_args()
     if options.which == "people":
         derive_people(options.source, options.out or PEOPLE_FILE)
+    elif options.which == "groups":
+        derive_groups(options.source, options.actor, options.patients, options.out or GROUPS_FILE)
     else:
         derive_healthy(options.source, options.out or HEALTHY_FILE)
 

@@ -1,19 +1,19 @@
 """How well limps are recognised: of left-out people, at several strengths, and in captured clips.
 
     python benchmarks/limps.py CMU_FOLDER [CLIP.bvh ...] [--network WEIGHTS.npz]
-    python benchmarks/limps.py CMU_FOLDER [CLIP.bvh ...] --sizes [--network WEIGHTS.npz] [--patients FOLDER]
+    python benchmarks/limps.py CMU_FOLDER --sizes [--network WEIGHTS.npz]
 
 Also prints how often healthy walks are called impaired, whether hurt versions of healthy walks are nearer to
 captured limps than the healthy walks are, and how large the limps of hurt versions and of a network are. With
---sizes only that. With --patients also in which features the limps of the network are beyond those of three
-groups: the ten people, the actors of CMU 105_25 and of the CLIPs, and the patients.
+--sizes only that, with the goals of limp.json.
 """
 
 import argparse
 import itertools
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import yaml
@@ -24,15 +24,16 @@ from hobble.cli.gait import read_clip
 from hobble.core.clip import Clip
 from hobble.core.errors import HobbleError
 from hobble.core.files import load_npz
-from hobble.core.quat import Array
 from hobble.core.skeleton import other_side
 from hobble.gait.cycles import join_walks, measure_clip
+from hobble.gait.judge import Limp, numbers, numbers_of_people
 from hobble.gait.profile import (
     GAITS,
+    LEFT,
     NORMAL,
     PROFILE_NAMES,
+    RIGHT,
     Profile,
-    features,
     healthy_profile,
     measure_effects,
     mirror_profile,
@@ -41,13 +42,12 @@ from hobble.gait.profile import (
 )
 from hobble.gait.recognise import (
     HEALTHY_FILE,
-    SHRINKAGE,
     SHRINKAGE_OF_PEOPLE,
+    SIDES,
     Grader,
     compare_clip,
     examples_of_people,
     grade_walk,
-    healthy_covariance,
     learn,
     learn_grader,
     recognise,
@@ -57,9 +57,9 @@ from hobble.hurt.hurt_clip import hurt_clip
 from hobble.labels import LabelOptions
 from hobble.labels.clip_labels import Labels
 from hobble.labels.label import label_clip
-from hobble.measures.limp_run import limp_distance, walk_figures
+from hobble.measures.limp_goals import GUARDINGS, USUAL, between_guardings, judge_limps
+from hobble.measures.limp_run import SEVERITIES, leg_limps, limp_distance, row_of_walk, walk_figures
 from hobble.models.load import load_network
-from hobble.models.network import Network
 from hobble.motion import ClipMotion
 from hobble.motion.make import make_clip
 from hobble.motion.skeleton_file import load_skeleton
@@ -206,38 +206,48 @@ PARTS = {
     "shank": "RightLeg-RightFoot",
     "foot": "RightFoot-RightToeBase",
 }
-SEVERITIES = (3.0, 5.0, 7.0, 10.0)
 COLUMNS = ("speed", "stance", "step_hurt", "step_sound", "knee_hurt", "knee_sound", "lean_forward")
 
 
-def print_sizes(title: str, healthy: Profile, walks: Mapping[tuple[str, float], Profile]) -> None:
+def print_sizes(title: str, limps: Iterable[Limp]) -> None:
     """The effects of each part and severity: EFFECTS of `hobble.gait.profile`, and these.
 
-    lift: rise of the sound ankle, share of healthy. turn: range of the pelvis' turn, degrees more. sd: root
-    mean square of the 21 features, each divided by its standard deviation over healthy windows of one person.
-    near: `limp_distance` to the nearest real limp of the ten people. The last line: how far parts are apart
-    at 10, in the same unit as `sd`.
+    lift: rise of the sound ankle, share of healthy. turn: range of the pelvis' turn, degrees more. sd:
+    `Limp.strength`. near: `Limp.nearest`.
     """
-    deviation, spread = np.sqrt(np.diag(healthy_covariance())), examples_of_people()[0].std(axis=0)
-    real = np.array(
-        [list(features(p[gait], p[NORMAL]).values()) for p in read_people() for gait in GAITS[1:]]
-    )
     print(f"\n{title}: {', '.join((*COLUMNS, 'lift', 'turn', 'sd', 'near'))}")
-    found: dict[tuple[str, float], Array] = {}
-    for (part, severity), walk in walks.items():
-        effects = measure_effects(walk, healthy)
-        found[part, severity] = limp = np.array(list(features(walk, healthy).values()))
+    for limp in (limp for limp in limps if limp.guarding == USUAL):
+        effects = measure_effects(limp.walk, limp.healthy)
         numbers = [
             *(effects[name] for name in COLUMNS),
-            walk["range ankle_height_L"] / healthy["range ankle_height_L"],
-            walk["range pelvis_turn_left"] - healthy["range pelvis_turn_left"],
-            np.sqrt(np.mean((limp / deviation) ** 2)),
-            np.sqrt((((real - limp) / spread) ** 2).mean(axis=1)).min(),
+            limp.walk["range ankle_height_L"] / limp.healthy["range ankle_height_L"],
+            limp.walk["range pelvis_turn_left"] - limp.healthy["range pelvis_turn_left"],
+            limp.strength,
+            limp.nearest,
         ]
-        print(f"  {part:5} {severity:2.0f} " + " ".join(f"{number:6.2f}" for number in numbers))
-    for a, b in (("hip", "thigh"), ("thigh", "shank"), ("thigh", "foot"), ("shank", "foot")):
-        apart = np.sqrt(np.mean(((found[a, 10.0] - found[b, 10.0]) / deviation) ** 2))
-        print(f"  {a} and {b}: {apart:.1f} apart")
+        print(f"  {limp.part:5} {limp.severity:2.0f} " + " ".join(f"{number:6.2f}" for number in numbers))
+
+
+def print_goals(limps: Mapping[str, Sequence[Limp]], sizes: Sequence[Mapping[str, Any]] = ()) -> None:
+    """The table of goals of limp.json, the features beyond people's, and what tells from people most."""
+    found = judge_limps(limps, sizes)
+    for row in found["goals"]:
+        least, most = row["least"], row["most"]
+        values = ["  ".join(f"{value:.2f}" for value in row[side]) for side in SIDES]
+        print(f"  {row['row']:20} {least!s:>5} to {most!s:5} {' | '.join(values)}  met: {row['met']}")
+    left_out = found["left_out"]
+    print(f"  beyond the means of people, actors and patients; counts from {left_out['by']:.2f} deviations")
+    print(f"  (so many count of the ten people, each beside all others: {left_out['features']})")
+    for row in found["beyond"]:
+        groups, mark = ", ".join(f"{group:.2f}" for group in row["groups"]), " counts" * row["counts"]
+        print(f"    {row['side']:5} {row['feature']}: {row['value']:.2f}, {groups} ({row['by']:+.2f}){mark}")
+    own = np.array([[*numbers(o.walk, o.healthy).values()] for o in between_guardings(limps[RIGHT])])
+    people = np.concatenate(numbers_of_people())
+    away = (own.mean(axis=0) - people.mean(axis=0)) / np.sqrt((own.var(axis=0) + people.var(axis=0)) / 2)
+    names = list(numbers(limps[RIGHT][0].walk, limps[RIGHT][0].healthy))
+    for k in np.argsort(-np.abs(away))[:8]:
+        means = f"{own[:, k].mean():.2f}, people {people[:, k].mean():.2f}"
+        print(f"    differs: {names[k]} {means} ({away[k]:+.1f})")
 
 
 def sizes_of_versions(folder: Path) -> None:
@@ -246,115 +256,28 @@ def sizes_of_versions(folder: Path) -> None:
     source = {"source_frames": len(walk), "source_fps": 60.0}
     generated = walk, label_clip(walk, [], source, "walk", "flat", LabelOptions())[0]
     for clip, labels in (generated, *(read(folder, name) for name in HEALTHY_WALKS)):
-        walks = {}
-        for part, link in PARTS.items():
-            for severity in SEVERITIES:
-                hurt = np.zeros((len(clip), len(skeleton.links)))
-                hurt[:, skeleton.link_names.index(link)] = severity
-                walks[part, severity] = profile_of_walk(measure_clip(hurt_clip(clip, labels, hurt).clip))
-        print_sizes(f"hurt versions of {clip.name}", profile_of_walk(measure_clip(clip)), walks)
+        healthy, limps = profile_of_walk(measure_clip(clip)), []
+        cases = [(severity, USUAL) for severity in SEVERITIES] + [(10.0, guarding) for guarding in GUARDINGS]
+        for (part, link), (severity, guarding) in itertools.product(PARTS.items(), cases):
+            hurt = np.zeros((len(clip), len(skeleton.links)))
+            hurt[:, skeleton.link_names.index(link)] = severity
+            version = hurt_clip(clip, labels, hurt, guarding=guarding).clip
+            limps.append(Limp(part, severity, guarding, profile_of_walk(measure_clip(version)), healthy))
+        print_sizes(f"hurt versions of {clip.name}", limps)
+        print_goals({RIGHT: limps, LEFT: []})
 
 
-def sizes_of_network(file: Path, others: Mapping[str, list[dict[str, float]]]) -> None:
+def sizes_of_network(file: Path) -> None:
+    """The network's walks of 20 s at 1.2 m/s."""
     network = load_network(file)
-    cases = [(part, severity) for part in PARTS for severity in SEVERITIES]
-    injuries = [{}, *({PARTS[part]: severity} for part, severity in cases)]
-    healthy, *hurt = profiles(network, injuries, [0.6] * len(injuries))
-    print_sizes(str(file), healthy, dict(zip(cases, hurt, strict=True)))
-    sides = [{}, *({link: 10.0} for link in PARTS.values())]
-    sides += [{"-".join(other_side(joint) for joint in link.split("-")): 10.0} for link in PARTS.values()]
-    made: list[tuple[str, Profile, Profile]] = []
-    guardings = (0.0, 0.4, 0.6, 0.8, 1.0)
-    walks = profiles(network, sides * 5, np.repeat(guardings, len(sides)).tolist())
-    for i, guarding in enumerate(guardings):
-        healthy, *hurt = walks[i * len(sides) : (i + 1) * len(sides)]
-        pairs = [(walk, healthy) for walk in hurt[:4]]
-        leans = [f"{measure_effects(*pair)['lean_forward']:.1f}" for pair in pairs]
-        print(f"  guarding {guarding:g}: lean forward {', '.join(leans)}")
-        pairs += [(mirror_profile(walk), mirror_profile(healthy)) for walk in hurt[4:]]
-        if 0 < guarding < 1:
-            made += [(part, *pair) for part, pair in zip([*PARTS] * 2, pairs, strict=True)]
-    told_from_people(made)
-    if others:
-        beyond_people(made, others)
-
-
-def profiles(network: Network, injuries: list[dict[str, float]], guarding: list[float]) -> list[Profile]:
-    """The walks of 20 s at 1.2 m/s of figures with these injuries."""
-    bodies = [
-        {"injury": injury, "guarding": {"guarding": each}}
-        for injury, each in zip(injuries, guarding, strict=True)
-    ]
-    figures = walk_figures(network, bodies, "walk", 20.0, Runtime())
-    found = [figure.profile for figure in figures]
-    assert all(found)
-    return found
-
-
-MORE = ("speed", "stride", "step_hurt", "step_sound", "knee_hurt", "knee_sound", "hip_sound")
-
-
-def numbers(walk: Profile, healthy: Profile) -> dict[str, float]:
-    """The 21 features, and 7 effects, of a limp of the right leg."""
-    effects = measure_effects(walk, healthy)
-    return features(walk, healthy) | {name: effects[name] for name in MORE}
-
-
-def real_limps(paths: Iterable[Path]) -> list[dict[str, float]]:
-    """Of each clip with a gait cycle, compared with healthy people. The leg that stands shorter is hurt."""
-    found = []
-    for path in paths:
-        if len(walk := measure_clip(read_clip(path))):
-            limp = profile_of_walk(walk)
-            right = limp["stance_share_R"] <= limp["stance_share_L"]
-            found.append(numbers(limp if right else mirror_profile(limp), healthy_profile([])))
-    return found
-
-
-def beyond_people(
-    made: list[tuple[str, Profile, Profile]], others: Mapping[str, list[dict[str, float]]]
-) -> None:
-    """Print the features whose mean is above or below the mean of the ten people and of all others.
-
-    made: as in `told_from_people`. others: name of a group of people -> what `numbers` says of their limps.
-    """
-    people = [numbers(p[gait], p[NORMAL]) for p in read_people() for gait in GAITS[1:]]
-    own = [numbers(walk, healthy) for _, walk, healthy in made]
-    print(
-        f"  beyond the means of all groups: ten people, {', '.join(others)} (people's deviations from them)"
-    )
-    for name in own[0]:
-        mean, *groups = (np.mean([limp[name] for limp in some]) for some in (own, people, *others.values()))
-        if not min(groups) <= mean <= max(groups):
-            deviation = np.std([limp[name] for limp in people])
-            z = min((mean - group for group in groups), key=abs) / deviation
-            print(f"    {name}: {mean:.2f}, {', '.join(f'{group:.2f}' for group in groups)} ({z:+.2f})")
-
-
-def told_from_people(made: list[tuple[str, Profile, Profile]]) -> None:
-    """How well a classifier tells the character's limps at 10 from those of the ten people.
-
-    made: part of the leg, walk and healthy walk; the right side is hurt. The classifier has the 21 features
-    and 7 effects. Each person and each part of the leg are left out of its training in turn. Prints the area
-    under the curve (.5: cannot tell), and the features in which the two differ most.
-    """
-    people = [(i, numbers(p[gait], p[NORMAL])) for i, p in enumerate(read_people()) for gait in GAITS[1:]]
-    own = [(part, numbers(*pair)) for part, *pair in made]
-    real, hurt = (np.array([list(each.values()) for _, each in some]) for some in (people, own))
-    person, part = (np.array([key for key, _ in some]) for some in (people, own))
-    areas = []
-    for i, left in itertools.product(np.unique(person), PARTS):
-        known = real[person != i], hurt[part != left]
-        judge = learn(np.concatenate(known), ["real"] * len(known[0]) + ["made"] * len(known[1]), SHRINKAGE)
-        of_real, of_made = (
-            np.diff(judge.scores(some))[:, 0] for some in (real[person == i], hurt[part == left])
-        )
-        areas.append(np.mean(of_real[:, None] > of_made))
-    print(f"  told from the ten people: area under the curve {np.mean(areas):.2f}")
-    apart = (hurt.mean(axis=0) - real.mean(axis=0)) / np.sqrt((hurt.var(axis=0) + real.var(axis=0)) / 2)
-    names = list(own[0][1])
-    for k in np.argsort(-np.abs(apart))[:6]:
-        print(f"    {names[k]}: {hurt[:, k].mean():.2f}, people {real[:, k].mean():.2f}")
+    assert network.skeleton is not None
+    links = [link for part in PARTS.values() for link in (part, "-".join(map(other_side, part.split("-"))))]
+    injuries = [{}, *({link: severity} for link in links for severity in SEVERITIES)]
+    crowd = walk_figures(network, [{"injury": injury} for injury in injuries], "walk", 20.0, Runtime())
+    sizes = [{"gait": "walk", **row_of_walk(network.skeleton, figure, crowd[0])} for figure in crowd[1:]]
+    limps = leg_limps(network, crowd, 20.0, Runtime())
+    print_sizes(str(file), limps[RIGHT])
+    print_goals(limps, sizes)
 
 
 def main() -> None:
@@ -367,16 +290,10 @@ def main() -> None:
         "--network", type=Path, metavar="WEIGHTS.npz", help="a network whose limps are measured"
     )
     parser.add_argument("--sizes", action="store_true", help="only the sizes of limps")
-    parser.add_argument("--patients", type=Path, metavar="FOLDER", help="folder of patients' walks, as .bvh")
     options = parser.parse_args()
     sizes_of_versions(options.folder)
     if options.network:
-        others = {}
-        if options.patients:
-            actors = [options.folder / "105_25.bvh", *map(Path, options.clips)]
-            patients = sorted(options.patients.glob("*.bvh"))
-            others = {"actors": real_limps(actors), "patients": real_limps(patients)}
-        sizes_of_network(options.network, others)
+        sizes_of_network(options.network)
     if options.sizes:
         return
     linear = {p: learn(*examples_of_people(rest), shrinkage=SHRINKAGE_OF_PEOPLE) for p, rest in left_out()}

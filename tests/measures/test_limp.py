@@ -11,7 +11,7 @@ import pytest
 from hobble.gait.cycles import CURVES, SCALARS, Cycle, WalkCycles
 from hobble.gait.profile import NORMAL, PROFILE_NAMES, mirror_profile, read_people
 from hobble.measures import limp_run as module
-from hobble.measures.limp import gallery_chart
+from hobble.measures.limp import _goal, gallery_chart
 from hobble.measures.limp_run import SEVERITIES, Walk, measure_limps
 from hobble.measures.walks import spearman
 from hobble.runtime import Runtime
@@ -123,3 +123,20 @@ def test_captured_limps_stand_beside_the_character_with_their_injury(measure, ho
     chart = gallery_chart({"gallery": rows[:1]}, holden31.to_dict())
     assert list(chart.options) == [f"7_1 ({RIGHT_KNEE} 8), from {view}" for view in ("the side", "behind")]
     assert "no captured limp" in gallery_chart({"gallery": []}, {}).text
+
+
+def test_the_goals_are_those_of_people_and_a_character_without_a_limp_misses_them(measure) -> None:
+    """Nobody hurts a hip or foot here, and the network has no guarding, so some rows have no value."""
+
+    def goals(effect) -> dict[str, dict[str, Any]]:
+        return {row["row"]: row for row in measure(effect)["goals"]}
+
+    full = goals(lambda s: 0.1 * s)
+    assert all(full[name]["met"] for name in ("knee_sound", "nearest", "strength_at_10", "named_at_10"))
+    assert full["strength_at_3"]["right"][0] == pytest.approx(
+        0.3 * full["strength_at_10"]["right"][0], rel=0.1
+    )
+    assert (full["apart"]["met"], full["forward_guarding_1"]["met"]) == (None, None)
+    assert _goal(full["knee_sound"])["goal"] == "at most 0.95"
+    none = goals(lambda s: 0.0)
+    assert not any(none[name]["met"] for name in ("knee_sound", "strength_at_3", "named_at_3"))

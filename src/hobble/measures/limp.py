@@ -63,9 +63,18 @@ def section(found: Json, material: ReportMaterial) -> parts.PageSection:
         parts.SectionPart(2, gallery_chart(found, skeleton)),
         parts.SectionPart(3, parts.Paragraph(parts.words("limp.recognisers") + sample_sentence(found))),
         parts.SectionPart(3, say("named", found["named"])),
+        parts.SectionPart(3, say("goals", [_goal(row) for row in found["goals"]])),
         parts.SectionPart(4, say("exam", exam)),
     ]
     return parts.PageSection("injury", content)
+
+
+def _goal(row: Json) -> Json:
+    """A row of the table of goals in words and numbers."""
+    least, most = ("" if row[key] is None else f"{row[key]:g}" for key in ("least", "most"))
+    goal = f"{least} to {most}" if least and most else f"at least {least}" if least else f"at most {most}"
+    values = {side: ", ".join(f"{value:.2f}" for value in row[side]) for side in ("right", "left")}
+    return {"row": parts.words(f"limp.goals.rows.{row['row']}"), "goal": goal, **values, "met": row["met"]}
 
 
 def _injury(hurt: Mapping[str, float]) -> str:

@@ -20,9 +20,11 @@ from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 from hobble.gait import profile
 from hobble.gait.cycles import WalkCycles, join_walks, measure_cycles
+from hobble.gait.judge import Limp
 from hobble.gait.recognise import SIDES, compare_walk, examples_of_people
 from hobble.hurt.effects import part_of_link
 from hobble.measures import walks
+from hobble.measures.limp_goals import GUARDINGS, LEG, USUAL, judge_limps
 from hobble.measures.measure import MeasureInputs, Outcome
 from hobble.measures.sample import HURT_VERSION, ClipPart, clip_parts, sample_to_measure, with_sample
 from hobble.measures.walks import FPS, PHASES, Case, mean_of_known, rounded, share_of_true
@@ -32,11 +34,10 @@ from hobble.rows.clip_rows import ClipRows, captured_stretches, headings
 from hobble.rows.layout import GAITS
 from hobble.runtime import Runtime
 
-INJURY = "injury"  # the channel
+INJURY, GUARDING = "injury", "guarding"  # channels
 NO_CYCLE = "the network's healthy character does not walk a whole cycle"
 SEVERITIES = (3.0, 5.0, 7.0, 10.0)  # of the link that hurts; only one link hurts in a walk
 SPEEDS = {"walk": 2.0, "jog": 7.0}  # target speeds, cm a frame; 2 is 1.2 m/s, a usual walking speed
-LEG = ("hip", "thigh", "shank", "foot")  # parts of the body that belong to a leg
 WARM_UP_FRAMES = 5 * FPS  # frames that are not measured, while figures reach their speed and begin to limp
 RECOGNISED = ("named", "wrong_side")  # keys of a row: shares of its windows
 IN_GALLERY = 6  # captured limps that the report shows beside the character
@@ -180,6 +181,7 @@ def measure_limps(
         for figure in crowd[1:]
     ]
     legs = [row for row in sizes if row["gait"] == "walk" and row["part"] in LEG]
+    limps_of_legs = leg_limps(network, crowds["walk"], seconds, runtime)
     return {
         "configuration": configuration,
         "applies": True,
@@ -189,6 +191,7 @@ def measure_limps(
         "trained": [link for link in links if link in network.trained_labels(INJURY)],
         "sizes": sizes,
         "named": _recognition(legs),
+        **judge_limps(limps_of_legs, sizes),
         "people": {
             gait: {name: [round(v, 5) for v in mean_and_sd] for name, mean_and_sd in of_gait.items()}
             for gait, of_gait in profile.effects_of_people().items()
@@ -210,6 +213,38 @@ def measure_limps(
             for walk in shown
         ],
     }
+
+
+def leg_limps(
+    network: Network, crowd: Sequence[Walk], seconds: float, runtime: Runtime
+) -> dict[str, list[Limp]]:
+    """Side -> the limps of its hip, thigh, shank and foot, as `judge_limps` needs them.
+
+    crowd: the healthy figure, then figures in which one link hurts. Of several links of one part, such as
+    toes, the first counts. The figures with another guarding walk here, if the network has this channel.
+    """
+    assert network.skeleton is not None
+    links: dict[tuple[str, str | None], str] = {}
+    for link in (link for figure in crowd for link in figure.injury):
+        part, side = _part_and_side(network.skeleton, link)
+        if part in LEG:
+            links.setdefault((part, side), link)
+    crowds = {USUAL: crowd}
+    for guarding in GUARDINGS if GUARDING in network.channels else ():
+        injuries = ({}, *({link: SEVERITIES[-1]} for link in links.values()))
+        cases = [{INJURY: injury, GUARDING: {GUARDING: guarding}} for injury in injuries]
+        crowds[guarding] = walk_figures(network, cases, "walk", seconds, runtime)
+    out: dict[str, list[Limp]] = {side: [] for side in SIDES}
+    for guarding, (healthy, *hurt) in crowds.items():
+        for figure in hurt:
+            ((link, severity),) = figure.injury.items()
+            part, side = _part_and_side(network.skeleton, link)
+            if links.get((part, side)) == link and side and figure.profile and healthy.profile:
+                pair = figure.profile, healthy.profile
+                if side == profile.LEFT:
+                    pair = profile.mirror_profile(pair[0]), profile.mirror_profile(pair[1])
+                out[side].append(Limp(part, severity, guarding, *pair))
+    return out
 
 
 def _part_and_side(skeleton: Skeleton, link: str) -> tuple[str, str | None]:
@@ -324,7 +359,7 @@ def run(inputs: MeasureInputs, options: Any) -> Outcome:
         runtime=inputs.runtime,
         seconds=options.limp_seconds,
     )
-    tables = {name: result.get(name, []) for name in ("sizes", "named")}
+    tables = {name: result.get(name, []) for name in ("sizes", "named", "goals")}
     log_line = str(result.get("reason", ""))
     if result["applies"]:
         share = result["named"][-1]["named"]
