@@ -100,6 +100,17 @@ def test_the_sound_leg_carries_the_body_as_soon_as_it_stands(made, hurting, part
     assert limp["range hips_height"] < 0.12
 
 
+@pytest.mark.parametrize("source", SOURCES)
+def test_a_foot_that_does_not_push_off_raises_its_heel_and_does_not_pull_the_hips_down(
+    made, hurting, source
+) -> None:
+    """Otherwise the sound foot lands on a knee that is bent by 60 degrees (people: 13)."""
+    clip, labels, flat = made(source)
+    hurt = hurt_clip(clip, labels, hurting(len(clip), {LEG["foot"]: 10.0}), flat=flat, guarding=0.0).clip
+    rise = [np.ptp(np.percentile(one.root[:, 1], [3, 97])) for one in (clip, hurt)]
+    assert rise[1] < 1.4 * rise[0]
+
+
 def test_a_crouching_figure_that_is_hurt_does_not_sink(holden31, hurting) -> None:
     crouch = walk_from_plan("crouch", holden31, [Segment("crouch", 90, seconds=8)], 480, "flat", 60, 1).clip
     clip, labels, _ = labelled(crouch, "crouch", True)

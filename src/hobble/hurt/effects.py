@@ -62,13 +62,13 @@ def read_profiles() -> dict[str, dict[str, Any]]:
 # Part -> impairment profiles and their weights. Parts that are not here have only ADDED_CHANGES.
 MIXES: dict[str, dict[str, float]] = {
     "pelvis": {"trendelenburg": 0.55, "lurch": 0.25, "antalgic": 0.2},
-    "hip": {"trendelenburg": 0.75, "antalgic": 0.25},
+    "hip": {"trendelenburg": 0.67, "lurch": 0.24, "antalgic": 0.09},
     "thigh": {"antalgic": 0.6, "stiff_legged": 0.4},
     "shank": {"antalgic": 0.8, "stiff_legged": 0.15, "steppage": 0.05},
     "foot": {"antalgic": 0.65, "steppage": 0.35},
 }
 # Part -> factor on the mixed curves of trunk, pelvis and shoulders.
-CURVE_FACTOR: dict[str, float] = {"pelvis": 1.6, "hip": 1.9, "thigh": 1.1, "shank": 1.2, "foot": 0.9}
+CURVE_FACTOR: dict[str, float] = {"pelvis": 1.6, "hip": 1.6, "thigh": 1.1, "shank": 1.2, "foot": 0.9}
 # Part -> changes that the recordings do not show.
 # - Ratios to the healthy clip: speed; stride (time); lift (height of the swinging foot); push and strike
 #   (pitch of the foot while the heel is up and while the toe is up); arm (its swing); back and head
@@ -84,24 +84,24 @@ ADDED_CHANGES: dict[str, dict[str, float]] = {
         "lift_sound": 0.3, "push_sound": 0.75, "list": 2.0,
     },
     "hip": {
-        "speed": 0.66, "stride": 1.2, "turn": 0.8, "push": 0.7, "vault": 0.9, "lift": 0.75,
-        "lift_sound": 0.3, "push_sound": 0.4, "forward": 2.0, "out": 0.02, "off_sound": 0.025,
-        "width": 0.07,
+        "speed": 0.66, "stride": 1.2, "turn": 0.8, "push": 0.7, "vault": 0.2, "lift": 1.0,
+        "crouch": 9.0, "lift_sound": 0.3, "push_sound": 0.4, "out": 0.02, "off_sound": 0.025, "width": 0.07,
+        "vault_sound": 0.5, "arm": 0.75, "arm_sound": 0.85, "forward": 2.0,
     },
     "thigh": {
-        "speed": 0.58, "stride": 1.08, "turn": 0.8, "push": 0.4, "vault": 1.0, "lift": 0.1,
+        "speed": 0.58, "stride": 1.08, "turn": 0.8, "push": 0.4, "vault": 0.7, "crouch": 3.0, "lift": 0.3,
         "lift_sound": 0.3, "push_sound": 0.45, "out": 0.07, "strike": 0.4, "list": 5.0, "toe_out": 8.0,
-        "vault_sound": 0.5,
+        "vault_sound": 0.5, "arm": 0.65, "arm_sound": 0.85, "forward": -2.0,
     },
     "shank": {
-        "speed": 0.62, "stride": 1.04, "turn": 0.8, "push": 0.57, "lift": 0.4, "lift_sound": 0.3,
-        "push_sound": 0.3, "strike": 0.0, "crouch": 26.0, "list": 2.0, "off_sound": 0.04, "width": 0.07,
-        "out": 0.03,
+        "speed": 0.62, "stride": 1.04, "turn": 0.8, "push": 0.57, "lift": 0.6, "lift_sound": 0.2,
+        "push_sound": 0.25, "strike": 0.0, "crouch": 26.0, "list": 2.0, "off_sound": 0.04, "width": 0.07,
+        "out": 0.05, "vault_sound": 0.3, "arm": 0.65, "arm_sound": 0.85, "forward": -3.0,
     },
     "foot": {
-        "speed": 0.66, "stride": 1.06, "turn": 0.8, "push": 0.12, "lift": 0.4, "lift_sound": 0.3,
-        "push_sound": 0.66, "strike": 1.0, "side": 6.0, "toe_out": 18.0, "out": 0.03, "vault": 0.5,
-        "off": -0.06, "width": 0.025,
+        "speed": 0.66, "stride": 1.06, "turn": 0.8, "push": 0.12, "lift": 0.7, "lift_sound": 0.3,
+        "push_sound": 0.66, "strike": 1.0, "side": 8.0, "toe_out": 18.0, "out": 0.03, "crouch": 3.0,
+        "off": -0.06, "width": 0.01, "vault_sound": 0.5, "arm": 0.65, "arm_sound": 0.85, "forward": -3.0,
     },
     "back": {
         "speed": 0.68, "push": 0.6, "push_sound": 0.6, "stride": 1.12, "forward": 17.0, "crouch": 9.0,
@@ -120,8 +120,8 @@ ADDED_CHANGES: dict[str, dict[str, float]] = {
 # degrees (`dip`) as the hurt foot bears weight, elbows bent by 40 to 77 degrees (`guard`), both knees
 # bent, eyes on the ground.
 GUARD_CHANGES: dict[str, float] = {
-    "forward": 29.0, "nod": 10.0, "dip": 16.0, "crouch": 10.0, "crouch_sound": 6.0, "guard": 0.95,
-    "guard_sound": 0.75,
+    "forward": 32.0, "nod": 10.0, "dip": 16.0, "crouch": 10.0, "crouch_sound": 6.0, "guard": 0.85,
+    "guard_sound": 0.8,
 }  # fmt: skip
 # The changes that are ratios.
 RATIOS = (

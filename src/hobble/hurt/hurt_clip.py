@@ -47,6 +47,8 @@ LEVEL_SHARE = 0.97
 
 # A leg takes over the body in the first LOADING of its stance, and hands it over in the last UNLOADING.
 LOADING, UNLOADING = 0.15, 0.4
+# Radians by which a trailing foot rolls over its ball at most, instead of pulling the hips down.
+MOST_ROLL = np.radians(45.0)
 LEAST_LOAD = 0.02  # so that a leg alone carries the body wholly, even as it begins or ends its stance
 
 
@@ -132,15 +134,25 @@ def _assemble(
     ankles = [interpolate_values(feet[side].ankle, timing.leg_frames[:, side]) for side in (LEFT, RIGHT)]
     stands = [interpolate_values(_load(source, side), timing.leg_frames[:, side]) for side in (LEFT, RIGHT)]
     reaches = [_desired_reach(legs[side], changes, source, timing, side) for side in (LEFT, RIGHT)]
-    root[:, 1] = hips_height(root, hips, ankles, reaches, stands, [leg.longest_reach for leg in legs])
+    lengths = [leg.longest_reach for leg in legs]
+    # Where the hips would be if no leg were too short. Behind the body, such a leg raises its heel.
+    free = np.column_stack(
+        [root[:, 0], hips_height(root, hips, ankles, reaches, stands, [9 * x for x in lengths]), root[:, 2]]
+    )
+    balls = [interpolate_values(feet[side].ball, timing.leg_frames[:, side]) for side in (LEFT, RIGHT)]
+    heading = interpolate_rotations(source.heading, timing.path_frames)
+    rolls = [_roll_over(heading, free + hips[i], ankles[i], balls[i], lengths[i]) for i in (LEFT, RIGHT)]
+    ankles = [b + quat.rotate(roll, a - b) for a, b, roll in zip(ankles, balls, rolls, strict=True)]
+    root[:, 1] = hips_height(root, hips, ankles, reaches, stands, lengths)
     for side in (LEFT, RIGHT):
         thigh, knee, heel, toe = (skeleton.role(f"{SIDES[side]}_{r}") for r in ("hip", "knee", "heel", "toe"))
         when = timing.leg_frames[:, side]
         world[:, thigh], world[:, knee] = place_leg(
             skeleton, side, legs[side], when, pelvis, root + hips[side], ankles[side]
         )
-        world[:, heel] = interpolate_rotations(feet[side].rotation, when)
-        world[:, toe] = quat.mul(world[:, heel], interpolate_rotations(feet[side].toe_rotation, when))
+        foot = interpolate_rotations(feet[side].rotation, when)
+        world[:, heel] = quat.mul(rolls[side], foot)
+        world[:, toe] = quat.mul(foot, interpolate_rotations(feet[side].toe_rotation, when))
     return Clip(name, skeleton, clip.fps, local_rotations(skeleton, world), root)
 
 
@@ -156,6 +168,21 @@ def _load(source: HealthyClip, side: int) -> Array:
         ramps = smoothstep(share / LOADING) * smoothstep((1 - share) / UNLOADING)
         load[stance.land : stance.off + 1] = np.maximum(ramps, LEAST_LOAD)
     return gaussian(load, 2.0)
+
+
+def _roll_over(heading: Array, hip: Array, ankle: Array, ball: Array, length: float) -> Array:
+    """(N, 4) world rotation about the ball of a foot behind the hip: its heel rises into the leg's reach.
+
+    heading: (N, 4). hip, ankle, ball: (N, 3) positions in the world, cm. length: of the leg, cm.
+    """
+    across, ahead = (quat.rotate(heading, axis) for axis in np.eye(3)[[0, 2]])
+    angles = np.linspace(0.0, MOST_ROLL, 31)
+    rolls = [quat.from_axis_angle(across, np.full(len(hip), angle)) for angle in angles]
+    away = [np.linalg.norm(ball + quat.rotate(roll, ankle - ball) - hip, axis=1) for roll in rolls]
+    # The least angle at which the leg reaches; if there is none, the one at which it is shortest.
+    least = angles[np.argmax(np.array(away) <= np.maximum(np.min(away, axis=0), length), axis=0)]
+    behind = np.sum((hip - ball) * ahead, axis=1) > 0
+    return quat.from_axis_angle(across, smooth_above(np.where(behind, least, 0.0), 2))
 
 
 def _hip_from_root(source: HealthyClip, world: Array, side: int) -> Array:
