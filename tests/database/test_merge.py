@@ -59,7 +59,8 @@ def test_a_network_without_local_phases_gets_rows_as_if_they_had_none(rows_of, t
     bare = {name: rows_of(name, 40, None, seed=i) for i, name in enumerate("ab")}
     rows = {}
     for name, clip in bare.items():
-        x, y = (np.hstack([v, rng.normal(size=(len(v), n))]) for v, n in ((clip.x, 8), (clip.y, 12)))
+        more = (clip.x, 8 + 3 * clip.layout.joints), (clip.y, 12)
+        x, y = (np.hstack([v, rng.normal(size=(len(v), n))]) for v, n in more)
         rows[name] = replace(clip, x=x, y=y, layout=replace(clip.layout, local_phases=4))
         rows[name].check(name)
         assert rows[name].layout.serves(clip.layout)

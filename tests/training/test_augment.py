@@ -157,7 +157,7 @@ def batch(
     """Rows with one value in every column of the pose, a share of a jog, and a value of the channel."""
     layout = data.layout
     x = torch.full((rows, layout.x_size), 7.0)
-    x[:, x_pose(layout)] = pose
+    x[:, x_pose(layout.blocks("x"))] = pose
     jogs = layout.x_gait.start + 2 * layout.samples
     x[:, jogs : jogs + layout.samples] = jog / float(data.statistics.x_std[jogs])
     x[:, layout.x_channel("injury")] = pose if hurt is None else hurt
@@ -165,7 +165,7 @@ def batch(
 
 
 def test_a_share_of_the_rows_moves_evenly_towards_the_pose_before(data: Database) -> None:
-    others, columns = OtherPoses(data, 0.4, range(ROWS), CPU), np.r_[x_pose(data.layout)]
+    others, columns = OtherPoses(data, 0.4, range(ROWS), CPU), np.r_[x_pose(data.layout.blocks("x"))]
     others.begin_section()
     first, p = batch(data, 0.0, 0.51)
     change(others, first, p)
@@ -208,7 +208,7 @@ def test_the_nearest_phase_is_taken_also_over_the_end_of_the_cycle(data: Databas
         change(others, *batch(data, pose, phase))
     x, p = batch(data, 0.0, 0.01)
     change(others, x, p)
-    assert float(x[:, x_pose(data.layout)].max()) == pytest.approx(20.0, rel=0.02)
+    assert float(x[:, x_pose(data.layout.blocks("x"))].max()) == pytest.approx(20.0, rel=0.02)
 
 
 # Input poses that are moved between a clip and its hurt versions.
@@ -220,7 +220,9 @@ def rows_of(name: str, pose: float, rows: int = 120, seed: int = 1, way: float =
     """Rows of three cycles with one value in every column of the pose, on level ground."""
     made = clip_rows(name, rows, 1, seed)
     x = made.x.copy()
-    x[:, x_pose(made.layout)] = pose  # joints come before the terrain, so the columns are the same with it
+    x[:, x_pose(made.layout.blocks("x"))] = (
+        pose  # joints come before the terrain, so the columns are the same with it
+    )
     for block in (made.layout.x_direction, made.layout.x_gait):
         x[:, block] = way
     return replace(made, x=x, mean=0 * made.mean)
@@ -276,7 +278,7 @@ def test_poses_of_a_clip_and_its_version_move_evenly_to_both_sides(healthy_and_h
 
 def test_only_the_pose_moves_and_only_in_a_share_of_the_rows(healthy_and_hurt: Database) -> None:
     block, x = mixed(healthy_and_hurt, 0.25)
-    columns = np.r_[x_pose(healthy_and_hurt.layout)]
+    columns = np.r_[x_pose(healthy_and_hurt.layout.blocks("x"))]
     assert np.array_equal(np.delete(x, columns, axis=1), np.delete(block.x, columns, axis=1))
     of_family = np.array(healthy_and_hurt.clips)[block.clip] != "jog"
     changed = (x != block.x).any(axis=1)
@@ -287,7 +289,7 @@ def test_a_row_gets_the_pose_of_its_own_phase(tmp_path: Path) -> None:
     """The healthy pose tells its phase, so a hurt row that moves all the way shows the phase that it took."""
     healthy, hurt = rows_of("walk", 0.0), rows_of("walk_hurt1", 50.0)
     x = healthy.x.copy()
-    x[:, x_pose(healthy.layout)] = 10 * healthy.p[:, None]
+    x[:, x_pose(healthy.layout.blocks("x"))] = 10 * healthy.p[:, None]
     data = database(tmp_path / "database", {"walk": replace(healthy, x=x), "walk_hurt1": hurt})
     block, moved = mixed(data)
     found = poses(data, moved)[:, 0]
@@ -365,7 +367,7 @@ def test_poses_carry_the_same_errors_as_a_roll_out(data: Database) -> None:
     carried = RollOut(data, 2 * STARTS, range(STARTS), CPU)
     carried.begin_section()
     whole = slice(FRAMES, None)  # places whose roll-out does not end meanwhile
-    pose = x_pose(layout)
+    pose = x_pose(layout.blocks("x"))
     for age in range(FRAMES):
         at = starts + age
         added = torch.zeros(STARTS, layout.x_size)

@@ -168,9 +168,14 @@ def x_groups(layout: RowLayout) -> list[slice]:
         for block in (layout.x_position, layout.x_direction)
         for start in (block.start, block.start + half)
     ]
-    joints = layout.x_joint_position, layout.x_joint_velocity
     local = [layout.x_local_phase] if layout.local_phases else []
-    return [*split, layout.x_gait, *joints, layout.x_terrain, *local]
+    return [*split, layout.x_gait, *x_joint_blocks(layout), layout.x_terrain, *local]
+
+
+def x_joint_blocks(layout: RowLayout) -> list[slice]:
+    """The blocks of X with three columns for each joint."""
+    turns = [layout.x_joint_rotation] if layout.local_phases else []
+    return [layout.x_joint_position, layout.x_joint_velocity, *turns]
 
 
 def share_in_groups(std: Array, groups: Iterable[slice], constant: float) -> Array:
@@ -198,7 +203,7 @@ def statistics_of_moments(
     """
     x_std = share_in_groups(x.std, x_groups(layout), SILENCING_STD)
     w = np.where(np.isin(list(skeleton["joints"]), skeleton.get("unseen", ())), UNSEEN, 1.0)
-    for block in (layout.x_joint_position, layout.x_joint_velocity):
+    for block in x_joint_blocks(layout):
         # At most 1e30, so that the value stays finite in float32.
         x_std[block] = np.minimum(x_std[block] / np.repeat(w * joint_weight, 3), 1e30)
     for name, _ in layout.channels:

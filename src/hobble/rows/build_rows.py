@@ -64,11 +64,7 @@ def build_clip_rows(
     )
     frame, cycle = cycle_frames(labels["cycles"])
     _check(name, clip, labels, channels, terrain, frame)
-    x, y = _body_columns(clip, labels, layout, frame, root_frames(clip, facing_sigma))
-    if local_phases:
-        vectors, change = local_phases
-        x.append(vectors[frame])
-        y += [vectors[frame + 1], change[frame]]
+    x, y = _body_columns(clip, labels, layout, frame, root_frames(clip, facing_sigma), local_phases)
     # Ground heights come in three groups, left of the path, on it and right of it. Each has all samples.
     heights_on_path = terrain["heights"][:, layout.samples : 2 * layout.samples]
     mean = heights_on_path.mean(axis=1, dtype=np.float64)
@@ -90,7 +86,12 @@ def build_clip_rows(
 
 
 def _body_columns(
-    clip: Clip, labels: Arrays, layout: RowLayout, frame: np.ndarray, root: RootFrames
+    clip: Clip,
+    labels: Arrays,
+    layout: RowLayout,
+    frame: np.ndarray,
+    root: RootFrames,
+    local_phases: tuple[Array, Array] | None,
 ) -> tuple[list[Array], list[Array]]:
     """The blocks of X without terrain and channels, and the blocks of Y, both in column order.
 
@@ -115,6 +116,10 @@ def _body_columns(
         velocity[frame],
         rotation[frame],
     ]
+    if local_phases:
+        vectors, change = local_phases
+        x += [vectors[frame], rotation[frame - 1]]
+        y += [vectors[frame + 1], change[frame]]
     return x, y
 
 

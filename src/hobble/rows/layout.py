@@ -59,8 +59,9 @@ class RowLayout:
 
     joints: number of joints. window: frames of the trajectory before and after the present frame. step:
     frames between two samples of the trajectory. channels: (name, number of columns) of each channel.
-    local_phases: number of parts of the body with a phase of their own (`hobble.labels.local_phase`). In X,
-    the blocks of BODY come first, then the local phases, then the channels.
+    local_phases: number of parts of the body with a phase of their own (`hobble.labels.local_phase`). Rows
+    with local phases have the rotations of the joints in X, too. In X, the blocks of BODY come first, then
+    the local phases, then the rotations, then the channels.
 
     With 31 joints, window 60 and step 10, X has 342 columns and Y has 311. With a channel of 30 columns, X
     has 372. Joint blocks hold x, y, z of joint 0, then of joint 1, and so on. Trajectory blocks hold x of
@@ -87,8 +88,8 @@ class RowLayout:
     def with_channels(self, names: Iterable[str], local_phases: bool = True) -> RowLayout:
         """The layout with only the channels `names`, in the order of `names`.
 
-        local_phases: whether the local phases stay. They are the last columns of Y, and in X the last ones
-        before the channels. Raises KeyError if the layout does not have one of these channels.
+        local_phases: whether the local phases, and the rotations in X, stay. They are the last columns of Y,
+        and in X the last ones before the channels. Raises KeyError if the layout lacks one of these channels.
         """
         size = dict(self.channels)
         kept = self.local_phases if local_phases else 0
@@ -121,7 +122,10 @@ class RowLayout:
         each, joints = self.samples, 3 * self.joints
         columns = (2 * each, 2 * each, len(GAITS) * each, joints, joints, 3 * each)
         sizes = dict(zip(BODY, columns, strict=True))
-        return _side_by_side(sizes | {LOCAL: 2 * self.local_phases} | dict(self.channels))
+        turns = joints if self.local_phases else 0
+        return _side_by_side(
+            sizes | {LOCAL: 2 * self.local_phases, "joint_rotation": turns} | dict(self.channels)
+        )
 
     # Trajectory positions, x then z, in the root coordinates of the row's frame, cm.
     x_position = _Block()
@@ -139,6 +143,8 @@ class RowLayout:
 
     # Local phases now: cosine and sine times the amplitude, of each part of the body.
     x_local_phase = _Block()
+    # Joint rotations of the previous frame in its root coordinates, as in Y; only beside local phases.
+    x_joint_rotation = _Block()
 
     def x_channel(self, name: str) -> slice:
         """The columns of a channel. Raises KeyError if there is no such channel."""
@@ -352,6 +358,7 @@ def mirror_of_x(layout: RowLayout, skeleton: Skeleton) -> ColumnMirror:
     collected.joints(POINT, layout.x_joint_position, layout.x_joint_velocity)
     collected.swap(layout.x_terrain, np.arange(len(SIDES))[::-1])
     collected.parts(layout.x_local_phase)
+    collected.joints(ROTATION, layout.x_joint_rotation)
     for name, columns in layout.channels:
         # Mirrors the numbers of the columns, which shows from which column each one is taken.
         swapped = channel(name).mirror(np.arange(columns, dtype=float)[None], skeleton)[0]
@@ -388,11 +395,12 @@ class _Columns:
     def joints(self, signs: tuple[int, int, int], *blocks: slice) -> None:
         """Mirror blocks that have x, y, z of every joint.
 
-        Left and right joints swap, and x, y, z are multiplied by `signs`.
+        Left and right joints swap, and x, y, z are multiplied by `signs`. A block may be empty.
         """
         for block in blocks:
-            self.swap(block, self.mirror_joints)
-            self.sign[block] = np.tile(signs, len(self.mirror_joints))
+            if block.stop > block.start:
+                self.swap(block, self.mirror_joints)
+                self.sign[block] = np.tile(signs, len(self.mirror_joints))
 
     def parts(self, block: slice) -> None:
         """Mirror a block of local phases, which may be empty: the parts of the body swap."""

@@ -5,6 +5,7 @@ Each way to change them is an `Augmentation`. `augmentations` makes those that a
 
 import math
 from abc import ABC, abstractmethod
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -68,9 +69,13 @@ def augmentations(
     return [kind(database, amount, places, device) for kind, amount, is_asked in asked if is_asked]
 
 
-def x_pose(layout: RowLayout) -> slice:
-    """The columns of the pose in X: positions, then velocities of the joints."""
-    return slice(layout.x_joint_position.start, layout.x_joint_velocity.stop)
+def x_pose(blocks: Mapping[str, slice]) -> np.ndarray:
+    """The columns of the pose in X: positions, then velocities, then any rotations of the joints.
+
+    blocks: name -> columns, from `RowLayout.blocks` or `blocks_without_terrain`.
+    """
+    names = ("joint_position", "joint_velocity", "joint_rotation")
+    return np.concatenate([np.r_[blocks[name]] for name in names if name in blocks])
 
 
 def channel_columns(layout: RowLayout, device: torch.device) -> Tensor:
@@ -172,8 +177,10 @@ class OtherPaces(Augmentation):
         is multiplied, too.
         """
         layout = self.layout
-        before, now = x[:, layout.x_joint_position], y[:, layout.y_joint_position]
-        before += (1 - pace) * (now - before)
+        moved = [(layout.x_joint_position, layout.y_joint_position)]
+        moved += [(layout.x_joint_rotation, layout.y_joint_rotation)] if layout.local_phases else []
+        for of_x, of_y in moved:
+            x[:, of_x] += (1 - pace) * (y[:, of_y] - x[:, of_x])
         x[:, layout.x_joint_velocity] *= pace
         for block in (layout.y_root_velocity, layout.y_turn, layout.y_phase_change, layout.y_joint_velocity):
             y[:, block] *= pace
@@ -241,7 +248,7 @@ class OtherPoses(Augmentation):
     def __init__(self, database: Database, share: float, places: range, device: torch.device) -> None:
         super().__init__(places, device)
         layout = database.layout
-        self.share, self.pose = share, x_pose(layout)
+        self.share, self.pose = share, x_pose(layout.blocks("x"))
         # Columns of X: the share of each gait in the present frame, and the channels.
         first = layout.x_gait.start + layout.samples // 2
         self.gait_columns = first + layout.samples * torch.arange(len(GAITS), device=device)
@@ -249,7 +256,7 @@ class OtherPoses(Augmentation):
         self.gait_std = std[self.gait_columns]
         self.channel_columns = channel_columns(layout, device)
         # The remembered rows of each place. A new row replaces the oldest one.
-        sizes = (6 * layout.joints, len(GAITS), len(self.channel_columns))
+        sizes = (len(self.pose), len(GAITS), len(self.channel_columns))
         self.poses, self.gaits, self.channels = (
             torch.zeros(len(places), REMEMBERED_ROWS, size, device=device) for size in sizes
         )
@@ -334,7 +341,7 @@ class VersionPoses(Augmentation):
         # Clips without hurt versions have a negative key.
         self.own_key = np.where(family < 0, -2.0, 2.0 * (family + len(names) * hurt))
         self.other_key = np.where(family < 0, -2.0, 2.0 * (family + len(names) * ~hurt))
-        self.pose, self.direction = x_pose(layout), layout.x_direction
+        self.pose, self.direction = x_pose(layout.blocks("x")), layout.x_direction
         key, poses, directions = _pose_table(database, self.own_key)
         self.key = torch.from_numpy(key).to(device)
         self.poses, self.directions = (torch.from_numpy(array).to(device) for array in (poses, directions))
@@ -359,7 +366,8 @@ class VersionPoses(Augmentation):
         smallest, chosen = torch.where(is_near, path_difference, torch.inf).min(dim=1)
         factor = torch.where(smallest < torch.inf, factors[moved], 0.0).to(x.dtype)
         other_pose = self.poses[candidates.gather(1, chosen[:, None])[:, 0]]
-        x[moved, self.pose] = torch.lerp(x[moved, self.pose], other_pose, factor[:, None])
+        columns = moved[:, None], self.pose
+        x[columns] = torch.lerp(x[columns], other_pose, factor[:, None])
 
 
 def _pose_table(database: Database, clip_keys: Array) -> tuple[Array, Array, Array]:
@@ -372,7 +380,7 @@ def _pose_table(database: Database, clip_keys: Array) -> tuple[Array, Array, Arr
     """
     blocks = blocks_without_terrain(database.layout)
     std = np.delete(database.statistics.x_std, database.layout.x_terrain)
-    pose_columns = np.r_[blocks["joint_position"], blocks["joint_velocity"]]
+    pose_columns = x_pose(blocks)
     row_bytes = 4 * len(np.r_[pose_columns, blocks["direction"]])  # float32
     row_step = max(1, math.ceil(row_bytes * database.row_count(TRAIN) / TABLE_BYTES))
     parts = []
@@ -396,7 +404,8 @@ class RollOut(Augmentation):
     At run time a joint's next position is the mean of two: the predicted position, and the old position plus
     the predicted velocity. Let d be the present error of the joint's position, and p and v the errors of the
     predicted position and velocity. In the next frame the joint's position is off by (d + v + p) / 2, and its
-    velocity by v. (The turn of the root between the frames, a few hundredths of a radian, is ignored.)
+    velocity by v. So is a rotation by the error of the predicted one, if X has rotations. (The turn of the
+    root between the frames, a few hundredths of a radian, is ignored.)
 
     Each place in a batch carries its errors to the same place in the next batch. There the row is usually of
     another clip, because rows are shuffled. The errors still have a realistic size and pattern over the
@@ -409,21 +418,22 @@ class RollOut(Augmentation):
     def __init__(self, database: Database, frames: int, places: range, device: torch.device) -> None:
         super().__init__(places, device)
         layout, s = database.layout, database.statistics
-        self.frames, self.pose = frames, x_pose(layout)
-        self.y_position, self.y_velocity = layout.y_joint_position, layout.y_joint_velocity
-        x_position, x_velocity = layout.x_joint_position, layout.x_joint_velocity
+        self.frames, self.pose = frames, x_pose(layout.blocks("x"))
+        self.joints = 3 * layout.joints
+        self.y_blocks = layout.y_joint_position, layout.y_joint_velocity, layout.y_joint_rotation
+        pairs = [
+            (layout.x_joint_position, layout.y_joint_position),
+            (layout.x_joint_position, layout.y_joint_velocity),
+            (layout.x_joint_velocity, layout.y_joint_velocity),
+        ]
+        pairs += [(layout.x_joint_rotation, layout.y_joint_rotation)] if layout.local_phases else []
         # Factors that turn errors in standardised Y into errors in standardised X. For example,
         # `position_of_velocity` is for the error that a velocity in Y causes in a position in X.
-        self.position_of_position, self.position_of_velocity, self.velocity_of_velocity = (
-            torch.from_numpy(s.y_std[of_y] / s.x_std[of_x]).to(device, torch.float32)
-            for of_x, of_y in (
-                (x_position, self.y_position),
-                (x_position, self.y_velocity),
-                (x_velocity, self.y_velocity),
-            )
+        self.position_of_position, self.position_of_velocity, *self.of_themselves = (
+            torch.from_numpy(s.y_std[of_y] / s.x_std[of_x]).to(device, torch.float32) for of_x, of_y in pairs
         )
         # The present errors of the pose in standardised X, for each place in the batch.
-        self.errors = torch.zeros(len(places), 6 * layout.joints, device=device)
+        self.errors = torch.zeros(len(places), len(self.pose), device=device)
 
     def begin_section(self) -> None:
         """As in `Augmentation`."""
@@ -437,10 +447,11 @@ class RollOut(Augmentation):
     def after(self, error: Tensor) -> None:
         """As in `Augmentation`: advance the errors by a frame."""
         super().after(error)
-        before, _ = self.errors[: len(error)].chunk(2, dim=1)
-        position, velocity = error[:, self.y_position], error[:, self.y_velocity]
-        added = position * self.position_of_position + velocity * self.position_of_velocity
+        before = self.errors[: len(error), : self.joints]
+        position, *others = (error[:, block] for block in self.y_blocks)
+        added = position * self.position_of_position + others[0] * self.position_of_velocity
         now = joint_place(before, added)  # (d + p + v) / 2
-        self.errors[: len(error)] = torch.cat([now, velocity * self.velocity_of_velocity], dim=1)
+        taken = [e * factor for e, factor in zip(others, self.of_themselves, strict=False)]
+        self.errors[: len(error)] = torch.cat([now, *taken], dim=1)
         # After each batch, the roll-outs of every `frames`-th place end, so that not all end at once.
         self.errors[(self.batches - self.places.start) % self.frames :: self.frames] = 0

@@ -102,7 +102,7 @@ enum { I32 = 1, F32 = 2, F64 = 3, I16 = 4, U8 = 5 };
 enum { HEADER = 64, ENTRY = 40, NAME = 16 };
 
 /* The values of the section "sizes". EXTRA: 2 if the first layer gets sine and cosine of the phase after X,
-   else 0. LATENT: of a gated network, the number of local phases, see `carry_phases`. */
+   else 0. LATENT: of a gated network, the number of local phases, see `remember`. */
 enum {
     JOINTS,
     WINDOW,
@@ -174,7 +174,7 @@ typedef struct { /* a character file, read only */
     channel channels[MOST_CHANNELS];
     stack network, gate;
     const int32_t *gate_columns;
-    const double *start_phases; /* local phases of a character that starts */
+    const double *remembered; /* local phases and rotations of a character that starts */
     /* Motion matching: the Y and the features of each recorded frame, and how many frames of its run follow.
      */
     const void *frames;
@@ -374,7 +374,7 @@ static void read_sizes(reader *r, model *m) {
     m->y_direction = 8 + 2 * m->future;
     m->y_joints = 8 + 4 * m->future;
     int local = form == GATED ? m->size[LATENT] : 0;
-    require(r, m->size[X_SIZE] == m->samples * (7 + GAITS) + 6 * joints + 2 * local + m->size[COLUMNS],
+    require(r, m->size[X_SIZE] == m->samples * (7 + GAITS) + joints * (local ? 9 : 6) + 2 * local + m->size[COLUMNS],
             "sizes");
     require(r, m->size[Y_SIZE] == m->y_joints + 9 * joints + 3 * local, "sizes");
     require(r, form == RECORDED ? m->size[ROWS] > 0 && m->size[EVERY] > 0 : m->size[LAYERS] > 0, "sizes");
@@ -520,6 +520,11 @@ static void read_learned(reader *r, model *m) {
     m->feature_high = floats(r, "feature_high", count, 1e15f);
 }
 
+/* Of a network with local phases: how many numbers it remembers of a character's last frame. */
+static int remembered_count(const model *m) {
+    return 2 * m->size[LATENT] + 3 * m->size[JOINTS];
+}
+
 static int name_count(const model *m) {
     return m->size[JOINTS] + GAITS + m->size[CHANNELS] + 2 * m->size[COLUMNS];
 }
@@ -577,8 +582,8 @@ static int read_model(const void *file, size_t bytes, model *m, char *why) {
         m->gate.storage = FLOAT32;
         m->gate_columns = indices(&r, "gate_columns", (uint64_t)m->size[GATE_INPUTS], 0, m->size[INPUTS] - 1);
         if (m->size[LATENT]) {
-            m->start_phases = doubles(&r, "start_phases", 2 * (uint64_t)m->size[LATENT], -1e6, 1e6);
-            require(&r, m->x_first[X_TERRAIN] + 3 * m->samples + 2 * m->size[LATENT] <= m->size[X_SIZE],
+            m->remembered = doubles(&r, "remembered", (uint64_t)remembered_count(m), -1e6, 1e6);
+            require(&r, m->x_first[X_TERRAIN] + 3 * m->samples + remembered_count(m) <= m->size[X_SIZE],
                     "x_first");
         }
         read_stack(&r, &m->gate, gate, m->size[GATE_INPUTS], m->size[SETS]);
@@ -932,19 +937,19 @@ static void softmax(float *logits, int count) {
 }
 
 /* Local phases: each foot and hand has a phase of its own, a vector, which the network predicts with the
-   pose. memory: ROW, which is 1 once the character was shown, then the vectors (LATENT, 2).
-   models/local/predictor.py explains it. Writes the vectors into the input row x. */
-static void write_phases(const model *m, double *memory, float *x) {
+   pose. memory: ROW, which is 1 once the character was shown, then the vectors (LATENT, 2) and the rotations
+   (JOINTS, 3) that were predicted. models/local/predictor.py explains it. Writes both into the input row x. */
+static void write_remembered(const model *m, double *memory, float *x) {
     float *at = x + m->x_first[X_TERRAIN] + 3 * m->samples;
-    for (int i = 0; i < 2 * m->size[LATENT]; i++) {
-        if (memory[ROW] != 1) memory[ROW + 1 + i] = m->start_phases[i];
+    for (int i = 0; i < remembered_count(m); i++) {
+        if (memory[ROW] != 1) memory[ROW + 1 + i] = m->remembered[i];
         at[i] = (float)memory[ROW + 1 + i];
     }
     memory[ROW] = 1;
 }
 
-/* The local phases of the next frame, from the prediction y. */
-static void carry_phases(const model *m, double *memory, const float *y) {
+/* The local phases of the next frame, from the prediction y, and its rotations. */
+static void remember(const model *m, double *memory, const float *y) {
     int count = m->size[LATENT];
     const float *predicted = y + m->y_joints + 9 * m->size[JOINTS], *change = predicted + 2 * count;
     for (int i = 0; i < count; i++) {
@@ -957,6 +962,8 @@ static void carry_phases(const model *m, double *memory, const float *y) {
         vector[0] = factor > 0 ? mean_x * factor : x;
         vector[1] = factor > 0 ? mean_z * factor : z;
     }
+    for (int i = 0; i < 3 * m->size[JOINTS]; i++)
+        memory[ROW + 1 + 2 * count + i] = y[m->y_joints + 6 * m->size[JOINTS] + i];
 }
 
 /* Standardises the columns of X that the network reads, and writes Y of all characters. */
@@ -967,7 +974,7 @@ static void predict_blend(hobble *h) {
     for (int c = 0; c < h->characters; c++) {
         float *x = h->x + (size_t)c * (size_t)m->size[X_SIZE];
         float *z = h->z + (size_t)c * (inputs + extra);
-        if (local) write_phases(m, h->state[c].memory, x);
+        if (local) write_remembered(m, h->state[c].memory, x);
         for (size_t i = 0; i < inputs; i++) z[i] = (x[m->inputs[i]] - m->x_mean[i]) * m->x_inverse[i];
         if (extra) {
             z[inputs] = (float)sin(2 * PI * h->state[c].phase);
@@ -990,7 +997,7 @@ static void predict_blend(hobble *h) {
     }
     run_stack(h, &m->network, h->shares, h->z, h->y);
     for (int c = 0; local && c < h->characters; c++)
-        carry_phases(m, h->state[c].memory, h->y + (size_t)c * (size_t)m->size[Y_SIZE]);
+        remember(m, h->state[c].memory, h->y + (size_t)c * (size_t)m->size[Y_SIZE]);
 }
 
 /* ---- 4. Motion matching ----------------------------------------------------------------------------------
@@ -2319,7 +2326,7 @@ static void distribute(hobble *h, arena *a) {
         h->widest = widest > h->widest ? widest : h->widest;
     }
     h->memory_size = plays ? OFFSETS + (int)state + OFFSETS_PER_JOINT * m->size[JOINTS]
-                     : m->size[FORM] == GATED && m->size[LATENT] ? ROW + 1 + 2 * m->size[LATENT]
+                     : m->size[FORM] == GATED && m->size[LATENT] ? ROW + 1 + remembered_count(m)
                                                                  : 0;
     h->number_count = lay_out(h, &one, NULL);
     h->names = take(a, (uint64_t)name_count(m), sizeof *h->names);

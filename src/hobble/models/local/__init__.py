@@ -2,12 +2,13 @@
 
 Each foot and hand has a phase of its own (`hobble.labels.local_phase`), so that motion without a gait cycle
 can be learned. The network predicts the phases of the next frame with the pose. The gate gets the phases
-alone, and where the character is to go.
+alone, and where the character is to go. As in the publication, the inputs have the joints' rotations, too.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, ClassVar, Literal
 
 import numpy as np
@@ -48,8 +49,8 @@ OPTIONS = LocalOptions
 class Local(Mann):
     """A network of K experts, gated by local phases.
 
-    At run time a character remembers its local phases. The network's inputs of them are taken from there, and
-    not from X.
+    At run time a character remembers its local phases and the predicted rotations of its joints. The
+    network's inputs of them are taken from there, and not from X.
     """
 
     kind: ClassVar[str] = "local"
@@ -58,13 +59,18 @@ class Local(Mann):
     @property
     def memory_size(self) -> int:
         """As in `Network`: see `hobble.models.local.predictor`."""
-        return 1 + 2 * self.layout.local_phases
+        return 1 + len(self.start)
+
+    @cached_property
+    def remembered(self) -> slice:
+        """The columns of X that a character remembers: the local phases, then the rotations of its joints."""
+        return slice(self.layout.x_local_phase.start, self.layout.x_joint_rotation.stop)
 
     @property
     def start(self) -> Array:
-        """(2 * parts,) the local phases of a character that starts."""
+        """What a character remembers when it starts."""
         facts = self.training_facts
-        return (self.x_mean if facts is None else facts.start_x)[self.layout.x_local_phase].astype(float)
+        return (self.x_mean if facts is None else facts.start_x)[self.remembered].astype(float)
 
     def prepared(self, mode: str, storage: str) -> LocalPredictor:
         """As in `Network`."""
@@ -77,4 +83,4 @@ class Local(Mann):
     ) -> tuple[dict[str, int], dict[str, np.ndarray]]:
         """As in `Network`."""
         sizes, sections = super().engine_data(mode, storage, inputs)
-        return sizes | {"latent": self.layout.local_phases}, sections | {"start_phases": self.start}
+        return sizes | {"latent": self.layout.local_phases}, sections | {"remembered": self.start}

@@ -1,4 +1,4 @@
-"""Runs a network gated by local phases, and carries each character's local phases from frame to frame."""
+"""Runs a network gated by local phases, and carries what each character remembers from frame to frame."""
 
 from typing import Any
 
@@ -7,18 +7,18 @@ import numpy as np
 from hobble.core.quat import Array
 from hobble.models.predict import BlendPredictor
 
-SHOWN = 0  # index in a character's memory: 1 once it was shown. Its local phases follow.
+SHOWN = 0  # index in a character's memory: 1 once it was shown. See `Local.remembered` for what follows.
 
 
 class LocalPredictor(BlendPredictor):
-    """A `Predictor` that carries each character's local phases from frame to frame."""
+    """A `Predictor` that carries each character's local phases and rotations from frame to frame."""
 
     network: Any  # a `Local`
 
     def evaluate(self, z: Array, phase: Array, out: Array, memory: Array | None = None) -> None:
-        """As in `Predictor`. memory: (C, M) float64. With None, the local phases are those in z."""
+        """As in `Predictor`. memory: (C, M) float64. With None, what it has is that in z."""
         network, layout = self.network, self.network.layout
-        at = layout.x_local_phase
+        at = network.remembered
         if memory is None:
             super().evaluate(z, phase, out)
             return
@@ -27,7 +27,9 @@ class LocalPredictor(BlendPredictor):
         before = memory[:, 1:]
         z[:, at] = (before.astype(np.float32) - self._x_mean[at]) * self._x_inverse[at]
         super().evaluate(z, phase, out)
-        memory[:, 1:] = next_phases(before, out[:, layout.y_local_phase], out[:, layout.y_local_change])
+        vectors, change = out[:, layout.y_local_phase], out[:, layout.y_local_change]
+        phases = next_phases(before[:, : vectors.shape[1]], vectors, change)
+        memory[:, 1:] = np.concatenate([phases, out[:, layout.y_joint_rotation]], axis=1)
         memory[:, SHOWN] = 1
 
 
