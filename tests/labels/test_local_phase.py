@@ -1,17 +1,20 @@
 """Local phases of feet and hands, the frames between gait cycles, and what a network makes of both."""
 
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from hobble.core.clip import Clip
+from hobble.core.skeleton import Skeleton
 from hobble.labels import LabelOptions
 from hobble.labels.label import label_clip, mirror_labels
 from hobble.labels.local_phase import MIRRORED_PARTS, local_phases
 from hobble.models.local.predictor import next_phases
 from hobble.motion.edit import mirror_clip
 from hobble.rows.build_rows import cycle_frames
+from tests.engine.networks import network_of
 
 MOTION = {"source_frames": 600, "source_fps": 60.0}
 
@@ -71,3 +74,18 @@ def test_the_network_carries_phases_without_losing_their_length() -> None:
     expected = weights @ np.array([late + lag, late]) / weights.sum()
     np.testing.assert_allclose(np.arctan2(after[1], after[0]), expected, atol=1e-4)
     assert not after[2:].any(), "a part that rests stays at rest"
+
+
+def test_a_character_remembers_the_rotations_that_were_predicted(holden31: Skeleton, tmp_path: Path) -> None:
+    """The second frame is that of a network whose X has the rotations of the first, whatever X has."""
+    network = network_of("local", holden31, tmp_path)
+    layout, predictor = network.layout, network.predictor(storage="float32")
+    x = np.random.default_rng(4).normal(0, 3, (2, layout.x_size)).astype(np.float32)
+    memory, phase = np.zeros((2, network.memory_size)), np.zeros(2)
+    first = predictor.predict(x, phase, memory=memory).copy()
+    kept = memory[:, 1:].copy()
+    second = predictor.predict(x, phase, memory=memory)
+    x[:, layout.x_local_phase] = kept[:, : 2 * layout.local_phases]
+    x[:, layout.x_joint_rotation] = first[:, layout.y_joint_rotation]
+    np.testing.assert_allclose(second, network.predict(x, phase), atol=1e-3)
+    assert np.abs(second - first).max() > 0.1

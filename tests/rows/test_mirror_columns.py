@@ -12,7 +12,7 @@ from hobble.labels.local_phase import local_phases
 from hobble.motion.edit import mirror_clip
 from hobble.rows.build_rows import build_clip_rows
 from hobble.rows.clip_rows import ClipRows, Pairs, pair_batches
-from hobble.rows.layout import ColumnMirror, RowLayout, mirror_of_x, mirror_of_y
+from hobble.rows.layout import ColumnMirror, RowLayout, blocks_without_terrain, mirror_of_x, mirror_of_y
 from hobble.synthetic.generate_clip import walk_from_plan
 from hobble.synthetic.plan import Segment
 from hobble.terrain.clip_fits import cycle_frames
@@ -48,6 +48,13 @@ def walked(holden31: Skeleton) -> tuple[ClipRows, ClipRows]:
     there["heights"] = np.concatenate([right, centre, left], axis=1)
     phases = local_phases(image, other.contacts)
     return own, build_clip_rows("image", image, vars(other), turned, there, local_phases=phases, **OPTIONS)
+
+
+def test_x_has_the_rotations_of_the_frame_before(walked: tuple[ClipRows, ClipRows]) -> None:
+    rows, layout = walked[0], walked[0].layout
+    follows = np.flatnonzero(np.diff(rows.frame) == 1)
+    before = rows.x[:, blocks_without_terrain(layout)["joint_rotation"]][follows + 1]
+    np.testing.assert_array_equal(before, rows.y[:, layout.y_joint_rotation][follows])
 
 
 def in_both(own: ClipRows, other: ClipRows) -> tuple[Pairs, Pairs, np.ndarray, np.ndarray]:
