@@ -82,7 +82,7 @@ def test_strafing_follows_from_velocity_and_facing(
 ) -> None:
     position, direction, gait = path(1.0)
     velocity, target = np.array([[3.0, 1.0]]), np.array([[1.0, 0.0]])
-    smoothed = velocity, target, np.array([strafe]), np.zeros((1, 2))
+    smoothed = velocity, target, np.array([strafe]), np.zeros((1, 2)), np.zeros((1, 2))
     trajectory.blend_future(smoothed, (position, direction, gait))
     t = np.arange(1, MIDDLE) / MIDDLE
     share = 1 - (1 - t) ** position_bias
@@ -99,9 +99,10 @@ def follow(target, facing, steering: float, frames: int = 1, speed: float = 1.5,
     position, heading, gait = path(speed)
     velocity, direction = np.zeros((1, 2)), np.array([[0.0, 1.0]])
     correction = np.zeros((1, 2)) if correction is None else np.array([correction], float)
+    earlier = np.array([target], float)
     for _ in range(frames):
         wanted = np.array([target]), np.array([facing]), np.zeros(1), np.eye(6)[[1]]
-        smoothed = velocity, direction, np.zeros(1), correction
+        smoothed = velocity, direction, np.zeros(1), correction, earlier
         trajectory.follow_target(wanted, steering, smoothed, (position, heading, gait))
     return velocity[0], direction[0], correction[0]
 
@@ -115,3 +116,21 @@ def test_steering_turns_further_than_the_remaining_angle(degrees: float, beyond:
         _, direction, _ = follow(target * speed / 1.5, (np.sin(facing), np.cos(facing)), 2.0)
         yaw = np.degrees(np.arctan2(*direction))
         assert yaw == pytest.approx(0.9 * sign * (degrees + extra), abs=1e-6)
+
+
+@pytest.mark.parametrize(("speed", "expected"), [(1.5, 0.0), (1.2, 0.3)])
+def test_whoever_walks_a_circle_as_asked_is_not_corrected(speed: float, expected: float) -> None:
+    """The mean velocity of the past lags behind on a circle, but not because the figure turns too late."""
+    position, heading, gait = path(speed)
+    ahead = np.array([[0.0, 1.0]])
+    smoothed = np.zeros((1, 2)), ahead, np.zeros(1), np.zeros((1, 2)), 1.5 * ahead
+    for frame in range(300):
+        yaw = 0.008 * (frame - np.arange(MIDDLE)[::-1])
+        steps = speed * np.column_stack([np.sin(yaw), np.cos(yaw)])
+        position[0, 1 : MIDDLE + 1] = np.cumsum(steps, axis=0)
+        wanted = 1.5 * np.array([[np.sin(yaw[-1]), np.cos(yaw[-1])]])
+        target = wanted, wanted / 1.5, np.zeros(1), np.eye(6)[[1]]
+        trajectory.follow_target(target, 2.0, smoothed, (position, heading, gait))
+    faster, left = smoothed[3][0]
+    assert (faster > expected) if expected else abs(faster) < 0.05
+    assert abs(left) < 0.15  # .7 if measured from the present target

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from hobble.measures.field import Options
 
 WALK, JOG = 2.0, 7.0  # cm a frame: 1.2 and 4.2 m/s
-LOOK_AHEAD = 16  # frames: the character is asked to go where the path will be after these
+LOOK_AHEAD = 20  # frames: the character is asked to go where the path will be after these
 SETTLING = 90  # frames at the start of a walk that are not measured
 REACHED = 0.8  # the asked gait counts as reached at this share of the asked speed
 LONGEST_RESPONSE = 4 * FPS

@@ -18,9 +18,9 @@ from hobble.models.network import Network
 
 # Arrays of the state that start at 0 -> their shape for one character.
 AT_ZERO: dict[str, tuple[int, ...]] = {
-    "root_height": (), "smoothed_velocity": (2,), "strafe": (), "correction": (2,), "foot_lock": (2,),
-    "foot_hold": (2, 2), "foot_step": (2,), "foot_missed": (2,), "foot_lift": (2,), "body_lift": (),
-    "step": (),
+    "root_height": (), "smoothed_velocity": (2,), "strafe": (), "correction": (2,), "earlier": (2,),
+    "foot_lock": (2,), "foot_hold": (2, 2), "foot_step": (2,), "foot_missed": (2,), "foot_lift": (2,),
+    "body_lift": (), "step": (),
 }  # fmt: skip
 SHOWN_JOINTS = ("knee", "heel", "toe")  # the joints of each leg in `Character.leg_shown`, in this order
 
@@ -37,8 +37,8 @@ class Character:
     placement. Joints follow the prediction, but move and turn by a limited amount in a frame.
     phase: (C,) cycles, 0 to 1. channel_values, channel_targets: (C, K) present and target values of the K
     columns of all channels.
-    smoothed_velocity, smoothed_direction (C, 2), strafe (C,), correction (C, 2): the smoothed target, see
-    `Smoothed` in `hobble.runtime.trajectory`.
+    smoothed_velocity, smoothed_direction (C, 2), strafe (C,), correction, earlier (C, 2): the smoothed
+    target, see `Smoothed` in `hobble.runtime.trajectory`.
     foot_lock (C, 2), foot_hold (C, 2, 2), foot_step (C, 2), foot_missed (C, 2): where and how firmly feet are
     held, see `Hold` in `hobble.runtime.feet`.
     foot_lift (C, 2), foot_added (C, 2, 2, 4), leg_shown (C, 2, 3, 3), body_lift (C,): the rest of foot
@@ -63,6 +63,7 @@ class Character:
     smoothed_direction: Array
     strafe: Array
     correction: Array
+    earlier: Array
     foot_lock: Array
     foot_hold: Array
     foot_step: Array

@@ -229,7 +229,7 @@ class Controller:
     def _group_arrays(self, c: Character) -> None:
         """Group the arrays for the compiled functions. Once is enough: the arrays only change in place."""
         self._path = (c.position, c.direction, c.gait)
-        self._smoothed = (c.smoothed_velocity, c.smoothed_direction, c.strafe, c.correction)
+        self._smoothed = (c.smoothed_velocity, c.smoothed_direction, c.strafe, c.correction, c.earlier)
         self._channels = (c.channel_values, c.channel_targets, self._channel_steps)
         self._joints = (c.joint_position, c.joint_velocity, c.joint_rotation)
         self.drawn = (self.root, self.yaw, self.pose_position, self.pose_rotation)

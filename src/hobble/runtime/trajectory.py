@@ -42,8 +42,8 @@ Trajectory = tuple[Any, Any, Any]
 # shares of the gaits. The strafe share rises with the angle between facing and velocity, from 0 to 1.
 Target = tuple[Any, Any, Any, Any]
 # The smoothed target: velocity, direction (C, 2); strafe (C,). correction (C, 2): what corrects a steady
-# error of the velocity, see `_ask_velocity`.
-Smoothed = tuple[Any, Any, Any, Any]
+# error of the velocity; earlier (C, 2): the mean target velocity of the last frames; see `_ask_velocity`.
+Smoothed = tuple[Any, Any, Any, Any, Any]
 # values, targets (C, K): present and target values of all channels' columns. steps (K,): largest change of a
 # value in a frame.
 Channels = tuple[Any, Any, Any]
@@ -113,7 +113,7 @@ def follow_target(target: Target, steering: float, smoothed: Smoothed, path: Tra
     as in the runtime of Holden et al. (2017).
     """
     target_velocity, target_direction, target_strafe, target_gait = target
-    velocity, direction, strafe, correction = smoothed
+    velocity, direction, strafe, correction, earlier = smoothed
     position, heading, gait = path
     middle = gait.shape[1] // 2
     for c in range(velocity.shape[0]):
@@ -126,7 +126,7 @@ def follow_target(target: Target, steering: float, smoothed: Smoothed, path: Tra
                 # Ask for more than the remaining turn, but not for so much that the network turns around.
                 room = max(FURTHEST_TURN - abs(turn), 0.0)
                 goal_yaw += min(max(0.5 * steering * turn, -room), room)
-            x, z = _ask_velocity(steering, x, z, position[c], correction[c])
+            x, z = _ask_velocity(steering, x, z, position[c], correction[c], earlier[c])
         velocity[c, 0] += TARGET_MIX * (x - velocity[c, 0])
         velocity[c, 1] += TARGET_MIX * (z - velocity[c, 1])
         yaw = np.arctan2(direction[c, 0], direction[c, 1])
@@ -138,14 +138,19 @@ def follow_target(target: Target, steering: float, smoothed: Smoothed, path: Tra
 
 
 @njit
-def _ask_velocity(steering: float, x: float, z: float, position: Any, correction: Any) -> tuple[float, float]:
+def _ask_velocity(
+    steering: float, x: float, z: float, position: Any, correction: Any, earlier: Any
+) -> tuple[float, float]:
     """The velocity to ask the network for, so that the character reaches the velocity (x, z).
 
     A network tends to keep its past velocity. So a correction is added to the target, at most STEERING_LIMIT
     times the target. One part is `steering` times the error, which is the target minus the mean velocity over
     the later half of the past. The other part, `correction` (2,), is for a steady error, such as weaker
     strafing to one side. It is the integral of the error along the target velocity and to its left, as shares
-    of the target speed. position: (T, 2) of the trajectory.
+    of the target speed. The mean velocity is that of some frames ago, so this error is measured from
+    `earlier` (2,), the target of the same time. Measured from the present target, a character that follows a
+    circle seems to turn too late, and the integral makes it turn ever earlier. position: (T, 2) of the
+    trajectory.
     """
     middle = position.shape[0] // 2
     span = middle // 2
@@ -153,6 +158,11 @@ def _ask_velocity(steering: float, x: float, z: float, position: Any, correction
     lack_x = x - (position[middle, 0] - position[middle - span, 0]) / span
     lack_z = z - (position[middle, 1] - position[middle - span, 1]) / span
     more_x, more_z = steering * lack_x, steering * lack_z
+    # A mean with weights that fall exponentially. Its mean age is that of the mean velocity.
+    earlier[0] += (x - earlier[0]) / ((span + 1) / 2)
+    earlier[1] += (z - earlier[1]) / ((span + 1) / 2)
+    lack_x += earlier[0] - x
+    lack_z += earlier[1] - z
     if speed < STILL:
         correction[:] = 0.0
     else:
@@ -176,7 +186,7 @@ def blend_future(smoothed: Smoothed, path: Trajectory) -> None:
     At time t of the future (0 to 1), the share of the target is 1 - (1 - t)^b. b is .5 for the position (1
     when strafing) and 2 for the direction (.5 when strafing). The gait of the future is the present gait.
     """
-    velocity, facing, strafe, _ = smoothed
+    velocity, facing, strafe, _, _ = smoothed
     position, direction, gait = path
     length = position.shape[1]
     middle = length // 2

@@ -597,7 +597,8 @@ typedef struct {
     double (*joint_position)[3], (*joint_velocity)[3], (*joint_rotation)[4];
     double (*pose_position)[3], (*pose_rotation)[4];
     double *values, *targets, *memory;
-    double root_height, phase, smoothed_velocity[2], smoothed_direction[2], strafe, correction[2];
+    double root_height, phase, smoothed_velocity[2], smoothed_direction[2], strafe, correction[2],
+        earlier[2];
     double foot_lock[2], foot_hold[2][2], foot_step[2], foot_missed[2], foot_lift[2], foot_added[2][2][4];
     double leg_shown[2][3][3], body_lift;
     double root[3], yaw, report[6]; /* report: what hobble_state returns */
@@ -1416,14 +1417,18 @@ static int read_target(const model *m, const character *c, const hobble_target *
 
 /* The velocity (x, z) to ask the network for, so that the character reaches the target (x, z): see
    `_ask_velocity` in trajectory.py. A share of the present error is added, and a steady error is integrated
-   in `correction`. */
+   in `correction`, from the error of the target `earlier`. */
 static void ask_velocity(double steering, const double (*position)[2], int middle, double *correction,
-                         double *asked) {
+                         double *earlier, double *asked) {
     int span = middle / 2;
     double x = asked[0], z = asked[1], speed = length2(x, z);
     double lack_x = x - (position[middle][0] - position[middle - span][0]) / span;
     double lack_z = z - (position[middle][1] - position[middle - span][1]) / span;
     double more_x = steering * lack_x, more_z = steering * lack_z;
+    earlier[0] += (x - earlier[0]) / ((span + 1) / 2.0);
+    earlier[1] += (z - earlier[1]) / ((span + 1) / 2.0);
+    lack_x += earlier[0] - x;
+    lack_z += earlier[1] - z;
     if (speed < STILL) {
         correction[0] = correction[1] = 0;
     } else {
@@ -1454,7 +1459,7 @@ static void follow_target(const model *m, character *c, const goal *target) {
                    room = larger(FURTHEST_TURN - fabs(turn), 0);
             goal_yaw += clamp(0.5 * steering * turn, -room, room);
         }
-        ask_velocity(steering, (const double (*)[2])c->position, middle, c->correction, asked);
+        ask_velocity(steering, (const double (*)[2])c->position, middle, c->correction, c->earlier, asked);
     }
     for (int i = 0; i < 2; i++) c->smoothed_velocity[i] += TARGET_MIX * (asked[i] - c->smoothed_velocity[i]);
     double yaw = yaw_of(c->smoothed_direction);
@@ -2112,8 +2117,8 @@ static int sound_character(const hobble *h, const character *c) {
            && sound(c->joint_rotation, 4 * joints) && sound(c->values, (size_t)h->model.size[COLUMNS])
            && sound(c->memory, (size_t)h->memory_size) && sound(&c->phase, 1)
            && sound(c->smoothed_velocity, 2) && sound(c->smoothed_direction, 2) && sound(c->correction, 2)
-           && sound(c->foot_hold, 4) && sound(c->foot_lift, 2) && sound(c->foot_added, 16)
-           && sound(c->leg_shown, 18) && sound(&c->body_lift, 1);
+           && sound(c->earlier, 2) && sound(c->foot_hold, 4) && sound(c->foot_lift, 2)
+           && sound(c->foot_added, 16) && sound(c->leg_shown, 18) && sound(&c->body_lift, 1);
 }
 
 /* The height of a grid of heights at x, z, bilinear. */
