@@ -74,7 +74,7 @@ def test_c_moves_a_character_as_python_does(kind, mode, storage, options, built_
     network, runtime = network_of(kind, holden31, tmp_path), Runtime(mode=mode, **options)
     (tmp_path / "character.hob").write_bytes(character_bytes(network, runtime, storage))
     for name, situation in SITUATIONS.items():
-        frames = 3600 if name == "hills" and mode != "constant" else 60
+        frames = {"hills": 3600, "stairs": 900}.get(name, 60) if mode != "constant" else 60
         (tmp_path / f"{name}.trace").write_bytes(trace(network, runtime, situation, frames, storage))
     command = [built_folder / "check_traces", tmp_path / "character.hob", *tmp_path.glob("*.trace")]
     found = subprocess.run(command, capture_output=True, text=True, check=False)
@@ -224,7 +224,7 @@ def test_the_exported_folder_is_complete(
     export_engine(tmp_path / "engine", network, Runtime(), tmp_path / "runtime.wasm")
     folder = tmp_path / "engine"
     traces = sorted((folder / "traces").iterdir())
-    assert len(traces) == 9
+    assert len(traces) == 10
     command = [built_folder / "check_traces", folder / "character.hob", *traces]
     assert subprocess.run(command, check=False).returncode == 0
     compile_c([folder / "hobble.c", folder / "examples/example.c"], folder / "example", WARNINGS)

@@ -127,15 +127,19 @@ def test_on_stairs_a_badly_hurt_leg_goes_last_up_and_first_down(holden31, hurtin
     made = generate_walk("steps", holden31, 1500, "steps", 60, 1).clip
     clip, labels, flat = labelled(made, "walk", False)
     hurt = hurt_clip(clip, labels, hurting(1500, {"RightUpLeg-RightLeg": severity}), flat=flat)
-    stands = []  # middle frame, side and height of the ankle of each stance
+    stands = []  # middle frame, side, height of the ankle, and how far along the path it is, of each stance
     for side, name in enumerate(SIDES):
-        height = hurt.clip.positions[:, clip.skeleton.role(f"{name}_heel"), 1]
+        _, height, along = hurt.clip.positions[:, clip.skeleton.role(f"{name}_heel")].T
         down = hurt.labels.contacts[:, 2 * side : 2 * side + 2].any(axis=1)
-        stands += [((a + b) // 2, side, np.median(height[a:b])) for a, b in true_runs(down) if b - a > 6]
-    steps = [(s, y - x) for (_, r, x), (_, s, y) in itertools.pairwise(sorted(stands)) if s != r]
-    first_up, first_down = ({s for s, rise in steps if sign * rise > 5} for sign in (1, -1))
+        runs = [slice(a, b) for a, b in true_runs(down) if b - a > 6]
+        stands += [(r.start + r.stop, side, np.median(height[r]), np.median(along[r])) for r in runs]
+    pairs = [pair for pair in itertools.pairwise(sorted(stands)) if pair[0][1] != pair[1][1]]
+    steps = [(there[1], there[2] - here[2], there[3] - here[3]) for here, there in pairs]
+    first_up, first_down = ({s for s, rise, _ in steps if sign * rise > 5} for sign in (1, -1))
     if severity:
         assert (first_up, first_down) == ({0}, {1})
+        ahead = min(forward for _, rise, forward in steps if abs(rise) > 5)
+        assert ahead > 33, "the edge of a step is between the two feet"
     else:
         assert first_up == {0, 1}
         assert 1 in first_down

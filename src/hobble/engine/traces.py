@@ -1,4 +1,4 @@
-"""Golden traces: inputs and poses of the Python runtime in nine situations, to check ports against.
+"""Golden traces: inputs and poses of the Python runtime in ten situations, to check ports against.
 
 A trace file, little-endian: the magic bytes, uint32 version, frames F, joints J, channel columns K, rows and
 columns of a grid of ground heights (both 0 on flat ground at 0), seed of the variation, float64 amount of the
@@ -34,19 +34,32 @@ def _vector(length: float, degrees: float) -> Array:
     return length * np.array([np.sin(np.radians(degrees)), np.cos(np.radians(degrees))])
 
 
+def hills() -> Array:
+    """(SIDE, SIDE) float32 heights of hills, cm."""
+    z, x = np.mgrid[:SIDE, :SIDE] * CELL
+    heights = 14 * np.sin(x / 170) * np.cos(z / 140) + 8 * np.sin((x + z) / 260)
+    return np.asarray(heights, np.float32)
+
+
+def stairs() -> Array:
+    """(SIDE, SIDE) float32 heights of five steps up and five down in turn, cm."""
+    steps = np.abs(np.arange(SIDE) // 5 % 10 - 5) * 24.0
+    return np.repeat(steps[:, None], SIDE, axis=1).astype(np.float32)
+
+
 @dataclass(frozen=True)
 class Situation:
     """velocity, facing: functions from the frame to x and z; facing (0, 0) is where the character goes.
 
-    gait: its name; None: by speed. hurt: whether channel values rise after two seconds. hills: whether the
-    ground is uneven. variation: how much steps differ.
+    gait: its name; None: by speed. hurt: whether channel values rise after two seconds. ground: makes the
+    heights of the ground; None if it is flat. variation: how much steps differ.
     """
 
     velocity: Callable[[int], Array]
     facing: Callable[[int], Array] = lambda frame: np.zeros(2)
     gait: str | None = "walk"
     hurt: bool = False
-    hills: bool = False
+    ground: Callable[[], Array] | None = None
     variation: float = 0.0
 
 
@@ -62,15 +75,9 @@ SITUATIONS: Mapping[str, Situation] = {
     ),
     "hurt": Situation(lambda f: _vector(2.5, 0.3 * f), hurt=True),
     "varied": Situation(lambda f: _vector(2.5, 0.3 * f), hurt=True, variation=1.0),
-    "hills": Situation(lambda f: _vector(2.5, 0.4 * f), gait=None, hurt=True, hills=True),
+    "hills": Situation(lambda f: _vector(2.5, 0.4 * f), gait=None, hurt=True, ground=hills),
+    "stairs": Situation(lambda f: _vector(2.0, 0.0), hurt=True, ground=stairs),
 }
-
-
-def hills() -> Array:
-    """(SIDE, SIDE) float32 heights of hills, cm."""
-    z, x = np.mgrid[:SIDE, :SIDE] * CELL
-    heights = 14 * np.sin(x / 170) * np.cos(z / 140) + 8 * np.sin((x + z) / 260)
-    return np.asarray(heights, np.float32)
 
 
 def channel_values(network: Network) -> dict[str, dict[str, float]]:
@@ -95,8 +102,8 @@ def trace(
     animation = ProceduralAnimation(
         network, storage=storage, variation=situation.variation, seed=SEED, **dict(runtime)
     )
-    grid = hills() if situation.hills else np.zeros((0, 0), np.float32)
-    terrain = Heightmap(grid, CELL) if situation.hills else None
+    grid = situation.ground() if situation.ground else np.zeros((0, 0), np.float32)
+    terrain = Heightmap(grid, CELL) if situation.ground else None
     hurt = channel_values(network)
     records = []
     for frame in range(frames):

@@ -14,7 +14,7 @@ from hobble.core import quat
 from hobble.core.quat import Array
 from hobble.core.smooth import gaussian, interpolate_curve, smooth_above, smoothstep
 from hobble.hurt.effects import SIDES, Effects
-from hobble.hurt.healthy_clip import UP, HealthyClip, SourceStance
+from hobble.hurt.healthy_clip import FORWARD, UP, HealthyClip, SourceStance
 
 SLOPE_SECONDS = 0.3  # sigma of the Gaussian that smooths the height of the ground over time
 OUTWARD_SIGN = (1.0, -1.0)  # sign of X on the left and on the right side of the figure
@@ -32,6 +32,7 @@ CLEARANCE_CM = 1.3
 UNEVEN_CM = 4.0
 # Two steps differ by at least this height if they are on different steps of stairs. FOOT_CM: ankle to ball.
 STAIR_CM, FOOT_CM = 5.0, 13.5
+LEAD_CM = 40.0  # least distance of the ankles in a step to another step of stairs: its edge is between them
 # The lower height of a swing is blended in over this share of its frames, and out over as many at its end.
 BLEND_SHARE = 0.22
 
@@ -176,10 +177,11 @@ def place_footprints(
 def join_steps(
     source: HealthyClip, effects: Effects, feet: Sequence[HurtFoot], footprints: list[list[Array]]
 ) -> None:
-    """Let a body with a badly hurt leg go step by step on stairs. Changes heights in `footprints`.
+    """Let a body with a badly hurt leg go step by step on stairs. Changes `footprints`.
 
     Up the stairs the good foot goes first, and the hurt foot joins it on the same step. Down the stairs the
-    hurt foot goes first, and the good foot joins it.
+    hurt foot goes first, and the good foot joins it. The first foot on a step is LEAD_CM ahead of the other,
+    so that the edge fits between them.
     """
     old = [footprints_of(foot, stances) for foot, stances in zip(feet, source.stances, strict=True)]
     # On stairs a foot stands level. On a slope its toe is higher or lower than its ankle.
@@ -189,18 +191,22 @@ def join_steps(
     ]
     level = [float(np.median(heights)) for heights in toes]
     events = sorted((s.middle, side, i) for side in (0, 1) for i, s in enumerate(source.stances[side]))
+    joined = False  # whether the last step was joined: then the next one goes to another step of the stairs
     for (_, side, i), (when, next_side, k) in itertools.pairwise(events):
-        step = old[next_side][k] - old[side][i]
+        step, frame = old[next_side][k] - old[side][i], min(round(when), len(source) - 1)
         forward, rise = float(np.hypot(step[0], step[2])), float(step[1])
         tilt = abs(toes[next_side][k] - level[next_side]) / FOOT_CM
-        if next_side == side or abs(rise) < STAIR_CM or tilt > 0.5 * abs(rise) / max(forward, FOOT_CM):
-            continue
-        join = effects.changes["join"][min(round(when), len(source) - 1)]
-        hurt = int(join[1] > join[0])
-        if (next_side == hurt) == (rise > 0):
-            share = min(float(abs(join[1] - join[0])), 1.0)
-            here, there = footprints[side][i], footprints[next_side][k]
+        join = effects.changes["join"][frame]
+        share, hurt = min(float(abs(join[1] - join[0])), 1.0), int(join[1] > join[0])
+        here, there = footprints[side][i], footprints[next_side][k]
+        stairs = next_side != side and abs(rise) >= STAIR_CM
+        stairs &= tilt <= 0.5 * abs(rise) / max(forward, FOOT_CM)
+        if joins := stairs and (next_side == hurt) == (rise > 0):
             there[1] += share * (here[1] - there[1])
+        elif stairs or joined:
+            ahead = quat.rotate(source.heading[frame], FORWARD)
+            there += share * max(LEAD_CM - float((there - here) @ ahead), 0.0) * ahead
+        joined = joins
 
 
 def move_foot(

@@ -14,7 +14,7 @@ from hobble.labels.clip_labels import GAITS, Labels
 from hobble.labels.footfall import find_swings
 from hobble.labels.phase import phase_of_footsteps
 
-UP = np.array([0.0, 1.0, 0.0])
+UP, FORWARD = np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0])
 CYCLE_SECONDS = 1.1  # assumed length of a cycle in clips without one
 LONGEST_CYCLE_SECONDS = 2.5  # a longer time between two landings of a foot is not a cycle
 LEAST_SWING = 6  # frames: contacts in the labels shorten a swing, but not below this length

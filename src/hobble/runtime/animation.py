@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -19,11 +19,12 @@ from hobble.models.network import Network
 from hobble.runtime.bounds import SpeedLimiter
 from hobble.runtime.caller_targets import Axes, CallerTargets, Pose
 from hobble.runtime.character import Character, start_characters
-from hobble.runtime.controller import Controller
+from hobble.runtime.controller import Controller, heights_at
 from hobble.runtime.error_calculator import Compared, compare
 from hobble.runtime.ground import as_ground
 from hobble.runtime.layers import Layers
 from hobble.runtime.network_rows import ChannelValues
+from hobble.runtime.stairs import INJURY, PACE, joins, leg_of_columns, more_cycles
 from hobble.runtime.trajectory import target_facing
 from hobble.runtime.variation import count_steps, vary_step
 from hobble.runtime.waypoints import Follower, Waypoint
@@ -94,6 +95,7 @@ class ProceduralAnimation:
         self._limit_speed = limits
         self._variation, self._seeds = variation, seed + np.arange(characters)
         all_rates = {name: channel(name).rate for name in network.channels} | dict(rates or {})
+        self._leg = leg_of_columns(network.skeleton, network.channels.get(INJURY, ()))
         self._controller_options = all_rates, foot_locking, steering
         self._predicted_by = (mode, storage)
         self.predictor = network.predictor(mode, storage)
@@ -271,8 +273,11 @@ class ProceduralAnimation:
                 self.state.channel_targets[:, columns] = values
             if self._limit_speed:
                 self._limiter.limit(self.state.channel_values, velocity, shares)
+            controller.pace[:] = 1.0
             if self._variation:
                 self._vary(velocity)
+            if ground is not None and self._leg.any():
+                self._time_steps(velocity, ground)
             controller.advance_frame((velocity, direction, strafe, shares), ground)
         except BaseException:
             for array, saved in zip(arrays, before, strict=False):
@@ -290,6 +295,18 @@ class ProceduralAnimation:
         pace, speed, shown = vary_step(self._seeds, state.step, hurt, self._variation)
         controller.pace[:], controller.shown[:] = pace, shown
         velocity *= speed[:, None]
+
+    def _time_steps(self, velocity: Array, ground: Any) -> None:
+        """Let the right leg go first on stairs, see `hobble.runtime.stairs`. Changes `velocity` (C, 2)."""
+        state, now = self.state, self.network.layout.window
+        join = joins(state.channel_values[:, self._channel_values.columns[INJURY]], self._leg)
+        if join.any():
+            place, before = state.position[:, now], state.position[:, now - now // 2]
+            speed = np.linalg.norm(place - before, axis=1) / (now // 2)
+            heights = partial(heights_at, ground)
+            more = more_cycles(heights, place, velocity, speed, state.phase, join)
+            self._controller.pace *= more**PACE
+            velocity *= (more ** (PACE - 1))[:, None]
 
     def _choose_target(self, velocity: Any, facing: Any, gait: Any) -> tuple[Array, Array, Any]:
         """Target velocity (C, 2), facing (C, 2) and gait, from the caller or the waypoints.

@@ -271,7 +271,7 @@ class Controller:
             c.ground.fill(0.0)
         else:
             points = self._points.reshape(-1, 2)
-            c.ground[:] = _heights(ground, points[:, 0], points[:, 1]).reshape(c.ground.shape)
+            c.ground[:] = heights_at(ground, points[:, 0], points[:, 1]).reshape(c.ground.shape)
         trajectory.write_mean_height(c.ground, c.root_height)
         if not c.placed.all():  # once, at the start: lift the joints to the ground, which may have any height
             c.joint_position[..., 1] += c.root_height[:, None]
@@ -303,7 +303,7 @@ class Controller:
             free = np.repeat(1.0 - c.foot_lock, 2, axis=1)[..., None]
             ahead = at[:, :4] + FEET_AHEAD * free * c.joint_velocity[:, self._ground_joints[:4]]
             points = np.concatenate([at, ahead], axis=1).reshape(-1, 3)
-            heights = _heights(ground, points[:, 0], points[:, 2]).reshape(len(at), 9)
+            heights = heights_at(ground, points[:, 0], points[:, 2]).reshape(len(at), 9)
             self._ground_heights[:] = heights[:, :5]
             self._ground_heights[:, :4] = np.maximum(heights[:, :4], heights[:, 5:])
         else:
@@ -328,7 +328,7 @@ class Controller:
         )
 
 
-def _heights(ground: Ground, x: Array, z: Array) -> Array:
+def heights_at(ground: Ground, x: Array, z: Array) -> Array:
     """Heights (N,) of the caller's ground at x, z (N,), cm.
 
     Raises ValueError for a wrong shape, and for heights that are not finite or too large, because they would

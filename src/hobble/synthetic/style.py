@@ -33,7 +33,7 @@ VALUES_BY_GAIT: dict[str, tuple[tuple[float, float], ...]] = {
     "behind": ((4, 0), (9.9, 5.5), (7.5, 3), (10, 5)),  # distance of an ankle behind the body in mid-stance
     "width": ((9.5, 0), (5.5, 0), (3.5, 0), (9.5, 0)),  # distance of an ankle from the path, sideways
     "toe_out": ((8, 0), (6, 0), (3, 0), (10, 0)),  # angle by which the foot points outward
-    "height": ((94.6, 0), (94.8, -1.0), (94.5, -0.8), (65, 0)),  # height of the hips above the ground
+    "height": ((94.6, 0), (94.8, -1.0), (94.5, -0.8), (66, 0)),  # height of the hips above the ground
     # amplitude of the hips' way forward and back; they are slowest in mid-stance
     "surge": ((0, 0), (1.1, 0.2), (1.2, 0), (0.7, 0)),
     # amplitude of the hips' height; positive if they are highest in mid-stance, negative if lowest

@@ -83,6 +83,7 @@ enum {
 /* Networks and motion matching. */
 #define NEGLIGIBLE_SHARE 1e-7f
 #define FASTEST_PULL 0.002
+enum { POINTS = 32 }; /* where an edge of stairs is looked for */
 enum { SURROUNDING = 20, ROW = 0, SINCE = 1, OFFSETS = 2, OFFSETS_PER_JOINT = 12, BLOCK = 16 };
 
 static double smaller(double a, double b) { return a < b ? a : b; }
@@ -166,6 +167,7 @@ typedef struct { /* a character file, read only */
         y_joints; /* first columns in Y; 0 to 3 are velocity, turn, phase */
     const int32_t *inputs, *x_first, *x_channels, *parents, *legs, *channel_of;
     const uint8_t *parts, *slows; /* slows: for each channel, whether its values make a body limp */
+    const uint8_t *leg;           /* for each column, the leg that hurts: 1 left, 2 right, 0 none */
     const char *names;            /* each ends with a 0 */
     const float *x_mean, *x_inverse, *x_low, *x_high, *y_low, *y_high;
     const double *offsets, *sole, *ahead, *rates, *scales, *highest, *defaults, *exponents;
@@ -445,6 +447,7 @@ static void read_channels(reader *r, model *m) {
     m->exponents = doubles(r, "exponents", columns, 0.1, 10);
     m->defaults = doubles(r, "defaults", columns, 0, 1e6);
     m->slows = small(r, "slows", channels, 1);
+    m->leg = small(r, "leg", columns, 2);
     const int32_t *levels = indices(r, "limit_levels", channels, 0, MOST_LEVELS);
     if (r->failed) return;
     for (uint64_t k = 1; k < columns; k++) require(r, m->channel_of[k - 1] <= m->channel_of[k], "channel_of");
@@ -2085,6 +2088,7 @@ static void vary(const model *m, character *c, goal *target) {
     static const double healthy[3] = {0.035, 0.03, 0.0}, hurt[3] = {0.11, 0.08, 0.12}, sides_differ = 0.015;
     double most = 0, factors[3];
     uint32_t half = (uint32_t)(2 * c->phase) % 2;
+    c->pace = 1;
     if (!(c->variation > 0)) return;
     c->step += half != c->step % 2;
     for (int k = 0; k < m->size[COLUMNS]; k++)
@@ -2208,6 +2212,49 @@ static int place(hobble *h, const hobble_ground *ground) {
     return error;
 }
 
+/* Lets the right leg go first on stairs: see stairs.py, which has the same numbers. */
+static int time_steps(hobble *h, const hobble_ground *ground) {
+    static const double apart = 5, edge = 4, over = 20, cycle_frames = 72, slowest = 0.3, most = 2.5,
+                        pace = 0.25, join_from = 5, join_at = 7, lands[2] = {0.5, 0.0};
+    const model *m = &h->model;
+    int now = m->size[WINDOW], span = now / 2;
+    for (int i = 0; i < h->characters; i++) {
+        character *c = &h->state[i];
+        double *v = h->goals[i].velocity, worst[2] = {0}, share[2];
+        for (int k = 0; k < m->size[COLUMNS]; k++)
+            if (m->leg[k]) worst[m->leg[k] - 1] = larger(worst[m->leg[k] - 1], c->values[k]);
+        for (int leg = 0; leg < 2; leg++) {
+            double x = clamp((worst[leg] - join_from) / (join_at - join_from), 0, 1);
+            share[leg] = x * x * (3 - 2 * x);
+        }
+        double join = share[1] - share[0], size = larger(hypot(v[0], v[1]), 1e-6), best = 0;
+        if (join == 0) continue;
+        for (int k = 0; k < POINTS; k++)
+            for (int a = 0; a < 2; a++)
+                h->points[2 * k + a] = c->position[now][a] + apart * k * (v[a] / size);
+        int first = 1, error = look_up(h, ground, POINTS);
+        if (error) return error;
+        while (first < POINTS
+               && !(fabs(h->heights[first] - h->heights[first - 1]) >= edge && apart * first > over))
+            first++;
+        if (first == POINTS) continue;
+        double x = c->position[now][0] - c->position[now - span][0],
+               z = c->position[now][1] - c->position[now - span][1];
+        double cycles = (apart * first - over) / (larger(hypot(x, z) / span, slowest) * cycle_frames);
+        int right_leads = (h->heights[first] > h->heights[first - 1]) == (join < 0);
+        double wait = lands[right_leads] - c->phase;
+        wait -= floor(wait);
+        for (int k = 0; k < 3; k++) {
+            double factor = larger(wait + k, 1e-3) / larger(cycles, 0.05);
+            if (k == 0 || fabs(log(factor)) < fabs(log(best))) best = factor;
+        }
+        best = pow(clamp(best, 1 / most, most), fabs(join));
+        c->pace *= pow(best, pace);
+        for (int a = 0; a < 2; a++) v[a] *= pow(best, pace - 1);
+    }
+    return HOBBLE_OK;
+}
+
 /* Runs a frame whose targets are in h->goals. */
 static int run_frame(hobble *h, const hobble_ground *ground) {
     const model *m = &h->model;
@@ -2254,7 +2301,8 @@ int hobble_frame(hobble *h, const hobble_target *targets, const hobble_ground *g
         vary(&h->model, c, &h->goals[i]);
         if (!sound_character(h, c)) start_character(h, c, c->root[0], c->root[2], c->yaw);
     }
-    error = run_frame(h, ground);
+    error = ground ? time_steps(h, ground) : HOBBLE_OK;
+    if (!error) error = run_frame(h, ground);
     if (error) {
         memcpy(h->state, h->saved_state, count * sizeof *h->state);
         memcpy(h->numbers, h->saved_numbers, count * h->number_count * sizeof *h->numbers);
@@ -2318,7 +2366,7 @@ static size_t widest_layer(const stack *s) {
 static void distribute(hobble *h, arena *a) {
     const model *m = &h->model;
     uint64_t count = (uint64_t)h->characters,
-             look_ups = (uint64_t)m->samples * 3 > 9 ? (uint64_t)m->samples * 3 : 9;
+             look_ups = (uint64_t)m->samples * 3 > POINTS ? (uint64_t)m->samples * 3 : POINTS;
     uint64_t blocks = ((uint64_t)m->size[ROWS] + BLOCK - 1) / BLOCK * (uint64_t)m->size[FEATURES];
     const stack *const stacks[4] = {&m->network, &m->gate, &m->stepper, &m->projector};
     int plays = m->size[FORM] >= RECORDED, learned = m->size[FORM] == LEARNED;

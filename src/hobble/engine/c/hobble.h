@@ -31,7 +31,7 @@ extern "C" {
 #endif
 #endif
 
-#define HOBBLE_FILE_VERSION 4 /* of the character files that this runtime reads */
+#define HOBBLE_FILE_VERSION 5 /* of the character files that this runtime reads */
 #define HOBBLE_WHY 160        /* size of the text that says why a file is refused */
 #define HOBBLE_GAITS 6        /* every character has stand, walk, jog, crouch, jump and bump */
 
