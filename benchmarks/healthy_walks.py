@@ -2,10 +2,10 @@
 
     python benchmarks/healthy_walks.py CMU_FOLDER [--network WEIGHTS.npz]
 
-A linear classifier has the 52 numbers of a profile (`hobble.gait.profile`) of windows of 4 s. Each person
-and each figure is left out of its training in turn. Prints the area under the curve (.5: cannot tell), and the
-numbers in which the two differ most. For comparison, the same of each person beside the others. All are on
-the skeleton holden31.
+A linear classifier has the 52 numbers of a profile (`hobble.gait.profile`) of windows of 4 s, all on the
+skeleton holden31. Each person and each figure is left out of its training in turn. Prints the area under the
+curve (.5: cannot tell), and the numbers in which the two differ most. For comparison, the same of each person
+beside the others.
 """
 
 import argparse
@@ -81,9 +81,7 @@ def told_apart(name: str, real: list[Array], made: list[Array], shown: int = 12)
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("folder", type=Path, metavar="CMU_FOLDER", help="folder of the CMU clips, as .bvh")
     parser.add_argument("--network", type=Path, metavar="WEIGHTS.npz")
     options = parser.parse_args()
