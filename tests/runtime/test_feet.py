@@ -20,6 +20,7 @@ from hobble.runtime.feet import (
     bend_leg,
     carry_body,
     foot_parts,
+    held_share,
     leg_joints,
     place_feet,
     rest_facing,
@@ -68,7 +69,9 @@ def test_a_foot_in_contact_stays_and_is_released_slowly(holden31: Skeleton) -> N
     for k in range(1, 8):
         np.testing.assert_allclose(feet(k * step, 1.0)[toe], first, atol=1e-9)
     free = feet.base[0][toe] + 8 * step
-    np.testing.assert_allclose(feet(8 * step, 0.0)[toe], free + (1 - RELEASE) * (first - free), atol=1e-6)
+    np.testing.assert_allclose(
+        feet(8 * step, 0.0)[toe], free + held_share(1 - RELEASE) * (first - free), atol=1e-6
+    )
     for _ in range(20):
         last = feet(8 * step, 0.0)[toe]
     np.testing.assert_allclose(last, free, atol=1e-9)
@@ -106,8 +109,8 @@ def test_a_gliding_foot_steps_instead_of_sliding(holden31: Skeleton, speed: floa
     assert set(lengths) == {STEP_FRAMES - 1}
     high = shown[:, 1] - network[:, 1]
     for a, b in zip(edges[::2], edges[1::2], strict=False):
-        assert STEP_HEIGHT - 1.5 < high[a + 1 : b + 1].max() < STEP_HEIGHT
-        assert 0.3 < high[a + 1] < 2.5, "it rises and comes down gradually"
+        assert STEP_HEIGHT - 1.5 < high[a + 1 : b + 1].max() <= STEP_HEIGHT
+        assert 0.1 < high[a + 1] < 1.0, "it rises and comes down gradually"
         assert high[b] < 2.5
         assert np.linalg.norm(shown[b + 1] - network[b + 1]) < 0.5, "it lands where the network has it"
 

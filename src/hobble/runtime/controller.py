@@ -297,10 +297,11 @@ class Controller:
             at = self.pose_position[:, self._ground_joints]
             # A held foot is not where the network predicts it, but where it is held.
             toes = at[:, [1, 3]][..., ::2]
-            away = c.foot_lock[..., None] * (c.foot_hold - toes)
+            share = feet.held_share(c.foot_lock)
+            away = share[..., None] * (c.foot_hold - toes)
             at[:, :4, ::2] += np.repeat(away, 2, axis=1)
             # A foot in the air rises in time for the ground that it will be over.
-            free = np.repeat(1.0 - c.foot_lock, 2, axis=1)[..., None]
+            free = np.repeat(1.0 - share, 2, axis=1)[..., None]
             ahead = at[:, :4] + FEET_AHEAD * free * c.joint_velocity[:, self._ground_joints[:4]]
             points = np.concatenate([at, ahead], axis=1).reshape(-1, 3)
             heights = heights_at(ground, points[:, 0], points[:, 2]).reshape(len(at), 9)

@@ -10,6 +10,7 @@ and lands there.
 from typing import Any
 
 import numpy as np
+from numba.extending import register_jitable
 
 from hobble.core.compiled import njit
 from hobble.core.skeleton import Skeleton, rest_positions
@@ -207,15 +208,15 @@ def bend_leg(
 # A foot is held from this predicted contact on. With .8, as in the runtime of Holden et al. (2017), a foot
 # slides 4.8 cm a step before it is held and after it is released.
 LOCK_AT = 0.5
-# After contact, `lock` (1: held, 0: free) falls by this much in each frame. With .075 the foot drags behind
-# the swing, and the knee bends by 46 degrees instead of the 53 that the network predicts.
-RELEASE = 0.2
+# After contact, `lock` (1: held, 0: free) falls by this much in each frame, and the foot follows slowly at both
+# ends. If it fell at once from frame to frame, legs would jerk more than twice as much as people's.
+RELEASE = 0.125
 TOO_FAR = 20.0  # cm; a held foot steps if the network's foot is this far away from it
 MISSED = 1.0  # cm; a held foot steps if its leg cannot keep it within this distance of where it is held
 # TOO_FAR and MISSED while the other foot is not held. They are larger, so that this foot waits for the other
 # one to land, and the character does not hop.
 TOO_FAR_ALONE, MISSED_ALONE = 30.0, 4.0
-STEP_FRAMES = 10  # length of a step in frames, a sixth of a second
+STEP_FRAMES = 14  # length of a step in frames, a quarter of a second
 STEP_HEIGHT = 5.0  # cm by which the sole is off the ground in the middle of a step
 
 # How the feet of C characters are held, kept between frames:
@@ -224,6 +225,12 @@ STEP_HEIGHT = 5.0  # cm by which the sole is off the ground in the middle of a s
 # of a step that is done, 0 if the foot does not step; missed (C, 2): cm from where the toe is held to where
 # it was drawn, 0 if lock is below 1.
 Hold = tuple[Any, Any, Any, Any]
+
+
+@register_jitable
+def held_share(lock: Any) -> Any:
+    """How much of the way from the network's toe to where it is held is shown. See `Hold` for lock."""
+    return lock * lock * (3.0 - 2.0 * lock)
 
 
 @njit
@@ -263,7 +270,8 @@ def hold_foot(
             lock[c, f] = max(0.0, lock[c, f] - RELEASE)
         elif lock[c, f] < 1.0:
             # Hold the foot where it is shown now, so that renewed contact does not pull it back.
-            away_x, away_z = limited_shift(lock[c, f] * away_x, lock[c, f] * away_z, x, z, shown, fastest)
+            share = held_share(lock[c, f])
+            away_x, away_z = limited_shift(share * away_x, share * away_z, x, z, shown, fastest)
             hold[c, f, 0], hold[c, f, 1] = x + away_x, z + away_z
             lock[c, f] = 1.0
         else:
@@ -271,9 +279,10 @@ def hold_foot(
             too_far, too_missed = (TOO_FAR, MISSED) if other_held else (TOO_FAR_ALONE, MISSED_ALONE)
             if far >= too_far or missed[c, f] > too_missed:
                 step[c, f] = 1.0 / STEP_FRAMES
-    if step[c, f] > 0.0:  # lock falls from 1 to 0, slowly at both ends
-        lock[c, f] = 1.0 - step[c, f] * step[c, f] * (3.0 - 2.0 * step[c, f])
-    return limited_shift(lock[c, f] * away_x, lock[c, f] * away_z, x, z, shown, fastest)
+    if step[c, f] > 0.0:
+        lock[c, f] = 1.0 - step[c, f]
+    share = held_share(lock[c, f])
+    return limited_shift(share * away_x, share * away_z, x, z, shown, fastest)
 
 
 @njit
@@ -533,15 +542,15 @@ def place_feet(
             depth = sole_depth(position[c], heel, toe, ground[c, 2 * f], ground[c, 2 * f + 1], sole)
             rise = max(depth, 0.0)
             if step[c, f] == 0.0:
-                rise += lock[c, f] * min(depth + FLOATING, 0.0)
+                rise += held_share(lock[c, f]) * min(depth + FLOATING, 0.0)
             change = rise - lift[c, f]
             if change < 0.0:
                 change *= HEIGHT_MIX
             lift[c, f] += min(max(change, -FASTEST_LIFT), FASTEST_LIFT)
             shift[1] = lift[c, f]
             if step[c, f] > 0.0:
-                # The height over a step is a parabola. The network's foot may be above the ground already.
-                height = 4.0 * STEP_HEIGHT * step[c, f] * (1.0 - step[c, f])
+                # The foot leaves the ground slowly, and comes back slowly. The network's may be above it already.
+                height = STEP_HEIGHT * (4.0 * step[c, f] * (1.0 - step[c, f])) ** 2
                 shift[1] += max(height - max(-depth, 0.0), 0.0)
                 contacts[c, 2 * f] = contacts[c, 2 * f + 1] = 0.0
             roll[0], roll[1], roll[2], roll[3] = 1.0, 0.0, 0.0, 0.0

@@ -62,12 +62,12 @@ enum {
 #define STANDING_SHARE 0.1
 /* Feet. */
 #define LOCK_AT 0.5
-#define RELEASE 0.2
+#define RELEASE 0.125
 #define TOO_FAR 20.0
 #define MISSED 1.0
 #define TOO_FAR_ALONE 30.0
 #define MISSED_ALONE 4.0
-#define STEP_FRAMES 10
+#define STEP_FRAMES 14
 #define STEP_HEIGHT 5.0
 #define HEIGHT_MIX 0.5
 #define FEET_AHEAD 4.0
@@ -1843,6 +1843,11 @@ static void limit_shift(double *shift, double x, double z, const double *shown, 
     shift[1] = shown[2] + to_z * fastest / far - z;
 }
 
+/* The share of a held foot's place in where it is shown: 1 to 0 with `lock`, slowly at both ends. */
+static double held_share(double lock) {
+    return lock * lock * (3 - 2 * lock);
+}
+
 /* Decides whether foot `f` is held, let go, or steps. Writes how far to move the network's toe into shift (x,
    z). */
 static void hold_foot(const model *m, character *c, int f, double contact, double *shift) {
@@ -1868,7 +1873,7 @@ static void hold_foot(const model *m, character *c, int f, double contact, doubl
         if (contact < LOCK_AT) {
             *lock = larger(0, *lock - RELEASE);
         } else if (*lock < 1) { /* hold the foot where it is shown now */
-            for (int k = 0; k < 2; k++) away[k] *= *lock;
+            for (int k = 0; k < 2; k++) away[k] *= held_share(*lock);
             limit_shift(away, x, z, shown, fastest);
             hold[0] = x + away[0];
             hold[1] = z + away[1];
@@ -1880,9 +1885,9 @@ static void hold_foot(const model *m, character *c, int f, double contact, doubl
                 *step = 1.0 / STEP_FRAMES;
         }
     }
-    if (*step > 0) *lock = 1 - *step * *step * (3 - 2 * *step); /* from 1 to 0, slowly at both ends */
-    shift[0] = *lock * away[0];
-    shift[1] = *lock * away[1];
+    if (*step > 0) *lock = 1 - *step;
+    shift[0] = held_share(*lock) * away[0];
+    shift[1] = held_share(*lock) * away[1];
     limit_shift(shift, x, z, shown, fastest);
 }
 
@@ -1990,15 +1995,16 @@ static void place_foot(const model *m, character *c, int f, float *contacts, con
     double shift[3], horizontal[2], roll[4] = {1, 0, 0, 0}, old[3], *heel = c->pose_position[leg[HEEL]];
     hold_foot(m, c, f, contacts[2 * f + 1], horizontal);
     double depth = sole_depth(m, c, f, ground + 2 * f), rise = larger(depth, 0), done = c->foot_step[f];
-    if (done == 0) rise += c->foot_lock[f] * smaller(depth + FLOATING, 0);
+    if (done == 0) rise += held_share(c->foot_lock[f]) * smaller(depth + FLOATING, 0);
     double change = rise - c->foot_lift[f];
     if (change < 0) change *= HEIGHT_MIX;
     c->foot_lift[f] += clamp(change, -FASTEST_LIFT, FASTEST_LIFT);
     shift[0] = horizontal[0];
     shift[1] = c->foot_lift[f];
     shift[2] = horizontal[1];
-    if (done > 0) { /* the height over a step is a parabola */
-        shift[1] += larger(4 * STEP_HEIGHT * done * (1 - done) - larger(-depth, 0), 0);
+    if (done > 0) { /* the foot leaves the ground slowly, and comes back slowly */
+        double share = 4 * done * (1 - done);
+        shift[1] += larger(STEP_HEIGHT * share * share - larger(-depth, 0), 0);
         contacts[2 * f] = contacts[2 * f + 1] = 0;
     }
     if (c->foot_lock[f] > 0)
@@ -2193,7 +2199,7 @@ static int place(hobble *h, const hobble_ground *ground) {
         for (int k = 0; k < 4; k++)
             for (int a = 0; a < 2; a++) {
                 /* a held foot is where it is held, not where the network predicts it */
-                double lock = c->foot_lock[k / 2];
+                double lock = held_share(c->foot_lock[k / 2]);
                 points[k][a] += lock * (c->foot_hold[k / 2][a] - c->pose_position[under[k | 1]][2 * a]);
                 /* a foot in the air rises in time for the ground that it will be over */
                 points[5 + k][a] = points[k][a] + FEET_AHEAD * (1 - lock) * c->joint_velocity[under[k]][2 * a];
