@@ -81,8 +81,9 @@ def test_a_character_remembers_the_rotations_that_were_predicted(holden31: Skele
     network = network_of("local", holden31, tmp_path)
     layout, predictor = network.layout, network.predictor(storage="float32")
     x = np.random.default_rng(4).normal(0, 3, (2, layout.x_size)).astype(np.float32)
-    memory, phase = np.zeros((2, network.memory_size)), np.zeros(2)
+    memory, phase = network.memory_of(x), np.zeros(2)
     first = predictor.predict(x, phase, memory=memory).copy()
+    np.testing.assert_allclose(first, network.predict(x, phase), atol=1e-3)
     kept = memory[:, 1:].copy()
     second = predictor.predict(x, phase, memory=memory)
     x[:, layout.x_local_phase] = kept[:, : 2 * layout.local_phases]

@@ -110,7 +110,7 @@ def test_a_gliding_foot_steps_instead_of_sliding(holden31: Skeleton, speed: floa
     high = shown[:, 1] - network[:, 1]
     for a, b in zip(edges[::2], edges[1::2], strict=False):
         assert STEP_HEIGHT - 1.5 < high[a + 1 : b + 1].max() <= STEP_HEIGHT
-        assert 0.1 < high[a + 1] < 1.0, "it rises and comes down gradually"
+        assert np.abs(np.diff(high[a : b + 2])).max() < 1.5, "it rises and comes down gradually"
         assert high[b] < 2.5
         assert np.linalg.norm(shown[b + 1] - network[b + 1]) < 0.5, "it lands where the network has it"
 

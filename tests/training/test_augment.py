@@ -335,7 +335,9 @@ class Mixer:
     """A predictor whose Y is a fixed mixture of X."""
 
     def __init__(self, data: Database) -> None:
-        self.network = SimpleNamespace(layout=data.layout, memory_size=0)
+        self.network = SimpleNamespace(
+            layout=data.layout, memory_size=0, memory_of=lambda x: np.zeros((len(x), 0))
+        )
         shape = (data.layout.x_size, data.layout.y_size)
         self.mixture = np.random.default_rng(1).normal(0, 0.02, shape)
         self.mixture[:, data.layout.y_phase_change] = 0

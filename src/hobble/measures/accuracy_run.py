@@ -173,7 +173,7 @@ class RollOutCrowd:
         self.phase = inputs.phase[first]
         self.joint_position = inputs.x[first][:, layout.x_joint_position].reshape(shape).astype(float)
         self.joint_velocity = np.zeros(shape)
-        self.memory = np.zeros((len(first), predictor.network.memory_size))
+        self.memory = predictor.network.memory_of(inputs.x[first])
 
     def frames(self) -> Iterator[tuple[np.ndarray, np.ndarray, Array]]:
         """Advance all roll-outs by one frame at a time, and yield the n roll-outs that are not yet over.

@@ -195,6 +195,10 @@ class Network(ABC):
         """How many numbers the caller keeps for each character between frames; see `Predictor`."""
         return 0
 
+    def memory_of(self, x: Array) -> Array:
+        """(n, memory_size): what the caller keeps of characters that go on from captured inputs x (n, X)."""
+        return np.zeros((len(x), self.memory_size))
+
     @classmethod
     def resolve_mode(cls, wanted: str | None) -> str:
         """The mode to run: `wanted`, or the exact one by default.

@@ -208,8 +208,8 @@ def bend_leg(
 # A foot is held from this predicted contact on. With .8, as in the runtime of Holden et al. (2017), a foot
 # slides 4.8 cm a step before it is held and after it is released.
 LOCK_AT = 0.5
-# After contact, `lock` (1: held, 0: free) falls by this much in each frame, and the foot follows slowly at both
-# ends. If it fell at once from frame to frame, legs would jerk more than twice as much as people's.
+# After contact, `lock` (1: held, 0: free) falls by this much in each frame. The foot follows slowly at both
+# ends. When it followed as the lock falls, the legs jerked more than twice as much as people's.
 RELEASE = 0.125
 TOO_FAR = 20.0  # cm; a held foot steps if the network's foot is this far away from it
 MISSED = 1.0  # cm; a held foot steps if its leg cannot keep it within this distance of where it is held
@@ -549,7 +549,7 @@ def place_feet(
             lift[c, f] += min(max(change, -FASTEST_LIFT), FASTEST_LIFT)
             shift[1] = lift[c, f]
             if step[c, f] > 0.0:
-                # The foot leaves the ground slowly, and comes back slowly. The network's may be above it already.
+                # It leaves the ground slowly, and comes back slowly. The network's may be above it already.
                 height = STEP_HEIGHT * (4.0 * step[c, f] * (1.0 - step[c, f])) ** 2
                 shift[1] += max(height - max(-depth, 0.0), 0.0)
                 contacts[c, 2 * f] = contacts[c, 2 * f + 1] = 0.0

@@ -72,6 +72,10 @@ class Local(Mann):
         facts = self.training_facts
         return (self.x_mean if facts is None else facts.start_x)[self.remembered].astype(float)
 
+    def memory_of(self, x: Array) -> Array:
+        """As in `Network`."""
+        return np.hstack([np.ones((len(x), 1)), x[:, self.remembered]])
+
     def prepared(self, mode: str, storage: str) -> LocalPredictor:
         """As in `Network`."""
         from hobble.models.local.predictor import LocalPredictor
