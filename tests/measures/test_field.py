@@ -33,8 +33,8 @@ class Point:
 def test_a_point_that_does_as_asked_is_as_far_off_as_its_look_ahead_says(monkeypatch):
     monkeypatch.setattr(module, "ProceduralAnimation", Point)
     found = module.follow_path(None, Runtime(), module.paths()["circle"])
-    # It goes on the circle from whose tangent the point ahead is seen: L^2 / 2R inside, with L = 32 cm.
-    assert found["cm"] == pytest.approx(32**2 / 500, abs=0.3)
+    # It goes on the circle from whose tangent the point ahead is seen: L^2 / 2R inside, with L = 40 cm.
+    assert found["cm"] == pytest.approx(40**2 / 500, abs=0.3)
     assert found["degrees"] < 1.0
 
 

@@ -128,13 +128,19 @@ def tables(compared: Json) -> dict[str, list[Row]]:
 
 
 def compared_values(compared: Compared) -> Iterator[parts.ComparedValue]:
-    """Skating, with the cleanest feet, the circle, with who is closest to it, and the Frechet distance."""
+    """Skating, path, response, jerk and Frechet distance, with who is best at three of them."""
     skating = "Cleanest feet", "the feet of {name} skate {value} cm a frame in a straight walk"
     circle = "Closest to a circle", "{name} is {value} cm off a circle on average"
+    quick = "Quickest to walk", "{name} walks {value} s after it was asked to"
     for order, key, label, verdict in (
         (60, "straight_skating", "skating, cm", skating),
         (61, "paths_circle_cm", "off a circle, cm", circle),
-        (62, "asked_character_frechet", "Frechet", ()),
+        (62, "paths_square_cm", "off a square, cm", ()),
+        (63, "response_walk", "from standing to a walk, s", quick),
+        (64, "response_jog", "from standing to a jog, s", ()),
+        (65, "asked_character_skating", "skating as asked, cm", ()),
+        (66, "asked_character_jerk", "jerk as asked, m/s3", ()),
+        (67, "asked_character_frechet", "Frechet", ()),
     ):
         values = {row["configuration"]: row.get(key) for row in compared.get("field", ())}
         yield parts.ComparedValue(order, parts.Column.number(label), values, *verdict)

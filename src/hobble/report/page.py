@@ -294,9 +294,11 @@ def configuration_table(compared: parts.Compared, measured: Sequence[parts.Compa
         """Configuration -> its entry `key` in compare.json."""
         return {name: entry[key] for name, entry in entries.items()}
 
+    trained = {s["configuration"]: s["seconds"] for s in compared["stages"] if s["stage"] == "training"}
     channel_names = {name: ", ".join(channels) or "none" for name, channels in by_name("channels").items()}
     values = [
         *measured,
+        parts.ComparedValue(45, parts.Column.number("seconds to train"), trained),
         parts.ComparedValue(50, parts.Column("channels"), channel_names),
         parts.ComparedValue(60, parts.Column("data set"), by_name("dataset")),
         parts.ComparedValue(80, parts.Column.count("layers"), by_name("hidden_layers")),
