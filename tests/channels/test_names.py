@@ -20,6 +20,7 @@ ASKING = {
         *("cli/", "measures/films.py", "measures/study.py"),
         *("measures/recognition.py", "measures/recognition_run.py"),
     ),
+    "guarding": ("gait/judge.py", "measures/limp_goals.py", "measures/limp_run.py"),  # who judges limps
 }
 
 

@@ -25,7 +25,7 @@ from hobble.runtime.bounds import Bounds
 from hobble.runtime.character import start_characters
 from hobble.runtime.controller import FPS
 from hobble.runtime.feet import foot_parts, leg_joints, rest_facing, sole_heights
-from hobble.runtime.stairs import INJURY, leg_of_columns
+from hobble.runtime.stairs import leg_of_columns
 
 MAGIC, VERSION, ORDER_MARK = b"HOBBLE\r\n", 5, 0x01020304
 HEADER, ENTRY, ALIGNMENT = 64, 40, 64
@@ -144,10 +144,6 @@ def _channel_sections(network: Network, runtime: Runtime) -> Sections:
             levels[number] = len(limit.levels)
             limits += [limit.levels, limit.usual, limit.speeds.ravel()]
     columns = [label for of_channel in network.channels.values() for label in of_channel]
-    legs = [
-        leg_of_columns(skeleton, labels if name == INJURY else [""] * len(labels))
-        for name, labels in network.channels.items()
-    ]
     names = [*skeleton.joints, *network.gaits, *network.channels, *columns, *parts]
     numbers, rates, scales, highest, defaults = np.array(of_columns, float).reshape(-1, 5).T
     return {
@@ -158,7 +154,7 @@ def _channel_sections(network: Network, runtime: Runtime) -> Sections:
         "defaults": defaults,
         "exponents": network.channel_curves[1],
         "slows": np.array([channel(name).slows for name in network.channels], np.uint8),
-        "leg": np.concatenate([np.zeros(0, np.uint8), *legs]),
+        "leg": leg_of_columns(skeleton, columns),
         "limit_levels": levels,
         "limits": np.concatenate(limits).astype(float),
         "names": np.frombuffer("".join(f"{name}\0" for name in names).encode(), np.uint8),

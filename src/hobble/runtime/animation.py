@@ -24,7 +24,7 @@ from hobble.runtime.error_calculator import Compared, compare
 from hobble.runtime.ground import as_ground
 from hobble.runtime.layers import Layers
 from hobble.runtime.network_rows import ChannelValues
-from hobble.runtime.stairs import INJURY, PACE, joins, leg_of_columns, more_cycles
+from hobble.runtime.stairs import PACE, joins, leg_of_columns, more_cycles
 from hobble.runtime.trajectory import target_facing
 from hobble.runtime.variation import count_steps, vary_step
 from hobble.runtime.waypoints import Follower, Waypoint
@@ -95,7 +95,8 @@ class ProceduralAnimation:
         self._limit_speed = limits
         self._variation, self._seeds = variation, seed + np.arange(characters)
         all_rates = {name: channel(name).rate for name in network.channels} | dict(rates or {})
-        self._leg = leg_of_columns(network.skeleton, network.channels.get(INJURY, ()))
+        labels = [label for of_channel in network.channels.values() for label in of_channel]
+        self._leg = leg_of_columns(network.skeleton, labels)
         self._controller_options = all_rates, foot_locking, steering
         self._predicted_by = (mode, storage)
         self.predictor = network.predictor(mode, storage)
@@ -299,7 +300,7 @@ class ProceduralAnimation:
     def _time_steps(self, velocity: Array, ground: Any) -> None:
         """Let the right leg go first on stairs, see `hobble.runtime.stairs`. Changes `velocity` (C, 2)."""
         state, now = self.state, self.network.layout.window
-        join = joins(state.channel_values[:, self._channel_values.columns[INJURY]], self._leg)
+        join = joins(state.channel_values, self._leg)
         if join.any():
             place, before = state.position[:, now], state.position[:, now - now // 2]
             speed = np.linalg.norm(place - before, axis=1) / (now // 2)

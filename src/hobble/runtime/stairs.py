@@ -23,12 +23,14 @@ SLOWEST = 0.3  # cm a frame: slower bodies count as this fast
 # If the body should make f times as many cycles up to the edge, f is at most MOST or its inverse. Then the
 # change of phase has the factor f ** PACE, and the target speed f ** (PACE - 1).
 MOST, PACE = 2.5, 0.25
-INJURY = "injury"  # the channel
 LANDS = {LEFT: 0.5, RIGHT: 0.0}  # the phase in which a foot lands
 
 
 def leg_of_columns(skeleton: Skeleton, labels: Sequence[str]) -> np.ndarray:
-    """(L,) which leg hurts by each column of the injury channel: 1 the left one, 2 the right one, 0 none."""
+    """(L,) which leg hurts by each column of the channels: 1 the left one, 2 the right one, 0 none.
+
+    labels: of the columns. Those that are names of links say how much the link hurts.
+    """
     links = dict(zip(skeleton.link_names, skeleton.links, strict=True))
     parts = [part_of_link(skeleton, links[label]) if label in links else None for label in labels]
     sides = [part.side if part and part.name in LEG_PARTS else None for part in parts]
@@ -38,7 +40,7 @@ def leg_of_columns(skeleton: Skeleton, labels: Sequence[str]) -> np.ndarray:
 def joins(severity: Array, leg: np.ndarray) -> Array:
     """(C,) how much each body goes step by step, from 0 to 1 for the right leg and to -1 for the left one.
 
-    severity: (C, L) of the links. leg: from `leg_of_columns`.
+    severity: (C, L) values of the columns. leg: from `leg_of_columns`.
     """
     left, right = (
         smoothstep((severity[:, leg == k].max(axis=1, initial=0.0) - JOIN_FROM) / (JOIN_AT - JOIN_FROM))
