@@ -109,6 +109,6 @@ def test_every_export_is_made(copied) -> None:
     weights = np.load(copied.folder / "results/test/network/weights.npz")
     assert spec["names"] == list(json.loads(str(weights["meta"]))["skeleton"]["joints"])
     assert (export / "engine/character.hob").read_bytes()[:6] == b"HOBBLE"
-    assert len(list((export / "engine/traces").iterdir())) == 9
+    assert len(list((export / "engine/traces").iterdir())) == 10
     assert len(list((export / "pfnn").glob("W0_*.bin"))) == 50
     assert (export / "linear.onnx").stat().st_size > 1e4
