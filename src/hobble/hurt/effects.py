@@ -85,7 +85,7 @@ ADDED_CHANGES: dict[str, dict[str, float]] = {
     },
     "hip": {
         "speed": 0.66, "stride": 1.2, "turn": 0.6, "push": 0.7, "vault": 0.2, "lift": 1.0,
-        "crouch": 9.0, "lift_sound": 0.3, "push_sound": 0.4, "out": 0.02, "off_sound": 0.025, "width": 0.07,
+        "crouch": 9.0, "lift_sound": 0.3, "push_sound": 0.3, "out": 0.02, "off_sound": 0.025, "width": 0.07,
         "vault_sound": 0.5, "arm": 0.75, "arm_sound": 0.85, "forward": 2.0,
     },
     "thigh": {
@@ -95,7 +95,7 @@ ADDED_CHANGES: dict[str, dict[str, float]] = {
     },
     "shank": {
         "speed": 0.62, "stride": 1.04, "turn": 0.8, "push": 0.57, "lift": 0.45, "lift_sound": 0.2,
-        "push_sound": 0.2, "strike": 0.0, "crouch": 27.0, "list": 2.0, "off_sound": 0.04, "width": 0.07,
+        "push_sound": 0.1, "strike": 0.0, "crouch": 27.0, "list": 2.0, "off_sound": 0.04, "width": 0.07,
         "out": 0.05, "vault_sound": 0.1, "arm": 0.65, "arm_sound": 0.85, "forward": -3.0,
     },
     "foot": {
