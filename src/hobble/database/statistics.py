@@ -27,6 +27,7 @@ from hobble.rows.layout import (
     body_layout,
     channel_inputs,
     lower_joints,
+    pose_blocks,
 )
 
 UNSEEN = 1e-10  # input weight of a joint that the network shall not see, as in Holden et al. (2017)
@@ -169,13 +170,7 @@ def x_groups(layout: RowLayout) -> list[slice]:
         for start in (block.start, block.start + half)
     ]
     local = [layout.x_local_phase] if layout.local_phases else []
-    return [*split, layout.x_gait, *x_joint_blocks(layout), layout.x_terrain, *local]
-
-
-def x_joint_blocks(layout: RowLayout) -> list[slice]:
-    """The blocks of X with three columns for each joint."""
-    turns = [layout.x_joint_rotation] if layout.local_phases else []
-    return [layout.x_joint_position, layout.x_joint_velocity, *turns]
+    return [*split, layout.x_gait, *pose_blocks(layout.blocks("x")), layout.x_terrain, *local]
 
 
 def share_in_groups(std: Array, groups: Iterable[slice], constant: float) -> Array:
@@ -203,7 +198,7 @@ def statistics_of_moments(
     """
     x_std = share_in_groups(x.std, x_groups(layout), SILENCING_STD)
     w = np.where(np.isin(list(skeleton["joints"]), skeleton.get("unseen", ())), UNSEEN, 1.0)
-    for block in x_joint_blocks(layout):
+    for block in pose_blocks(layout.blocks("x")):
         # At most 1e30, so that the value stays finite in float32.
         x_std[block] = np.minimum(x_std[block] / np.repeat(w * joint_weight, 3), 1e30)
     for name, _ in layout.channels:

@@ -258,6 +258,15 @@ def channel_inputs(name: str, values: Array) -> Array:
     return read
 
 
+def pose_blocks(blocks: Mapping[str, slice]) -> list[slice]:
+    """The blocks of X with three columns for each joint: positions, velocities, then any rotations.
+
+    blocks: name -> columns, from `RowLayout.blocks` or `blocks_without_terrain`.
+    """
+    names = ("joint_position", "joint_velocity", "joint_rotation")
+    return [blocks[name] for name in names if name in blocks]
+
+
 def blocks_without_terrain(layout: RowLayout) -> dict[str, slice]:
     """Name -> columns of each block of X, counted without the terrain columns."""
     terrain = layout.x_terrain

@@ -14,7 +14,7 @@ from torch import Tensor
 
 from hobble.core.quat import Array
 from hobble.database.reader import Database
-from hobble.rows.layout import GAITS, RowLayout, blocks_without_terrain, lower_joints
+from hobble.rows.layout import GAITS, RowLayout, blocks_without_terrain, lower_joints, pose_blocks
 from hobble.runtime.trajectory import joint_place
 from hobble.training import Training
 from hobble.training.batches import TRAIN, SampleBatch
@@ -70,12 +70,8 @@ def augmentations(
 
 
 def x_pose(blocks: Mapping[str, slice]) -> np.ndarray:
-    """The columns of the pose in X: positions, then velocities, then any rotations of the joints.
-
-    blocks: name -> columns, from `RowLayout.blocks` or `blocks_without_terrain`.
-    """
-    names = ("joint_position", "joint_velocity", "joint_rotation")
-    return np.concatenate([np.r_[blocks[name]] for name in names if name in blocks])
+    """The columns of the pose in X. blocks: as for `pose_blocks`."""
+    return np.concatenate([np.r_[block] for block in pose_blocks(blocks)])
 
 
 def channel_columns(layout: RowLayout, device: torch.device) -> Tensor:

@@ -59,7 +59,7 @@ class Local(Mann):
     @property
     def memory_size(self) -> int:
         """As in `Network`: see `hobble.models.local.predictor`."""
-        return 1 + len(self.start)
+        return 1 + self.remembered.stop - self.remembered.start
 
     @cached_property
     def remembered(self) -> slice:
