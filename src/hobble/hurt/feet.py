@@ -27,8 +27,8 @@ SHORT_SWING_CM = 12.0
 # In mid-swing the toe joint stays at least this much above its height in stance. If it is lower in the
 # source, it stays at least at its height there.
 CLEARANCE_CM = 1.3
-# A swing is lowered less if the stances before and after it differ in height. At this difference, it is
-# lowered 1 / e times as much as on flat ground.
+# A swing is lowered less if the next stance is higher or lower than the slope of the ground explains. At this
+# difference, it is lowered 1 / e times as much as on flat ground.
 UNEVEN_CM = 4.0
 # Two steps differ by at least this height if they are on different steps of stairs. FOOT_CM: ankle to ball.
 STAIR_CM, FOOT_CM = 5.0, 13.5
@@ -144,6 +144,15 @@ def _median_in_stance(values: Array, stance: SourceStance) -> Array:
     return np.median(values[int(first) : int(np.ceil(last)) + 1], axis=0)
 
 
+def _tilts(foot: HurtFoot, stances: list[SourceStance]) -> Array:
+    """The slope of the foot in each stance: rise of the toe over the foot's length.
+
+    On stairs a foot stands level. On a slope its toe is higher or lower than usual.
+    """
+    toes = np.array([_median_in_stance(foot.ball - foot.ankle, stance)[1] for stance in stances])
+    return np.asarray((toes - np.median(toes)) / FOOT_CM)
+
+
 def footprints_of(foot: HurtFoot, stances: list[SourceStance]) -> list[Array]:
     """The footprint of each stance: the position (3,) of the ankle, cm."""
     return [_median_in_stance(foot.ankle, stance) for stance in stances]
@@ -184,18 +193,13 @@ def join_steps(
     so that the edge fits between them.
     """
     old = [footprints_of(foot, stances) for foot, stances in zip(feet, source.stances, strict=True)]
-    # On stairs a foot stands level. On a slope its toe is higher or lower than its ankle.
-    toes = [
-        [float(_median_in_stance(foot.ball - foot.ankle, stance)[1]) for stance in stances]
-        for foot, stances in zip(feet, source.stances, strict=True)
-    ]
-    level = [float(np.median(heights)) for heights in toes]
+    tilts = [_tilts(foot, stances) for foot, stances in zip(feet, source.stances, strict=True)]
     events = sorted((s.middle, side, i) for side in (0, 1) for i, s in enumerate(source.stances[side]))
     joined = False  # whether the last step was joined: then the next one goes to another step of the stairs
     for (_, side, i), (when, next_side, k) in itertools.pairwise(events):
         step, frame = old[next_side][k] - old[side][i], min(round(when), len(source) - 1)
         forward, rise = float(np.hypot(step[0], step[2])), float(step[1])
-        tilt = abs(toes[next_side][k] - level[next_side]) / FOOT_CM
+        tilt = abs(tilts[next_side][k])
         join = effects.changes["join"][frame]
         share, hurt = min(float(abs(join[1] - join[0])), 1.0), int(join[1] > join[0])
         here, there = footprints[side][i], footprints[next_side][k]
@@ -228,7 +232,7 @@ def move_foot(
         least_ball[frames] = sole + rise + np.minimum(ball[frames] - sole, 0.0)
         ankle[frames] = new + quat.rotate(yaw[frames], foot.ankle[frames] - old)
     along = quat.rotate(yaw, foot.ball - foot.ankle)
-    lift = effects.ratio("lift")[:, side]
+    lift, tilts = effects.ratio("lift")[:, side], _tilts(foot, stances)
     out = effects.changes["out"][:, side] * source.leg_length * OUTWARD_SIGN[side]
     outward = quat.rotate(source.heading, np.array([1.0, 0.0, 0.0])) * out[:, None]
     for i, (here, there) in enumerate(itertools.pairwise(stances)):
@@ -242,7 +246,9 @@ def move_foot(
         swing = ankle[off] + (ankle[land] - ankle[off]) * progress + foot.ankle[frames] - line
         u = np.linspace(0.0, 1.0, land - off + 1)  # share of the swing's time
         blend = smoothstep(u / BLEND_SHARE) * smoothstep((1 - u) / BLEND_SHARE)
-        evenness = np.exp(-abs(foot.ankle[land, 1] - foot.ankle[off, 1]) / UNEVEN_CM)
+        step = foot.ankle[land] - foot.ankle[off]
+        slope = (tilts[i] + tilts[i + 1]) / 2
+        evenness = np.exp(-abs(step[1] - slope * np.hypot(step[0], step[2])) / UNEVEN_CM)
         swing[:, 1] -= (1 - lift[frames]) * evenness * blend * (foot.ankle[frames, 1] - line[:, 1])
         swing += outward[frames] * (np.sin(np.pi * u) ** 2)[:, None]
         ground = soles[i] + (soles[i + 1] - soles[i]) * progress[:, 0]

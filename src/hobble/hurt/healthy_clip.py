@@ -8,7 +8,7 @@ import numpy as np
 from hobble.core import quat
 from hobble.core.clip import Clip
 from hobble.core.quat import Array
-from hobble.core.smooth import gaussian
+from hobble.core.smooth import gaussian, smoothstep
 from hobble.hurt.effects import LEFT, RIGHT, SIDES
 from hobble.labels.clip_labels import GAITS, Labels
 from hobble.labels.footfall import find_swings
@@ -20,6 +20,8 @@ LONGEST_CYCLE_SECONDS = 2.5  # a longer time between two landings of a foot is n
 LEAST_SWING = 6  # frames: contacts in the labels shorten a swing, but not below this length
 PATH_SECONDS = 0.25  # sigma of the Gaussian that smooths the hips' positions to a path
 HEADING_SECONDS = 0.2  # sigma of the Gaussian that smooths the heading
+SWAY = 0.3  # a smaller share of movement to a side is only the sway of a walk
+STANDING_SPEED = 30.0  # cm/s: below this, movement to a side counts less
 PHASE_KNOWN_SECONDS = 0.2  # sigma of the Gaussian that smooths `phase_known`
 JOG_SECONDS = 0.1  # sigma of the Gaussian that smooths the share of jogging
 
@@ -46,7 +48,8 @@ class HealthyClip:
     unwrapped; a whole number as the right foot lands. phase_known: (F,) 1 where the phase is known, 0 where
     it is not, smoothed. jog_share: (F,) share of jogging in the gait, 0 to 1. cycle_frames: (F,) length in
     frames of the cycle around each frame. path: (F, 2) horizontal path of the hips, x and z, cm. heading:
-    (F, 4) rotation of the pelvis about Y. leg_length: cm from hip to ankle of a straight leg.
+    (F, 4) rotation of the pelvis about Y. sideways: (F,) share of the movement to a side, 0 to 1.
+    leg_length: cm from hip to ankle of a straight leg.
     """
 
     clip: Clip
@@ -59,6 +62,7 @@ class HealthyClip:
     cycle_frames: Array = field(repr=False)
     path: Array = field(repr=False)
     heading: Array = field(repr=False)
+    sideways: Array = field(repr=False)
     leg_length: float
 
     def __len__(self) -> int:
@@ -86,6 +90,8 @@ def measure_healthy_clip(clip: Clip, labels: Labels) -> HealthyClip:
         stances.append([SourceStance(land, max(land, off)) for land, off in pairs])
     phase, known = phase_of_footsteps(labels.footsteps, frames)
     change = np.diff(phase, prepend=phase[:1])
+    path = gaussian(clip.positions[:, skeleton.role("hips")][:, [0, 2]], PATH_SECONDS * clip.fps)
+    heading = _heading(clip)
     return HealthyClip(
         clip,
         stances,
@@ -95,8 +101,9 @@ def measure_healthy_clip(clip: Clip, labels: Labels) -> HealthyClip:
         gaussian(known.astype(float), PHASE_KNOWN_SECONDS * clip.fps),
         gaussian(labels.gait[:, GAITS.index("jog")], JOG_SECONDS * clip.fps),
         _cycle_lengths(stances, frames, clip.fps),
-        gaussian(clip.positions[:, skeleton.role("hips")][:, [0, 2]], PATH_SECONDS * clip.fps),
-        _heading(clip),
+        path,
+        heading,
+        _sideways(path, heading, clip.fps),
         skeleton.leg_length,
     )
 
@@ -136,6 +143,16 @@ def _heading(clip: Clip) -> Array:
     left, right = (clip.positions[:, clip.skeleton.role(f"{side}_hip")] for side in SIDES)
     forward = gaussian(np.cross(left - right, UP), HEADING_SECONDS * clip.fps)
     return quat.yaw(np.arctan2(forward[:, 0], forward[:, 2]))
+
+
+def _sideways(path: Array, heading: Array, fps: float) -> Array:
+    """(F,) share of the movement along `path` (F, 2) to a side of `heading` (F, 4); 0 for a standing body."""
+    velocity = np.gradient(path, axis=0) * fps
+    across = quat.rotate(heading, np.array([1.0, 0.0, 0.0]))[:, [0, 2]]
+    share = np.abs(np.sum(velocity * across, axis=1)) / np.maximum(
+        np.linalg.norm(velocity, axis=1), STANDING_SPEED
+    )
+    return gaussian(smoothstep((share - SWAY) / (1 - 2 * SWAY)), HEADING_SECONDS * fps)
 
 
 # Interpolates arrays that have a value for each frame, at times between frames.
