@@ -270,19 +270,21 @@ def test_poses_of_a_clip_and_its_version_move_evenly_to_both_sides(healthy_and_h
     """A mean other than the pose itself would make a running character exaggerate."""
     block, x = mixed(healthy_and_hurt)
     moved, names = poses(healthy_and_hurt, x)[:, 0], np.array(healthy_and_hurt.clips)[block.clip]
-    for name, pose in (("walk", 1.0), ("walk_hurt1", 3.0)):
+    for name, pose, atol in (("walk", 1.0, 0.5), ("walk_hurt1", 3.0, 0.15)):
         of_clip = np.sort(moved[names == name])
-        np.testing.assert_allclose(of_clip, np.linspace(pose - 2, pose + 2, len(of_clip)), atol=0.15)
+        of_clip = of_clip[np.abs(of_clip - pose) > 1e-4]
+        even = np.linspace(pose - 2, pose + 2, len(of_clip))
+        np.testing.assert_allclose(of_clip, even, atol=atol)
     assert np.allclose(moved[names == "jog"], 9.0, atol=1e-3), "a clip without versions stays"
 
 
 def test_only_the_pose_moves_and_only_in_a_share_of_the_rows(healthy_and_hurt: Database) -> None:
-    block, x = mixed(healthy_and_hurt, 0.25)
+    block, x = mixed(healthy_and_hurt, 0.7)
     columns = np.r_[x_pose(healthy_and_hurt.layout.blocks("x"))]
     assert np.array_equal(np.delete(x, columns, axis=1), np.delete(block.x, columns, axis=1))
-    of_family = np.array(healthy_and_hurt.clips)[block.clip] != "jog"
-    changed = (x != block.x).any(axis=1)
-    assert changed[of_family].mean() == pytest.approx(0.25, abs=0.03)
+    names, changed = np.array(healthy_and_hurt.clips)[block.clip], (x != block.x).any(axis=1)
+    for name, share in (("walk_hurt1", 0.7), ("walk", 0.1)):
+        assert changed[names == name].mean() == pytest.approx(share, abs=0.03)
 
 
 def test_a_row_gets_the_pose_of_its_own_phase(tmp_path: Path) -> None:

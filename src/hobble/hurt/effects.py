@@ -86,22 +86,22 @@ ADDED_CHANGES: dict[str, dict[str, float]] = {
     "hip": {
         "speed": 0.66, "stride": 1.2, "turn": 0.45, "push": 0.7, "vault": 0.2, "lift": 1.0,
         "crouch": 9.0, "lift_sound": 0.3, "push_sound": 0.3, "out": 0.02, "off_sound": 0.025, "width": 0.07,
-        "vault_sound": 0.5, "arm": 0.75, "arm_sound": 0.85, "forward": 2.0,
+        "vault_sound": 0.5, "arm": 0.75, "arm_sound": 0.85, "forward": 0.0,
     },
     "thigh": {
         "speed": 0.58, "stride": 1.08, "turn": 0.55, "push": 0.4, "vault": 0.8, "crouch": 2.0, "lift": 0.25,
         "lift_sound": 0.3, "push_sound": 0.37, "out": 0.07, "strike": 0.4, "list": 5.0, "toe_out": 8.0,
-        "vault_sound": 0.5, "arm": 0.65, "arm_sound": 0.85, "forward": -2.0,
+        "vault_sound": 0.5, "arm": 0.65, "arm_sound": 0.85, "forward": -3.0,
     },
     "shank": {
         "speed": 0.62, "stride": 1.04, "turn": 0.7, "push": 0.57, "lift": 0.45, "lift_sound": 0.2,
         "push_sound": 0.1, "strike": 0.0, "crouch": 27.0, "list": 2.0, "off_sound": 0.04, "width": 0.07,
-        "out": 0.05, "vault_sound": 0.1, "arm": 0.65, "arm_sound": 0.85, "forward": -3.0,
+        "out": 0.05, "vault_sound": 0.1, "arm": 0.65, "arm_sound": 0.85, "forward": -4.0,
     },
     "foot": {
         "speed": 0.66, "stride": 1.06, "turn": 0.8, "push": 0.12, "lift": 0.7, "lift_sound": 0.3,
         "push_sound": 0.58, "strike": 1.0, "side": 8.0, "toe_out": 18.0, "out": 0.03, "crouch": 3.0,
-        "off": -0.06, "width": 0.01, "vault_sound": 0.5, "arm": 0.65, "arm_sound": 0.85, "forward": -2.0,
+        "off": -0.06, "width": 0.01, "vault_sound": 0.5, "arm": 0.65, "arm_sound": 0.85, "forward": -4.0,
     },
     "back": {
         "speed": 0.68, "push": 0.6, "push_sound": 0.6, "stride": 1.12, "forward": 17.0, "crouch": 9.0,
@@ -120,7 +120,7 @@ ADDED_CHANGES: dict[str, dict[str, float]] = {
 # degrees (`dip`) as the hurt foot bears weight, elbows bent by 40 to 77 degrees (`guard`), both knees
 # bent, eyes on the ground.
 GUARD_CHANGES: dict[str, float] = {
-    "forward": 32.0, "nod": 10.0, "dip": 16.0, "crouch": 10.0, "crouch_sound": 6.0, "guard": 0.85,
+    "forward": 36.0, "nod": 10.0, "dip": 16.0, "crouch": 10.0, "crouch_sound": 6.0, "guard": 0.85,
     "guard_sound": 0.8,
 }  # fmt: skip
 # The changes that are ratios.

@@ -299,6 +299,9 @@ class OtherPoses(Augmentation):
 TABLE_BYTES = 256 << 20
 CANDIDATES = 8  # the pose comes from one of this many rows with the nearest phases: the most similar path
 NEAR_PHASE = 1 / 32  # largest difference in phase between two poses that are mixed, in cycles
+# A healthy row is moved less often than a hurt one, by this factor. The injury is learnt from the hurt rows;
+# in the healthy ones moved poses only make the healthy walk less accurate.
+HEALTHY_SHARE = 1 / 7
 
 
 class VersionPoses(Augmentation):
@@ -310,24 +313,24 @@ class VersionPoses(Augmentation):
     with and without the injury, and only the channels tell whether Y is hurt.
 
     The pose of a hurt row moves along the line to a pose of the healthy clip. The pose of a healthy row moves
-    along the line to a pose of a hurt version. This other pose comes from a row with nearly the same phase:
-    the one whose path turns most like the path of the moved row. The pose moves by a factor of -1 to 1 times
-    the way to the other pose; a negative factor moves it away. The factors are spread evenly. Rows of clips
-    without hurt versions are not changed.
+    more rarely (HEALTHY_SHARE), along the line to a pose of a hurt version. This other pose comes from a row
+    with nearly the same phase: the one whose path turns most like the path of the moved row. The pose moves
+    by a factor of -1 to 1 times the way to the other pose; a negative factor moves it away. The factors are
+    spread evenly. Rows of clips without hurt versions are not changed.
 
     The mean of the factors is 0, for this reason: if all poses of X moved towards the other version, Y would
     always be further from that version than X, because Y does not move. The network would learn to step away
     from that version in each frame, so the character would exaggerate its limp at run time.
 
-    share: share of the rows that are moved.
+    share: share of the hurt rows that are moved.
     """
 
     def __init__(self, database: Database, share: float, places: range, device: torch.device) -> None:
         super().__init__(places, device)
         names, sources, layout = database.clips, database.sources, database.layout
-        self.share = share
         index_of = {name: i for i, name in enumerate(names)}
         hurt = np.array([name in sources for name in names])
+        self.shares = share * np.where(hurt, 1.0, HEALTHY_SHARE)
         # Each clip's family: the index of its healthy original; -1 for clips without hurt versions.
         family = np.array([index_of.get(sources.get(name, name), -1) for name in names])
         family[~np.isin(family, family[hurt])] = -1
@@ -349,8 +352,9 @@ class VersionPoses(Augmentation):
         if not len(self.key):
             return
         x, even = batch.x, self.spread(len(batch.x))
-        # In `share` of the rows spread evenly from -1 to 1, else 0.
-        factors = torch.where(even < self.share, 2 * even / self.share - 1, 0.0)
+        share = torch.from_numpy(self.shares[batch.clip]).to(x.device)
+        # In this share of the rows spread evenly from -1 to 1, else 0.
+        factors = torch.where(even < share, 2 * even / share - 1, 0.0)
         moved = torch.nonzero(factors).flatten()
         key = torch.from_numpy(self.other_key[batch.clip]).to(x.device)
         sought = key[moved] + batch.p[moved].double()
