@@ -145,6 +145,14 @@ def test_the_heel_of_a_held_foot_rises_before_its_leg_is_straight(holden31: Skel
     assert without > lengths[-1] + 0.005
 
 
+def test_the_knee_of_a_foot_held_under_the_hip_does_not_snap_straight(holden31: Skeleton) -> None:
+    """Held 5 cm behind the network's foot, whose heel is behind the hip: the heel rises instead."""
+    feet = Feet(holden31, 0.05, 0.36)  # the toe is 1 cm ahead of the hip
+    lengths = [stretched(feet(np.array([0.0, 0, z]), 1.0), feet.legs) for z in np.arange(0, 5.5, 0.5)]
+    assert lengths[0] < 0.985
+    assert lengths[-1] < STRETCH + 0.0005
+
+
 def test_standing_feet_raise_and_lower_the_body(holden31: Skeleton) -> None:
     """The foot in contact decides how far the body is raised or lowered; the hips stay within their range."""
     base, _ = crouched(holden31)

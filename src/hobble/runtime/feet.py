@@ -308,14 +308,14 @@ HEIGHT_MIX = 0.5  # a foot comes down by this share of the way that is left, eac
 # Largest change of the foot lift, cm a frame. It is needed because a network may predict contact while the
 # foot is at knee height.
 FASTEST_LIFT = 8.0
-# A held foot behind the hip may stretch the leg to this share of the leg's full length, or as far as the
-# network stretches it if that is further. Instead of stretching more, the leg raises its heel. Without this
-# rule, holding a foot 5 cm behind the network's foot straightens a knee that is bent by 26 degrees, and a leg
-# that should stay stiff bends and stretches.
+# A held foot whose heel is behind the hip may stretch the leg to this share of the leg's full length, or as
+# far as the network stretches it if that is further. Instead of stretching more, the leg raises its heel.
+# Without this rule, holding a foot 5 cm behind the network's foot straightens a knee that is bent by 26
+# degrees, and a leg that should stay stiff bends and stretches.
 STRETCH = 0.99
-# The rule of STRETCH applies in full if the toe is at least this many cm behind the hip. A foot ahead of the
-# hip stays flat.
-BEHIND = 10.0
+# The rule sets in as the toe comes within UNDER cm ahead of the hip, and applies in full BEHIND cm later. A
+# foot further ahead stays flat.
+UNDER, BEHIND = 8.0, 10.0
 BODY_MIX = 0.15  # a share of the way that is left, each frame, for the body lift, up and down
 BODY_FREE = 3.0  # cm that standing feet may be off the ground before the body is raised or lowered
 BODY_MIN_CONTACT = 0.3  # if the contacts of both feet sum to less, the feet do not decide the body's height
@@ -371,7 +371,7 @@ def raise_heel(position: Any, hip: int, knee: int, heel: int, toe: int, shift: A
 
     position: (J, 3) of the pose, not changed. shift: (3,) how far the whole foot moves, cm. The foot turns
     about its toe, by MOST_ADDED at most. This rotation is written to `roll` (4,), once the identity, and the
-    heel's movement is added to `shift`. A foot ahead of the hip stays flat.
+    heel's movement is added to `shift`. A foot ahead of the hip by UNDER stays flat.
     """
     # Squares of: the lengths of thigh and shank, the distance from hip to heel before the shift and after it.
     upper, lower, before, needed = 0.0, 0.0, 0.0, 0.0
@@ -391,9 +391,9 @@ def raise_heel(position: Any, hip: int, knee: int, heel: int, toe: int, shift: A
     # The shifted toe is at (wx, up, wz) from the hip, and `ahead` of it in the direction of the foot.
     wx, wz = position[toe, 0] + shift[0] - position[hip, 0], position[toe, 2] + shift[2] - position[hip, 2]
     ahead, up = wx * fx + wz * fz, position[toe, 1] + shift[1] - position[hip, 1]
-    if ahead >= 0.0:
+    if ahead >= UNDER:
         return
-    most += max(1.0 + ahead / BEHIND, 0.0) * (needed - most)
+    most += max(1.0 + (ahead - UNDER) / BEHIND, 0.0) * (needed - most)
     # Find the angle of the turn about the toe after which the squared distance from hip to heel is `most`.
     # Before the turn, the heel is at (-along, high) from the toe. This leads to the equation
     # cosine * cos(angle) + sine * sin(angle) = right.

@@ -73,6 +73,7 @@ enum {
 #define FEET_AHEAD 4.0
 #define FASTEST_LIFT 8.0
 #define STRETCH 0.99
+#define UNDER 8.0
 #define BEHIND 10.0
 #define BODY_MIX 0.15
 #define BODY_FREE 3.0
@@ -1911,8 +1912,8 @@ static void raise_heel(const double *hip, const double *knee, const double *heel
     /* The shifted toe is at (wx, up, wz) from the hip, and `ahead` of it in the direction of the foot. */
     double wx = toe[0] + shift[0] - hip[0], wz = toe[2] + shift[2] - hip[2], ahead = wx * fx + wz * fz,
            up = toe[1] + shift[1] - hip[1];
-    if (ahead >= 0) return;
-    most += larger(1 + ahead / BEHIND, 0) * (needed - most);
+    if (ahead >= UNDER) return;
+    most += larger(1 + (ahead - UNDER) / BEHIND, 0) * (needed - most);
     /* The angle of the turn about the toe after which the squared distance from hip to heel is `most`. */
     double cosine = up * high - ahead * along, sine = ahead * high + up * along, size = length2(cosine, sine);
     double right = 0.5 * (most - wx * wx - up * up - wz * wz - along * along - high * high);
