@@ -62,7 +62,7 @@ def read_profiles() -> dict[str, dict[str, Any]]:
 # Part -> impairment profiles and their weights. Parts that are not here have only ADDED_CHANGES.
 MIXES: dict[str, dict[str, float]] = {
     "pelvis": {"trendelenburg": 0.55, "lurch": 0.25, "antalgic": 0.2},
-    "hip": {"trendelenburg": 0.67, "lurch": 0.24, "antalgic": 0.09},
+    "hip": {"trendelenburg": 0.76, "lurch": 0.15, "antalgic": 0.09},
     "thigh": {"antalgic": 0.6, "stiff_legged": 0.4},
     "shank": {"antalgic": 0.8, "stiff_legged": 0.15, "steppage": 0.05},
     "foot": {"antalgic": 0.65, "steppage": 0.35},
@@ -85,7 +85,7 @@ ADDED_CHANGES: dict[str, dict[str, float]] = {
     },
     "hip": {
         "speed": 0.66, "stride": 1.2, "turn": 0.45, "push": 0.7, "vault": 0.2, "lift": 1.0,
-        "crouch": 9.0, "lift_sound": 0.3, "push_sound": 0.3, "out": 0.02, "off_sound": 0.025, "width": 0.07,
+        "crouch": 11.0, "lift_sound": 0.3, "push_sound": 0.3, "out": 0.02, "off_sound": 0.025, "width": 0.07,
         "vault_sound": 0.5, "arm": 0.75, "arm_sound": 0.85, "forward": 0.0,
     },
     "thigh": {
@@ -95,12 +95,12 @@ ADDED_CHANGES: dict[str, dict[str, float]] = {
     },
     "shank": {
         "speed": 0.62, "stride": 1.04, "turn": 0.7, "push": 0.57, "lift": 0.45, "lift_sound": 0.2,
-        "push_sound": 0.1, "strike": 0.0, "crouch": 27.0, "list": 2.0, "off_sound": 0.04, "width": 0.07,
+        "push_sound": 0.1, "strike": 0.0, "crouch": 29.0, "list": 2.0, "off_sound": 0.04, "width": 0.07,
         "out": 0.05, "vault_sound": 0.1, "arm": 0.65, "arm_sound": 0.85, "forward": -4.0,
     },
     "foot": {
         "speed": 0.66, "stride": 1.06, "turn": 0.8, "push": 0.12, "lift": 0.7, "lift_sound": 0.3,
-        "push_sound": 0.58, "strike": 1.0, "side": 8.0, "toe_out": 18.0, "out": 0.03, "crouch": 3.0,
+        "push_sound": 0.58, "strike": 1.0, "side": 8.0, "toe_out": 18.0, "out": 0.03, "crouch": 6.0,
         "off": -0.06, "width": 0.01, "vault_sound": 0.5, "arm": 0.65, "arm_sound": 0.85, "forward": -4.0,
     },
     "back": {
