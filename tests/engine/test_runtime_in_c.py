@@ -74,7 +74,7 @@ def test_c_moves_a_character_as_python_does(kind, mode, storage, options, built_
     network, runtime = network_of(kind, holden31, tmp_path), Runtime(mode=mode, **options)
     (tmp_path / "character.hob").write_bytes(character_bytes(network, runtime, storage))
     for name, situation in SITUATIONS.items():
-        frames = {"hills": 3600, "stairs": 900}.get(name, 60) if mode != "constant" else 60
+        frames = {"hills": 3600, "stairs": 900, "varied": 300}.get(name, 60) if mode != "constant" else 60
         (tmp_path / f"{name}.trace").write_bytes(trace(network, runtime, situation, frames, storage))
     command = [built_folder / "check_traces", tmp_path / "character.hob", *tmp_path.glob("*.trace")]
     found = subprocess.run(command, capture_output=True, text=True, check=False)

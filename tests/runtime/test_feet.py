@@ -48,6 +48,7 @@ class Feet:
         self.ahead, self.fastest = rest_facing(skeleton), 1e8
         self.base = crouched(skeleton, *bent)
         self.shown, self.height = self.base[0][None, self.legs[:, 1:]], np.zeros(1)
+        self.more = np.zeros((1, 2))
 
     def __call__(
         self, moved: np.ndarray, contact: float, ground: float | None = None, other: float = 0.0
@@ -57,7 +58,7 @@ class Feet:
         position, rotation = self.base[0][None] + moved, self.base[1][None].copy()
         contacts = np.array([[contact, contact, other, other]], np.float32)
         legs = self.legs, self.below, np.array([5.0, 4.0]), self.ahead, self.fastest
-        feet = self.held, self.lift, self.added, self.shown, self.height, np.zeros(1)
+        feet = self.held, self.lift, self.added, self.shown, self.height, np.zeros(1), self.more
         place_feet(contacts, np.full((1, 4), ground), True, legs, feet, position, rotation)
         self.contacts, self.rotation = contacts[0], rotation[0]
         return position[0]
@@ -75,6 +76,29 @@ def test_a_foot_in_contact_stays_and_is_released_slowly(holden31: Skeleton) -> N
     for _ in range(20):
         last = feet(8 * step, 0.0)[toe]
     np.testing.assert_allclose(last, free, atol=1e-9)
+
+
+@pytest.mark.parametrize("more", [-0.3, 0.2])
+def test_a_knee_that_bends_more_does_so_in_the_air_only(holden31: Skeleton, more: float) -> None:
+    feet, plain = Feet(holden31), Feet(holden31)
+    feet.more[0, 0] = more
+    hip, knee, heel, toe = feet.legs[0]
+
+    def bend(place: np.ndarray) -> float:
+        thigh, shank = place[knee] - place[hip], place[heel] - place[knee]
+        return float(np.arccos(thigh @ shank / np.linalg.norm(thigh) / np.linalg.norm(shank)))
+
+    for k in range(10):  # on the ground
+        moved = np.array([0.0, 0, k])
+        before, shown = plain(moved, 1.0), feet(moved, 1.0)
+        np.testing.assert_array_equal(shown, before)
+    for _ in range(10):
+        before, shown = plain(moved, 0.0, ground=-20.0), feet(moved, 0.0, ground=-20.0)
+    assert bend(shown) == pytest.approx(bend(before) + more, abs=1e-4)
+    np.testing.assert_array_equal(shown[feet.legs[1]], before[feet.legs[1]])
+    for _ in range(10):  # a foot that a straighter knee would lower into the ground stays on it
+        ground = before[toe, 1] - 4.5
+        assert feet(moved, 0.0, ground=ground)[toe, 1] >= ground + 4.0 - 1e-6
 
 
 def glide(

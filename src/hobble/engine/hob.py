@@ -26,6 +26,7 @@ from hobble.runtime.character import start_characters
 from hobble.runtime.controller import FPS
 from hobble.runtime.feet import foot_parts, leg_joints, rest_facing, sole_heights
 from hobble.runtime.stairs import leg_of_columns
+from hobble.runtime.variation import find_arms
 
 MAGIC, VERSION, ORDER_MARK = b"HOBBLE\r\n", 5, 0x01020304
 HEADER, ENTRY, ALIGNMENT = 64, 40, 64
@@ -118,6 +119,7 @@ def _body_sections(network: Network) -> Sections:
         "parents": np.array(skeleton.parents, np.int32),
         "offsets": np.asarray(skeleton.offsets, float).ravel(),
         "legs": legs.ravel().astype(np.int32),
+        "arms": np.array([joint for arm in find_arms(skeleton) for joint in arm[:2]], np.int32),
         "parts": foot_parts(skeleton, legs).ravel().astype(np.uint8),
         "sole": np.asarray(sole_heights(network, legs), float),
         "ahead": rest_facing(skeleton),

@@ -26,7 +26,7 @@ from hobble.runtime.layers import Layers
 from hobble.runtime.network_rows import ChannelValues
 from hobble.runtime.stairs import PACE, joins, leg_of_columns, more_cycles
 from hobble.runtime.trajectory import target_facing
-from hobble.runtime.variation import count_steps, vary_step
+from hobble.runtime.variation import count_steps, mix_swing, vary_step
 from hobble.runtime.waypoints import Follower, Waypoint
 
 if TYPE_CHECKING:
@@ -293,7 +293,8 @@ class ProceduralAnimation:
         slowing = [(columns[name], channel(name)) for name in columns if channel(name).slows]
         shares = [state.channel_values[:, at].max(axis=1, initial=0.0) / each.highest for at, each in slowing]
         hurt = np.minimum(np.max([np.zeros(self.characters), *shares], axis=0), 1.0)
-        pace, speed, shown = vary_step(self._seeds, state.step, hurt, self._variation)
+        pace, speed, shown, swing = vary_step(self._seeds, state.step, hurt, self._variation)
+        mix_swing((state.knee_more, state.arm_more), state.step, swing)
         controller.pace[:], controller.shown[:] = pace, shown
         velocity *= speed[:, None]
 

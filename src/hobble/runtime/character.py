@@ -20,7 +20,7 @@ from hobble.models.network import Network
 AT_ZERO: dict[str, tuple[int, ...]] = {
     "root_height": (), "smoothed_velocity": (2,), "strafe": (), "correction": (2,), "earlier": (2,),
     "foot_lock": (2,), "foot_hold": (2, 2), "foot_step": (2,), "foot_missed": (2,), "foot_lift": (2,),
-    "body_lift": (), "step": (),
+    "body_lift": (), "step": (), "knee_more": (2,), "arm_more": (2,), "arm_mean": (2,),
 }  # fmt: skip
 SHOWN_JOINTS = ("knee", "heel", "toe")  # the joints of each leg in `Character.leg_shown`, in this order
 
@@ -44,7 +44,8 @@ class Character:
     foot_lift (C, 2), foot_added (C, 2, 2, 4), leg_shown (C, 2, 3, 3), body_lift (C,): the rest of foot
     placement, see `Feet` and `carry_body` in `hobble.runtime.feet`.
     placed: (C,) bool, whether the joints have been lifted to the ground, which happens once, at the start.
-    step: (C,) half cycles since the start, see `hobble.runtime.variation`.
+    step (C,), half cycles since the start, knee_more, arm_more, arm_mean (C, 2): what differs from step to
+    step, see `hobble.runtime.variation`.
     memory: (C, M) the network's own state of the character, see `Network.memory_size`.
     """
 
@@ -74,6 +75,9 @@ class Character:
     body_lift: Array
     placed: np.ndarray
     step: Array
+    knee_more: Array
+    arm_more: Array
+    arm_mean: Array
     memory: Array
 
 

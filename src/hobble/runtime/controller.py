@@ -20,6 +20,7 @@ from hobble.runtime import feet, network_rows, trajectory
 from hobble.runtime.bounds import Bounds, limit_rows
 from hobble.runtime.character import Character
 from hobble.runtime.trajectory import STILL, Trajectory, movement_share, phase_change
+from hobble.runtime.variation import find_arms, swing_arms
 
 # If the predicted poses are recorded frames (motion matching), the root's movement in a frame is changed
 # toward the target velocity. At right angles to the target, the change is at most this share of the
@@ -219,7 +220,7 @@ class Controller:
         legs = feet.leg_joints(network.skeleton)
         parts, ahead = feet.foot_parts(network.skeleton, legs), feet.rest_facing(network.skeleton)
         self._legs = legs, parts, feet.sole_heights(network, legs), ahead, self.bounds.fastest
-        self._hips = network.skeleton.role("hips")
+        self._hips, self._arms = network.skeleton.role("hips"), find_arms(network.skeleton)
         self._hips_range = (*self.bounds.hips, self.bounds.upright)
         # The joints under which the ground is looked up (heels, toes, hips), and the ground heights there.
         self._ground_joints = np.append(legs[:, 2:].reshape(-1), self._hips)
@@ -235,7 +236,7 @@ class Controller:
         self.drawn = (self.root, self.yaw, self.pose_position, self.pose_rotation)
         self._feet = (
             (c.foot_lock, c.foot_hold, c.foot_step, c.foot_missed),
-            *(c.foot_lift, c.foot_added, c.leg_shown, c.root_height, c.body_lift),
+            *(c.foot_lift, c.foot_added, c.leg_shown, c.root_height, c.body_lift, c.knee_more),
         )
         self._contacts = self.y[:, self.layout.y_contacts]
         self._predicted_hips = self.y[:, self._y_joints + 3 * self._hips + 1]
@@ -313,6 +314,8 @@ class Controller:
             self._contacts, self._ground_heights, self._hips, self._hips_range,
             self._predicted_hips, self._legs, c.body_lift, self.pose_position,
         )  # fmt: skip
+        if c.arm_more.any():
+            swing_arms(self._arms, c.arm_more, c.arm_mean, *self.drawn[1:])
         feet.place_feet(
             self._contacts, self._ground_heights, self.foot_locking, self._legs, self._feet,
             self.pose_position, self.pose_rotation,

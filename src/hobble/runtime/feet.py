@@ -323,6 +323,9 @@ SOLE = (5.0, 4.0)  # height of heel and toe joint above the ground in a standing
 # A held foot is lowered only if its joints are more than this many cm above SOLE. Skeletons differ in how
 # high these joints are.
 FLOATING = 3.0
+# Where steps differ, see `hobble.runtime.variation`: the height of a heel above the ground, in cm, from which
+# its knee bends as much more as it should, and the bends, in radians, between which it is changed.
+BENDS_ABOVE, BENT, MOST_BENT = 10.0, 0.1, 2.5
 FOOT, TOES = 1, 2  # the part of a foot to which a joint belongs, see `foot_parts`; 0: neither
 
 
@@ -333,9 +336,10 @@ FOOT, TOES = 1, 2  # the part of a foot to which a joint belongs, see `foot_part
 Legs = tuple[Any, Any, Any, Any, float]
 # The state of the feet between frames: held, see `Hold`; lift (C, 2), the foot lift; added (C, 2, 2, 4),
 # rotations added to thigh and shank of each leg; shown (C, 2, 3, 3), knee, heel and toe of each leg as they
-# were drawn; root_height (C,), mean ground height on the path; body_lift (C,). The heights in `shown` are
-# above root_height + body_lift, because the whole body may rise in a frame.
-Feet = tuple[Hold, Any, Any, Any, Any, Any]
+# were drawn; root_height (C,), mean ground height on the path; body_lift (C,); more (C, 2), radians that each
+# knee bends more in the air. The heights in `shown` are above root_height + body_lift, because the whole body
+# may rise in a frame.
+Feet = tuple[Hold, Any, Any, Any, Any, Any, Any]
 
 
 def leg_joints(skeleton: Skeleton) -> np.ndarray:
@@ -517,6 +521,27 @@ def carry_body(
 
 
 @njit
+def heel_of_bend(position: Any, hip: int, knee: int, heel: int, more: float) -> tuple[float, float, float]:
+    """How far (x, y, z) the heel of a pose (J, 3) moves, toward the hip, if the knee bends by `more` radians.
+
+    If `more` is negative, it moves away from the hip, but the knee stays bent by BENT, if it was.
+    """
+    upper, lower, before = 0.0, 0.0, 0.0  # squares of the lengths, and of the distance from hip to heel
+    for i in range(3):
+        upper += (position[knee, i] - position[hip, i]) ** 2
+        lower += (position[heel, i] - position[knee, i]) ** 2
+        before += (position[heel, i] - position[hip, i]) ** 2
+    both = 2.0 * np.sqrt(upper * lower)
+    if before < 1.0 or both < 1.0:
+        return 0.0, 0.0, 0.0
+    bent = np.arccos(min(max((before - upper - lower) / both, -1.0), 1.0))
+    bent = min(max(bent + more, min(bent, BENT)), max(bent, MOST_BENT))
+    share = np.sqrt((upper + lower + both * np.cos(bent)) / before) - 1.0
+    x, y, z = position[hip, 0], position[hip, 1], position[hip, 2]
+    return share * (position[heel, 0] - x), share * (position[heel, 1] - y), share * (position[heel, 2] - z)
+
+
+@njit
 def place_feet(
     contacts: Any, ground: Any, locking: bool, legs: Legs, feet: Feet, position: Any, rotation: Any
 ) -> None:
@@ -527,7 +552,7 @@ def place_feet(
     held at all. position (C, J, 3), rotation (C, J, 4): the pose.
     """
     joints, parts, sole, ahead, fastest = legs
-    held, lift, added, shown, root_height, body_lift = feet
+    held, lift, added, shown, root_height, body_lift, more = feet
     lock, hold, step, missed = held
     shift, roll = np.zeros(3), np.zeros(4)
     for c in range(position.shape[0]):
@@ -540,6 +565,14 @@ def place_feet(
             )
             # Lift a foot out of the ground; lower a held foot that floats; raise a foot that steps.
             depth = sole_depth(position[c], heel, toe, ground[c, 2 * f], ground[c, 2 * f + 1], sole)
+            x, y, z = 0.0, 0.0, 0.0
+            if more[c, f] != 0.0:
+                # Only in the air: nothing changes as the foot leaves the ground, and little as it lands.
+                near = max(lock[c, f], min(contacts[c, 2 * f + 1] / LOCK_AT, 1.0))
+                high = (position[c, heel, 1] - ground[c, 2 * f] - sole[0]) / BENDS_ABOVE
+                free = (1.0 - held_share(near)) * held_share(min(max(high, 0.0), 1.0))
+                x, y, z = heel_of_bend(position[c], hip, knee, heel, free * more[c, f])
+                shift[0], shift[2], depth = shift[0] + x, shift[2] + z, depth - y
             rise = max(depth, 0.0)
             if step[c, f] == 0.0:
                 rise += held_share(lock[c, f]) * min(depth + FLOATING, 0.0)
@@ -547,7 +580,7 @@ def place_feet(
             if change < 0.0:
                 change *= HEIGHT_MIX
             lift[c, f] += min(max(change, -FASTEST_LIFT), FASTEST_LIFT)
-            shift[1] = lift[c, f]
+            shift[1] = lift[c, f] + y
             if step[c, f] > 0.0:
                 # It leaves the ground slowly, and comes back slowly. The network's may be above it already.
                 height = STEP_HEIGHT * (4.0 * step[c, f] * (1.0 - step[c, f])) ** 2

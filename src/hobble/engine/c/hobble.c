@@ -79,6 +79,9 @@ enum {
 #define BODY_FREE 3.0
 #define BODY_MIN_CONTACT 0.3
 #define FLOATING 3.0
+#define BENDS_ABOVE 10.0
+#define BENT 0.1
+#define MOST_BENT 2.5
 #define MOST_ADDED RADIANS(28)
 #define KNEE_AHEAD 3.0
 /* Networks and motion matching. */
@@ -166,7 +169,7 @@ typedef struct { /* a character file, read only */
     int stand, walk, jog, crouch;
     int y_contacts, y_position, y_direction,
         y_joints; /* first columns in Y; 0 to 3 are velocity, turn, phase */
-    const int32_t *inputs, *x_first, *x_channels, *parents, *legs, *channel_of;
+    const int32_t *inputs, *x_first, *x_channels, *parents, *legs, *arms, *channel_of; /* arms: find_arms */
     const uint8_t *parts, *slows; /* slows: for each channel, whether its values make a body limp */
     const uint8_t *leg;           /* for each column, the leg that hurts: 1 left, 2 right, 0 none */
     const char *names;            /* each ends with a 0 */
@@ -421,6 +424,7 @@ static void read_body(reader *r, model *m) {
     m->parents = indices(r, "parents", joints, -1, (int64_t)last);
     m->offsets = doubles(r, "offsets", 3 * joints, -1e5, 1e5);
     m->legs = indices(r, "legs", 8, 0, (int64_t)last);
+    m->arms = indices(r, "arms", 4, 0, (int64_t)last);
     m->parts = small(r, "parts", 2 * joints, TOES);
     m->sole = doubles(r, "sole", 2, -1e6, 1e6);
     m->ahead = doubles(r, "ahead", 3, -1.001, 1.001);
@@ -608,7 +612,7 @@ typedef struct {
     double root[3], yaw, report[6]; /* report: what hobble_state returns */
     int placed;
     /* Steps that differ, see vary. pace and shown: factors of the change of phase and of the values. */
-    double variation, pace, shown;
+    double variation, pace, shown, knee_more[2], arm_more[2], arm_mean[2];
     uint32_t seed, step;
 } character;
 
@@ -1989,20 +1993,70 @@ static void carry_body(const model *m, character *c, const float *y, const doubl
     for (int j = 0; j < m->size[JOINTS]; j++) c->pose_position[j][1] += c->body_lift;
 }
 
+/* How the heel moves if the knee bends by `more` radians more: see heel_of_bend in feet.py. */
+static void heel_of_bend(const double *hip, const double *knee, const double *heel, double more,
+                         double *move) {
+    double thigh[3], shank[3], line[3];
+    minus(knee, hip, thigh);
+    minus(heel, knee, shank);
+    minus(heel, hip, line);
+    double upper = dot3(thigh, thigh), lower = dot3(shank, shank), before = dot3(line, line),
+           both = 2 * sqrt(upper * lower);
+    if (before < 1 || both < 1) return;
+    double bent = acos(clamp((before - upper - lower) / both, -1, 1));
+    bent = clamp(bent + more, smaller(bent, BENT), larger(bent, MOST_BENT));
+    double share = sqrt((upper + lower + both * cos(bent)) / before) - 1;
+    for (int i = 0; i < 3; i++) move[i] = share * line[i];
+}
+
+/* Lets the arms swing further, or less: see swing_arms in variation.py. */
+static void swing_arms(const model *m, character *c) {
+    double sine = sin(c->yaw), cosine = cos(c->yaw);
+    if (c->arm_more[0] == 0 && c->arm_more[1] == 0) return;
+    for (int side = 0; side < 2; side++) {
+        int first = m->arms[2 * side];
+        double bone[3], *shoulder = c->pose_position[first];
+        minus(c->pose_position[m->arms[2 * side + 1]], shoulder, bone);
+        double ahead = (bone[0] * sine + bone[2] * cosine) / larger(sqrt(dot3(bone, bone)), 1e-6);
+        c->arm_mean[side] += (ahead - c->arm_mean[side]) / 60;
+        double half = c->arm_more[side] * (ahead - c->arm_mean[side]) / 2;
+        double turn[4] = {cos(half), -cosine * sin(half), 0, sine * sin(half)};
+        for (int j = first; j < m->size[JOINTS]; j++) {
+            int above = j;
+            double from[3];
+            while (above > first) above = m->parents[above];
+            if (above != first) continue;
+            minus(c->pose_position[j], shoulder, from);
+            turn_vector(turn, from, bone);
+            for (int i = 0; i < 3; i++) c->pose_position[j][i] = shoulder[i] + bone[i];
+            turn_rotation(turn, c->pose_rotation[j]);
+        }
+    }
+}
+
 /* Holds foot `f` if it is in contact, and keeps it out of the ground. Writes contact 0 for a foot that steps.
  */
 static void place_foot(const model *m, character *c, int f, float *contacts, const double *ground) {
     const int32_t *leg = m->legs + 4 * f;
     double shift[3], horizontal[2], roll[4] = {1, 0, 0, 0}, old[3], *heel = c->pose_position[leg[HEEL]];
     hold_foot(m, c, f, contacts[2 * f + 1], horizontal);
-    double depth = sole_depth(m, c, f, ground + 2 * f), rise = larger(depth, 0), done = c->foot_step[f];
+    double depth = sole_depth(m, c, f, ground + 2 * f), done = c->foot_step[f], bend[3] = {0};
+    if (c->knee_more[f] != 0) { /* only in the air */
+        double near = larger(c->foot_lock[f], smaller(contacts[2 * f + 1] / LOCK_AT, 1));
+        double high = (heel[1] - ground[2 * f] - m->sole[0]) / BENDS_ABOVE;
+        double in_air = (1 - held_share(near)) * held_share(clamp(high, 0, 1));
+        heel_of_bend(c->pose_position[leg[HIP]], c->pose_position[leg[KNEE]], heel, in_air * c->knee_more[f],
+                     bend);
+        depth -= bend[1];
+    }
+    double rise = larger(depth, 0);
     if (done == 0) rise += held_share(c->foot_lock[f]) * smaller(depth + FLOATING, 0);
     double change = rise - c->foot_lift[f];
     if (change < 0) change *= HEIGHT_MIX;
     c->foot_lift[f] += clamp(change, -FASTEST_LIFT, FASTEST_LIFT);
-    shift[0] = horizontal[0];
-    shift[1] = c->foot_lift[f];
-    shift[2] = horizontal[1];
+    shift[0] = horizontal[0] + bend[0];
+    shift[1] = c->foot_lift[f] + bend[1];
+    shift[2] = horizontal[1] + bend[2];
     if (done > 0) { /* the foot leaves the ground slowly, and comes back slowly */
         double share = 4 * done * (1 - done);
         shift[1] += larger(STEP_HEIGHT * share * share - larger(-depth, 0), 0);
@@ -2090,26 +2144,36 @@ static double step_noise(uint32_t seed, uint32_t step, uint32_t stream) {
 }
 
 /* Makes each step of a character take a little more or less time and way: see variation.py, which has the
-   same numbers. Streams of random numbers: 0 time, 1 length, 2 how much an injury shows, 3 the person. */
+   same numbers and streams of random numbers. */
 static void vary(const model *m, character *c, goal *target) {
-    static const double healthy[3] = {0.035, 0.03, 0.0}, hurt[3] = {0.11, 0.08, 0.12}, sides_differ = 0.015;
-    double most = 0, factors[3];
+    enum { TIME, LENGTH, SHOWN, PERSON, KNEE_MORE, ARM_MORE, STREAMS };
+    static const double healthy[STREAMS] = {0.035, 0.03, 0, 0, 0.066, 0.1},
+                        hurt[STREAMS] = {0.11, 0.08, 0.12, 0, 0.17, 0.2},
+                        sides_differ[STREAMS] = {0.015, 0, 0, 0, 0.052, 0.225}, swing_mix = 0.15;
+    double most = 0, more[STREAMS];
     uint32_t half = (uint32_t)(2 * c->phase) % 2;
     c->pace = 1;
-    if (!(c->variation > 0)) return;
+    if (!(c->variation > 0)) {
+        memset(c->knee_more, 0, sizeof c->knee_more);
+        memset(c->arm_more, 0, sizeof c->arm_more);
+        return;
+    }
     c->step += half != c->step % 2;
     for (int k = 0; k < m->size[COLUMNS]; k++)
         if (m->slows[m->channel_of[k]] && m->highest[k] > 0)
             most = larger(most, c->values[k] / m->highest[k]);
     most = smaller(most, 1);
-    for (uint32_t s = 0; s < 3; s++) {
+    uint32_t side = c->step % 2;
+    for (uint32_t s = 0; s < STREAMS; s++) {
         double spread = healthy[s] + most * (hurt[s] - healthy[s]);
-        factors[s] = 1 + c->variation * spread * step_noise(c->seed, c->step, s);
+        double person = sides_differ[s] * (side ? -1 : 1) * step_noise(c->seed, s, PERSON);
+        more[s] = c->variation * (spread * step_noise(c->seed, c->step, s) + person);
     }
-    double person = c->variation * sides_differ * step_noise(c->seed, 0, 3);
-    c->pace = factors[0] + (c->step % 2 ? -person : person);
-    c->shown = factors[2];
-    for (int i = 0; i < 2; i++) target->velocity[i] *= factors[1];
+    c->pace = 1 + more[TIME];
+    c->shown = 1 + more[SHOWN];
+    c->knee_more[side] += swing_mix * (more[KNEE_MORE] - c->knee_more[side]);
+    c->arm_more[side] += swing_mix * (more[ARM_MORE] - c->arm_more[side]);
+    for (int i = 0; i < 2; i++) target->velocity[i] *= 1 + more[LENGTH];
 }
 
 /* Whether `count` numbers are finite and not too large. */
@@ -2213,6 +2277,7 @@ static int place(hobble *h, const hobble_ground *ground) {
         double *heights = h->heights + 9 * i;
         for (int k = 0; k < 4; k++) heights[k] = larger(heights[k], heights[5 + k]);
         carry_body(m, c, y, heights);
+        swing_arms(m, c);
         for (int f = 0; f < 2; f++) place_foot(m, c, f, contacts, heights);
         for (int k = 0; k < 4; k++) c->report[2 + k] = clamp(contacts[k], 0, 1);
     }
