@@ -229,7 +229,7 @@ HEEL = np.array([0.0, -4.2, -3.0])  # cm from the ankle joint to the heel, appro
 READY = 0.95  # after this share of the swing, the foot has the pitch with which it lands
 # Exponents of the time in a swing, which runs from 0 to 1. KICK is below 1, so the foot is highest before the
 # middle of the swing. EARLY is below 1, so the foot covers more than half of its way in the first half.
-KICK, EARLY = 0.64, 0.81
+KICK, EARLY = 0.57, 0.81
 FOLLOW = 0.45  # the pitch begins the swing with this share of its rate of change at the end of the stance
 LANDING_SPEED = 0.36  # speed of the foot as it lands, as a share of its mean speed in the swing
 # Where the ground is in the way, the foot is raised more. The raise grows in the first RISE of the swing, and
@@ -300,6 +300,7 @@ def _swing(foot: FootPoses, here: Stance, there: Stance, style: Style, side: int
     first_toe = here.toe_at(first_pitch)
     toe = first_toe + (there.toe_at(last_pitch) - first_toe) * share
     toe[:, 1] += style.lift[t, side] * bump
+    toe += quat.rotate(turn, SIDE_SIGN[side] * X_AXIS) * (style.circle[t] * bump)[:, None]
     toe[:, 1] += (
         _missing_height(toe, rotation, toes, style.clearance[t, side] * bump, ground)
         * smoothstep(u / RISE)

@@ -67,7 +67,7 @@ def pose_figure(
     world = np.tile(quat.IDENTITY, (len(path), len(skeleton.joints), 1))
     _set_trunk_and_head(walk, world, hips, chest)
     for side in (LEFT, RIGHT):
-        _set_leg(skeleton, world, root, feet[side], side)
+        _set_leg(walk, world, root, feet[side], side)
         _set_arm(walk, world, side)
     return local_rotations(skeleton, world), root
 
@@ -92,7 +92,7 @@ def _pelvis_rotation(walk: _Walk, yaw: Array) -> Array:
 def _chest_rotation(walk: _Walk, yaw: Array) -> Array:
     """(F, 4) world rotation. The chest turns opposite to the pelvis. yaw: see `_pelvis_rotation`."""
     turn = -walk.style.chest_yaw * walk.wave(0.03) + 0.8 * walk.noise[:, 1]
-    lean = walk.style.lean + 0.8 * walk.wave(0.05, 2) + 0.8 * walk.noise[:, 2]
+    lean = walk.style.lean + walk.style.bow * walk.wave(0.05, 2) + 0.8 * walk.noise[:, 2]
     return quat.mul(yaw, quat.mul(_rotation(Y, turn), _rotation(X, lean)))
 
 
@@ -165,12 +165,12 @@ def _set_trunk_and_head(walk: _Walk, world: Array, hips: Array, chest: Array) ->
         world[:, index(name)] = quat.slerp(lower, upper, np.full(len(path), share))
 
 
-def _set_leg(skeleton: Skeleton, world: Array, root: Array, foot: FootPoses, side: int) -> None:
+def _set_leg(walk: _Walk, world: Array, root: Array, foot: FootPoses, side: int) -> None:
     """Set a leg by inverse kinematics. The knee points midway between the directions of pelvis and foot."""
-    name = ("Left", "Right")[side]
+    name, skeleton = ("Left", "Right")[side], walk.skeleton
     hips = world[:, 0]
     hip_joint = root + quat.rotate(hips, skeleton.offsets[skeleton.index(f"{name}UpLeg")])
-    forward = np.array([SIDE_SIGN[side] * 0.06, 0.0, 1.0])  # and slightly outward
+    forward = walk.style.knee_out[:, None] * SIDE_SIGN[side] * X + Z
     knee_direction = quat.rotate(hips, forward) + quat.rotate(foot.foot, forward)
     upper, lower = leg_lengths(skeleton, name)
     knee, ankle = two_bone_knee(hip_joint, foot.ankle, knee_direction, upper, lower)

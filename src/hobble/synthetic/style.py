@@ -1,8 +1,8 @@
 """How the figure moves in each gait at each speed: timing, feet, pelvis, trunk and arms.
 
-The values for walking at 1.3 m/s and for running are those of healthy adults on level ground: Perry &
-Burnfield, Gait Analysis; Winter, The Biomechanics and Motor Control of Human Gait; for running, Novacheck
-(1998).
+The values for running are those of healthy adults: Novacheck (1998). The values for walking at 1.3 m/s began
+as those of Perry & Burnfield, Gait Analysis, and Winter, The Biomechanics and Motor Control of Human Gait.
+Many were then moved towards the means of four captured people (`benchmarks/healthy_walks.py`).
 """
 
 from types import SimpleNamespace
@@ -19,36 +19,40 @@ REFERENCE_SPEED = (0.0, 1.3, 2.8, 0.8)  # m/s, for each gait of GAITS
 # in degrees, lengths in cm, and shares. An amplitude is half the range of a movement in a cycle.
 VALUES_BY_GAIT: dict[str, tuple[tuple[float, float], ...]] = {
     "duty": ((0.64, 0), (0.604, -0.06), (0.365, -0.05), (0.64, -0.06)),  # share of the cycle on the ground
-    "land_pitch": ((0, 0), (16, 6), (15, 2), (-24, 0)),  # pitch of the foot as it lands, + toe up
-    "off_pitch": ((-15, 0), (-53, -13), (-49, -1), (-58, -8)),  # pitch of the foot as it leaves the ground
+    "land_pitch": ((0, 0), (17, 6), (15, 2), (-24, 0)),  # pitch of the foot as it lands, + toe up
+    "off_pitch": ((-15, 0), (-56, -13), (-49, -1), (-58, -8)),  # pitch of the foot as it leaves the ground
     "rest_pitch": ((0, 0), (0, 0), (0, 0), (-24, 0)),  # pitch of the foot while it stands
-    "flat": ((0.15, 0), (0.14, 0), (0.30, 0), (0.15, 0)),  # share of stance until the toe is down
+    "flat": ((0.15, 0), (0.16, 0), (0.30, 0), (0.15, 0)),  # share of stance until the toe is down
     # share of stance until the heel leaves the ground
     "heel_off": ((0.6, 0), (0.32, -0.03), (0.30, 0), (0.48, 0)),
     # exponent of the heel's rise over time: slow at first, then fast
-    "roll": ((2.8, 0), (3.2, 0), (2.6, 0), (1.9, 0)),
+    "roll": ((2.8, 0), (3.3, 0), (2.6, 0), (1.9, 0)),
     # greatest height of the swinging foot above the line from its last place on the ground to its next
-    "lift": ((2, 0), (5.2, 1), (4, 3), (4, 0)),
+    "lift": ((2, 0), (6, 1), (4, 3), (4, 0)),
+    "circle": ((0, 0), (3.5, 0), (0, 0), (0, 0)),  # greatest distance outward from this line
     "clearance": ((1, 0), (2.5, 0), (3, 0), (2, 0)),  # least height of the sole above the ground in mid-swing
-    "behind": ((4, 0), (9.9, 5.5), (7.5, 3), (10, 5)),  # distance of an ankle behind the body in mid-stance
-    "width": ((9.5, 0), (5.5, 0), (3.5, 0), (9.5, 0)),  # distance of an ankle from the path, sideways
+    "behind": ((4, 0), (10.5, 5.5), (7.5, 3), (10, 5)),  # distance of an ankle behind the body in mid-stance
+    "width": ((9.5, 0), (3.3, 0), (3.5, 0), (9.5, 0)),  # distance of an ankle from the path, sideways
     "toe_out": ((8, 0), (6, 0), (3, 0), (10, 0)),  # angle by which the foot points outward
+    # part of a knee's direction outward, where the part forward is 1
+    "knee_out": ((0.06, 0), (-0.02, 0), (0.06, 0), (0.06, 0)),
     "height": ((94.6, 0), (94.8, -1.0), (94.5, -0.8), (66, 0)),  # height of the hips above the ground
     # amplitude of the hips' way forward and back; they are slowest in mid-stance
     "surge": ((0, 0), (1.1, 0.2), (1.2, 0), (0.7, 0)),
     # amplitude of the hips' height; positive if they are highest in mid-stance, negative if lowest
-    "bob": ((0, 0), (1.3, 1.2), (-2.0, 0.3), (0.8, 0)),
-    "sway": ((1.6, 0), (2.2, -0.8), (0.8, 0), (2.5, 0)),  # amplitude of the hips, sideways
-    "pelvis_yaw": ((0.3, 0), (9, 2), (6, 1), (5, 0)),  # amplitude of the turn about the vertical axis
+    "bob": ((0, 0), (1.6, 1.2), (-2.0, 0.3), (0.8, 0)),
+    "sway": ((1.6, 0), (3.1, -0.8), (0.8, 0), (2.5, 0)),  # amplitude of the hips, sideways
+    "pelvis_yaw": ((0.3, 0), (7, 2), (6, 1), (5, 0)),  # amplitude of the turn about the vertical axis
     "pelvis_list": ((1.0, 0), (6, 1), (4, 0), (3, 0)),  # amplitude of the sideways tilt
-    "pelvis_tilt": ((3, 0), (7, 1), (6, 1), (34, 0)),  # mean forward tilt
+    "pelvis_tilt": ((3, 0), (4, 1), (6, 1), (34, 0)),  # mean forward tilt
     "nod": ((0.1, 0), (2.4, 0.6), (3, 0), (1.5, 0)),  # amplitude of the head, forward
-    "lean": ((1, 0), (3, 2), (10, 2), (79, 0)),  # lean of the trunk, forward
-    "chest_yaw": ((0.3, 0), (4, 2), (9, 2), (4, 0)),  # amplitude of the turn about the vertical axis
-    "arm_swing": ((0.8, 0), (17, 12), (27, 4), (9, 0)),  # amplitude of the upper arm, forward and backward
-    "arm_mean": ((1, 0), (-1, 0), (-8, 0), (14, 0)),  # mean angle of the upper arm, + forward
-    "elbow": ((14, 0), (22, 8), (82, 2), (48, 0)),  # mean bend of the elbow
-    "elbow_swing": ((0.5, 0), (16, 5), (14, 0), (7, 0)),  # amplitude of the bend of the elbow
+    "lean": ((1, 0), (-1.5, 2), (10, 2), (79, 0)),  # lean of the trunk, forward
+    "bow": ((0.8, 0), (2.6, 0), (0.8, 0), (0.8, 0)),  # amplitude of this lean
+    "chest_yaw": ((0.3, 0), (2, 2), (9, 2), (4, 0)),  # amplitude of the turn about the vertical axis
+    "arm_swing": ((0.8, 0), (16.5, 12), (27, 4), (9, 0)),  # amplitude of the upper arm, forward and backward
+    "arm_mean": ((1, 0), (-6.5, 0), (-8, 0), (14, 0)),  # mean angle of the upper arm, + forward
+    "elbow": ((14, 0), (35, 8), (82, 2), (48, 0)),  # mean bend of the elbow
+    "elbow_swing": ((0.5, 0), (13.5, 5), (14, 0), (7, 0)),  # amplitude of the bend of the elbow
     "abduction": ((9, 0), (9, 0), (13, 0), (14, 0)),  # angle of the upper arm, away from the body
 }
 # The names in VALUES_BY_GAIT whose curves have a value for each side of the body.
@@ -123,6 +127,7 @@ def _adapt_to_direction(style: Style, path: PlannedPath) -> Style:
         "width": style.width + 0.25 * stride / (1 + 0.6 * sideways) * sideways,
         "behind": 4 + (style.behind - 4) * ahead,
         "lift": style.lift - back - side,
+        "circle": style.circle * np.maximum(ahead, 0),
         "frequency": style.frequency * (1 + 0.6 * sideways + 0.15 * back[:, 0] + SPIN_CADENCE * spin),
         "lean": style.lean * (1 - 0.6 * back[:, 0]),
         "surge": style.surge * np.abs(ahead),
