@@ -5,7 +5,8 @@
 The right thigh, shank or foot hurts. `run`: asked for 4.2 m/s, speed and the two steps by severity. `gaits`:
 stance and range of the hurt knee at 10, and what share they are of the straight walk's effect. `stairs`: how
 often a toe or heel is more than 1 cm inside a step, and whether the good leg leads up and the bad one down.
-`variation`: spreads with variation 1.
+`variation`: with variation 1, standard deviations of stride time (s) and knee ranges (degrees), and how far
+apart the ranges of left and right knee and arm are, mean of eight seeds.
 """
 
 import argparse
@@ -17,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from hobble.core.quat import Array
-from hobble.gait.cycles import measure_cycles
+from hobble.gait.cycles import CURVES, measure_cycles
 from hobble.gait.profile import profile_of_walk
 from hobble.measures.walks import SHORTEST_STANCE, SIDES, bend, feet_in_stance, runs_of_true
 from hobble.models.load import load_network
@@ -27,6 +28,7 @@ from hobble.runtime.feet import leg_joints, sole_heights
 
 PARTS = {"thigh": "RightUpLeg-RightLeg", "shank": "RightLeg-RightFoot", "foot": "RightFoot-RightToeBase"}
 WARM_UP = 300  # frames
+KNEE, ARM = CURVES.index("knee_flexion_R"), CURVES.index("arm_forward_R")
 STANDING = 0.35  # an ankle that is slower than this share of the body stands, as in `hobble.gait.cycles`
 Bodies = list[tuple[str, float]]  # part and severity of each figure
 TEN: Bodies = [("thigh", 0.0), *((part, 10.0) for part in PARTS)]
@@ -177,11 +179,14 @@ def variation(network: Network) -> None:
         rows = []
         for i in range(8):
             walk = measure_cycles(network.skeleton, walks.positions[:, i])
-            knees = [np.array([np.ptp(c.curves[2]) for c in side]) for side in (walk.left, walk.right)]
+            knees = [np.array([np.ptp(c.curves[KNEE]) for c in side]) for side in (walk.left, walk.right)]
+            # The curves of a left cycle are mirrored, so those of the right arm are of the left one.
+            arms = [np.mean([np.ptp(c.curves[ARM]) for c in side]) for side in (walk.left, walk.right)]
             times = [c.scalars["stride_seconds"] for c in walk.right]
-            rows.append((np.std(times), np.std(knees[1]), abs(knees[0].mean() - knees[1].mean())))
+            apart = abs(knees[0].mean() - knees[1].mean()), abs(arms[0] - arms[1])
+            rows.append((np.std(times), *map(np.std, knees), *apart))
         spreads = " ".join(f"{value:.3f}" for value in np.mean(rows, axis=0))
-        print(f"variation, thigh {severity:g}: stride s, knee degrees, left - right knee: {spreads}")
+        print(f"variation, thigh {severity:g}: stride, left knee, right knee, sides: knee, arm: {spreads}")
 
 
 def main() -> None:
