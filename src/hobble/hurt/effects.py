@@ -100,7 +100,7 @@ ADDED_CHANGES: dict[str, dict[str, float]] = {
     },
     "foot": {
         "speed": 0.66, "stride": 1.06, "turn": 0.8, "push": 0.12, "lift": 0.7, "lift_sound": 0.3,
-        "push_sound": 0.58, "strike": 1.0, "side": 8.0, "toe_out": 18.0, "out": 0.03, "crouch": 6.0,
+        "push_sound": 0.58, "strike": 1.0, "side": 8.0, "toe_out": 18.0, "out": 0.03, "crouch": 4.0,
         "off": -0.06, "width": 0.01, "vault_sound": 0.5, "arm": 0.65, "arm_sound": 0.85, "forward": -4.0,
     },
     "back": {
