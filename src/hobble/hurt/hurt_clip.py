@@ -39,7 +39,7 @@ MOST_VAULT = np.radians(14.0)  # a knee straightens by at most this, so a crouch
 CROUCHED = np.radians([40.0, 90.0])
 # In a step to the side the leg reaches out straight. A knee that bends to spare the leg in between would move
 # further than a healthy one. So it bends less, by this share.
-SIDEWAYS = 0.7
+SIDEWAYS = 0.8
 # Radians of knee flexion. Below the first value, the bend is too small to tell in which direction the knee
 # points. Above the second value, the bend is large enough. Between them, it counts partly.
 BENT = np.radians([6.0, 18.0])
