@@ -4,9 +4,10 @@
     python benchmarks/derive_gait.py healthy CMU_FOLDER [HEALTHY.npz]
     python benchmarks/derive_gait.py groups CMU_FOLDER --actor FERRE.bvh --patients PATIENTS.csv
 
-people.npz has the profiles of the people whom Jun et al. (2020) recorded (`hobble.gait.profile`). Of
-WALKS.npz it reads five arrays: `gaits`, `curves`, `scalars`, the names GAITS, CURVES and SCALARS; `curve`
-(6, people, 22, 50) and `scalar` (6, people, 8), medians over the cycles of each person in each gait.
+people.npz has the profiles of the people whom Jun et al. (2020) recorded (`hobble.gait.profile`), and as
+`curves` (6, 22, 50) the means of their curves over the people, rounded to float16. Of WALKS.npz it reads five
+arrays: `gaits`, `curves`, `scalars`, the names GAITS, CURVES and SCALARS; `curve` (6, people, 22, 50) and
+`scalar` (6, people, 8), medians over the cycles of each person in each gait.
 
 healthy.npz says how much the features of healthy walks vary within one person: with the speed, on slight
 curves, and from one window of 4 seconds to another. The motion was obtained from mocap.cs.cmu.edu, which was
@@ -73,7 +74,8 @@ def derive_people(walks: Path, out: Path) -> None:
         [list(profile_of_curves(c, s).values()) for c, s in zip(curves, scalars, strict=True)]
         for curves, scalars in zip(data["curve"].astype(float), data["scalar"].astype(float), strict=True)
     ]
-    save_npz(out, profiles=np.array(profiles, np.float32))
+    means = data["curve"].mean(axis=1, dtype=float)
+    save_npz(out, profiles=np.array(profiles, np.float32), curves=means.astype(np.float16))
 
 
 def healthy_windows(folder: Path, performer: str) -> Iterator[tuple[str, Profile, Profile]]:

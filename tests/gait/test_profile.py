@@ -1,8 +1,11 @@
 """The numbers of a walk, and those of its mirror image."""
 
+import runpy
+
 import numpy as np
 import pytest
 
+from hobble.gait import profile
 from hobble.gait.cycles import measure_cycles
 from hobble.gait.profile import measure_effects, mirror_profile, profile_of_walk
 from hobble.gait.recognise import grade_walk, recognise
@@ -62,3 +65,19 @@ def test_effects_of_a_made_limp_are_found(holden31, healthy):
     # From 3 degrees to the left to none: towards the right.
     expected |= {"lean_forward": 4.0, "lean_hurt": 3.0, "lean": 5.0, "pelvis_drop": 2.0}
     assert {name: sizes[name] for name in expected} == pytest.approx(expected)
+
+
+def test_peoples_mean_curves_agree_with_their_profiles():
+    for gait, curves in profile.mean_curves().items():
+        people = profile.mean_profile(gait)
+        for name, curve in curves.items():
+            assert curve.mean() == pytest.approx(people[f"mean {name}"], abs=0.005)
+            # People are not in step, so the range of their mean is smaller than the mean of their ranges.
+            assert 0.4 < np.ptp(curve) / people[f"range {name}"] < 1
+
+
+@pytest.mark.shared
+def test_the_file_of_people_comes_from_the_recordings(root, shared, tmp_path):
+    derive = runpy.run_path(str(root / "benchmarks/derive_gait.py"))["derive_people"]
+    derive(shared / "reference/impaired_walks.npz", tmp_path / "people.npz")
+    assert (tmp_path / "people.npz").read_bytes() == profile.PEOPLE_FILE.read_bytes()

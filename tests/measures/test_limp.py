@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from hobble.gait.cycles import CURVES, SCALARS, Cycle, WalkCycles
-from hobble.gait.profile import NORMAL, PROFILE_NAMES, mirror_profile, read_people
+from hobble.gait.profile import GAITS, NORMAL, PROFILE_NAMES, mean_curves, mirror_profile, read_people
 from hobble.measures import limp_run as module
 from hobble.measures.limp import _goal, gallery_chart
-from hobble.measures.limp_run import SEVERITIES, Walk, measure_limps
+from hobble.measures.limp_run import SEVERITIES, Walk, imitated_walks, measure_limps
 from hobble.measures.walks import spearman
 from hobble.runtime import Runtime
 
@@ -113,16 +113,41 @@ def test_a_held_out_limp_is_nearer_only_if_the_same_leg_is_hurt(measure) -> None
 
 
 def test_captured_limps_stand_beside_the_character_with_their_injury(measure, holden31) -> None:
-    """Held-out clips first, no mirrors, at most six; without captured limps the page says how to get them."""
+    """Held-out clips first, no mirrors, at most six; then the ten people's walks are not needed."""
     names = [*(f"8_{n}" for n in range(8)), "7_1", "7_1_mirror"]
     every = [clip(name, {RIGHT_KNEE: 8.0}, {}) for name in names]
-    rows = measure(lambda s: 0.0, every=every, splits={"7_1": "held_out"})["gallery"]
+    found = measure(lambda s: 0.0, every=every, splits={"7_1": "held_out"})
+    rows = found["gallery"]
+    assert found["imitated"] == []
     assert [row["clip"] for row in rows] == ["7_1", "8_0", "8_1", "8_2", "8_3", "8_4"]
     assert rows[0]["poses"]["captured"] == POSES[::3].tolist()
     assert {np.shape(poses) for poses in rows[0]["poses"].values()} == {(8, 31, 3)}
     chart = gallery_chart({"gallery": rows[:1]}, holden31.to_dict())
     assert list(chart.options) == [f"7_1 ({RIGHT_KNEE} 8), from {view}" for view in ("the side", "behind")]
-    assert "no captured limp" in gallery_chart({"gallery": []}, {}).text
+
+
+def test_without_captured_limps_six_walks_of_people_stand_beside_the_character(measure) -> None:
+    """It has people's pain in the thigh, and no other part of it hurts."""
+    charts = gallery_chart(measure(lambda s: 0.1 * s), {}).charts
+    hurt = [f"{name}; hurt: {RIGHT_KNEE}" for name in ("antalgic (pain)", "stiff-legged")]
+    for chart in charts:
+        assert len(chart.options) == 6
+        for walk, traces in chart.options.items():
+            assert [t["name"] for t in traces] == ["people", *["hurt"] * (walk in hurt), "healthy"]
+    knee, lean = mean_curves()[NORMAL]["knee_flexion_R"], charts[4].options[hurt[0]]
+    assert charts[0].options["normal walk"][0]["y"] == pytest.approx(knee - knee.mean(), abs=0.11)
+    # The trunk of people and of the hurt character, and no longer the offset of the recordings.
+    assert [np.mean(trace["y"]) for trace in lean] == pytest.approx([5.1, 5.1, 0.0], abs=0.2)
+
+
+def test_beside_people_is_the_nearest_limp_of_a_fitting_right_part_at_severity_10(hurtable) -> None:
+    left, shank = ("Leg-".join((side, f"{side}Foot")) for side in ("Left", "Right"))
+    hurt = [(0.4, RIGHT_KNEE, 10.0), (1.0, shank, 7.0), (0.8, shank, 10.0), (1.0, left, 10.0)]
+    crowd = [walking({"right": share}, 2.0, {link: severity}) for share, link, severity in hurt]
+    rows = list(imitated_walks(hurtable.skeleton, [walking({}, 2.0), *crowd]))
+    assert [row["gait"] for row in rows] == list(GAITS)
+    assert [row["hurt"] for row in rows] == [{}, {shank: 10.0}, {RIGHT_KNEE: 10.0}, {}, {}, {}]
+    assert rows[1]["from_hurt"] == pytest.approx(0.2 * rows[1]["from_healthy"], rel=0.2)
 
 
 def test_the_goals_are_those_of_people_and_a_character_without_a_limp_misses_them(measure) -> None:

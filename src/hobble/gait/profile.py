@@ -3,8 +3,8 @@
 The comparison has two forms: 17 effects, which say how big a limp is, and 21 features, which distinguish
 impairments. Ten people who walked normally and imitated five impairments of the right leg have the same
 profiles. They were recorded with a Kinect. Source: Jun et al. (2020), "Pathological gait classification using
-Kinect v2 and gated recurrent neural networks", IEEE Access 8. Their profiles are in `people.npz`, which
-`benchmarks/derive_gait.py` writes.
+Kinect v2 and gated recurrent neural networks", IEEE Access 8. Their profiles and their mean curves are in
+`people.npz`, which `benchmarks/derive_gait.py` writes.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -94,7 +94,12 @@ def healthy_profile(clips: Sequence[Clip]) -> Profile:
     """
     if clips:
         return profile_of_walk(join_walks(map(measure_clip, clips)))
-    mean = np.mean([list(person[NORMAL].values()) for person in read_people()], axis=0)
+    return mean_profile(NORMAL)
+
+
+def mean_profile(gait: str) -> Profile:
+    """The mean profile of the ten people's walks in a gait of GAITS."""
+    mean = np.mean([list(person[gait].values()) for person in read_people()], axis=0)
     return _named(map(float, mean))
 
 
@@ -106,6 +111,16 @@ def read_people() -> tuple[Mapping[str, Profile], ...]:
         {gait: _named(row.tolist()) for gait, row in zip(GAITS, of_person, strict=True)}
         for of_person in profiles.swapaxes(0, 1)
     )
+
+
+@cache
+def mean_curves() -> Mapping[str, Mapping[str, Array]]:
+    """Gait of GAITS -> name of CURVES -> (50,) mean over the ten people; see `Cycle`.
+
+    Each person's curve is the median over the cycles in which the right foot lands first.
+    """
+    curves = load_npz(PEOPLE_FILE)["curves"].astype(float)
+    return {gait: dict(zip(CURVES, some, strict=True)) for gait, some in zip(GAITS, curves, strict=True)}
 
 
 def _named(values: Iterable[float]) -> dict[str, float]:

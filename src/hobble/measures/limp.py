@@ -58,11 +58,13 @@ def section(found: Json, material: ReportMaterial) -> parts.PageSection:
         return parts.told_table(f"{material.name}-limp-{key}", records, f"limp.{key}")
 
     exam = [{**row, "injury": _injury(row["hurt_links"])} for row in found["held_out_limps"]]
+    imitated = [{**row, "walk": _walk_of_people(row)} for row in found["imitated"][1:]]
     content = [
         parts.SectionPart(2, size_chart(found)),
         parts.SectionPart(2, gallery_chart(found, skeleton)),
         parts.SectionPart(3, parts.Paragraph(parts.words("limp.recognisers") + sample_sentence(found))),
         parts.SectionPart(3, say("named", found["named"])),
+        parts.SectionPart(3, say("imitated", imitated)),
         parts.SectionPart(3, say("goals", [_goal(row) for row in found["goals"]])),
         parts.SectionPart(4, say("exam", exam)),
     ]
@@ -82,13 +84,14 @@ def _injury(hurt: Mapping[str, float]) -> str:
     return ", ".join(f"{link} {severity:g}" for link, severity in hurt.items())
 
 
-def gallery_chart(found: Json, skeleton: Json) -> parts.Chart | parts.Paragraph:
+def gallery_chart(found: Json, skeleton: Json) -> parts.Chart | parts.ChartGroup:
     """Captured limps above the character with the same injury and the healthy character, over a gait cycle.
 
-    A menu chooses the limp, and whether it is seen from the side or from behind.
+    A menu chooses the limp, and whether it is seen from the side or from behind. Without captured limps, the
+    ten people's walks are shown instead.
     """
     if not found["gallery"]:
-        return parts.Paragraph(parts.words("limp.no-gallery"))
+        return people_charts(found["imitated"])
     options: dict[str, list[parts.Trace]] = {}
     for limp in found["gallery"]:
         hurt = _injury(limp["hurt"])
@@ -111,6 +114,48 @@ def gallery_chart(found: Json, skeleton: Json) -> parts.Chart | parts.Paragraph:
                 )
             ]
     return strips("limp-gallery", options, 560, "Captured limp")
+
+
+def people_charts(walks: parts.Records) -> parts.ChartGroup:
+    """Mean curves of the ten people and of the character over a gait cycle. A menu chooses the walk.
+
+    walks: `imitated` of limp.json. Its first row has the normal walks.
+    """
+    title, caption = (parts.words(f"limp-people.{key}") for key in ("title", "caption"))
+    charts = [_people_chart(walks, *panel) for panel in parts.told("limp-people.panels").items()]
+    return parts.ChartGroup(charts, "limp-people", title, caption, "Walk")
+
+
+def _people_chart(walks: parts.Records, curve: str, title: str) -> parts.Chart:
+    """One curve, in degrees more than its mean in the own normal walk."""
+    usual = walks[0]["curves"]
+
+    def trace(name: str, curves: Json, whose: str, colour: str) -> parts.Trace:
+        degrees = np.array(curves[whose][curve]) - np.mean(usual[whose][curve])
+        percent = np.linspace(0, 100, len(degrees), endpoint=False).tolist()
+        return parts.line_trace(name, percent, degrees.round(1).tolist(), colour)
+
+    options: dict[str, list[parts.Trace]] = {}
+    for walk in walks:
+        traces = options.setdefault(_walk_of_people(walk), [])
+        traces.append(trace("people", walk["curves"], "people", "@ink"))
+        if walk["hurt"]:
+            traces.append(trace("hurt", walk["curves"], "character", "@accent"))
+        traces.append(trace("healthy", usual, "character", "@muted"))
+    degrees = [value for traces in options.values() for each in traces for value in each["y"]]
+    layout = {
+        "xaxis": parts.axis("% of the cycle", dtick=25, range=[0, 100]),
+        # The same for all walks, so that a small change looks small.
+        "yaxis": {"range": [min(degrees) - 1, max(degrees) + 1]},
+        "margin": {"l": 34, "r": 8},  # so that the legend is one line
+    }
+    return parts.Chart(f"limp-people-{curve}", title, "", (), layout, 240, None, options)
+
+
+def _walk_of_people(walk: Json) -> str:
+    """A walk of the ten people, and what hurts in the character beside it."""
+    hurt = f"; hurt: {', '.join(walk['hurt'])}" if walk["hurt"] else ""
+    return parts.words(f"limp-people.walks.{walk['gait']}") + hurt
 
 
 def size_chart(found: Json) -> parts.Chart:

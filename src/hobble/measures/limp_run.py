@@ -8,7 +8,7 @@ the walk changes by only 2 %. Here the size of each effect of an injury on the w
 linear and a graded one, judge the walks. They learnt only from real people.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import groupby
@@ -19,7 +19,7 @@ import numpy as np
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 from hobble.gait import profile
-from hobble.gait.cycles import WalkCycles, join_walks, measure_cycles
+from hobble.gait.cycles import CURVES, WalkCycles, join_walks, measure_cycles
 from hobble.gait.judge import Limp
 from hobble.gait.recognise import SIDES, compare_walk, examples_of_people
 from hobble.hurt.effects import part_of_link
@@ -41,6 +41,18 @@ SPEEDS = {"walk": 2.0, "jog": 7.0}  # target speeds, cm a frame; 2 is 1.2 m/s, a
 WARM_UP_FRAMES = 5 * FPS  # frames that are not measured, while figures reach their speed and begin to limp
 RECOGNISED = ("named", "wrong_side")  # keys of a row: shares of its windows
 IN_GALLERY = 6  # captured limps that the report shows beside the character
+# Imitated impairment -> parts of the right side; one of them hurts in the character beside these people.
+FITTING = {
+    "antalgic": ("thigh", "shank"),
+    "stiff_legged": ("thigh",),
+    "steppage": ("foot",),
+    "trendelenburg": ("hip",),
+    "lurch": ("hip", "pelvis"),
+}
+# The curves that stand beside people's. A Kinect sees ankles and toes badly.
+COMPARED_CURVES = (
+    "knee_flexion_R", "knee_flexion_L", "hip_flexion_R", "hip_flexion_L", "trunk_forward", "trunk_left",
+)  # fmt: skip
 MIRROR = "_mirror"  # end of the name of a mirrored clip
 Rows = list[dict[str, Any]]
 Injury = Mapping[str, float]  # link -> severity, only of links that hurt
@@ -65,6 +77,11 @@ class Walk:
     def profile(self) -> profile.Profile | None:
         """None if there is no whole cycle, which cannot happen in a captured walk."""
         return profile.profile_of_walk(self.cycles) if len(self.cycles) else None
+
+    @property
+    def curves(self) -> dict[str, Array]:
+        """Name of CURVES -> (50,) its median over the cycles that begin as the right foot lands."""
+        return dict(zip(CURVES, np.median([c.curves for c in self.cycles.right], axis=0), strict=True))
 
     @property
     def performer(self) -> str:
@@ -212,7 +229,41 @@ def measure_limps(
             }
             for walk in shown
         ],
+        "imitated": [] if shown else list(imitated_walks(skeleton, crowds["walk"])),
     }
+
+
+def imitated_walks(skeleton: Skeleton, crowd: Sequence[Walk]) -> Iterator[dict[str, Any]]:
+    """The ten people's normal walk and their impairments, each beside the character with the nearest limp.
+
+    crowd: the healthy figure, then figures in which one link hurts, of which those of FITTING are compared.
+    Yields the rows of `imitated` in limp.json.
+    """
+    healthy, *hurt = crowd
+    assert healthy.profile is not None
+    strongest = [figure for figure in hurt if SEVERITIES[-1] in figure.injury.values()]
+    for gait, people in profile.mean_curves().items():
+        limp = profile.mean_profile(gait), profile.mean_profile(profile.NORMAL)
+        fitting = [(part, profile.RIGHT) for part in FITTING.get(gait, ())]
+        away = [
+            (limp_distance(figure.profile, healthy.profile, *limp), figure)
+            for figure in strongest
+            if figure.profile and _part_and_side(skeleton, *figure.injury) in fitting
+        ]
+        from_hurt, nearest = min(away, key=lambda pair: pair[0], default=(None, None))
+        shown = healthy if gait == profile.NORMAL else nearest
+        curves = {"people": people} | ({"character": shown.curves} if shown else {})
+        row = {
+            "gait": gait,
+            "hurt": dict(shown.injury) if shown else {},
+            "from_hurt": from_hurt,
+            "from_healthy": limp_distance(healthy.profile, healthy.profile, *limp),
+            "curves": {
+                whose: {name: np.round(some[name], 1).tolist() for name in COMPARED_CURVES}
+                for whose, some in curves.items()
+            },
+        }
+        yield rounded(row)
 
 
 def leg_limps(
