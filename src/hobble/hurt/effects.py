@@ -77,8 +77,8 @@ CURVE_FACTOR: dict[str, float] = {"pelvis": 1.6, "hip": 1.6, "thigh": 1.1, "shan
 # - Share: vault (how far the standing knee straightens while the other leg swings; 1 is nearly straight).
 # - Leg lengths: out (how far the foot swings outward).
 # - Degrees: toe_out; crouch (knee flexion added in stance); forward and side (lean of the trunk forward and
-#   to the hurt side); list (pelvis up on the hurt side while that
-#   leg swings; negative: it drops further); nod (head forward).
+#   to the hurt side); list (pelvis up on the hurt side while that leg swings; negative: it drops further);
+#   nod (head forward).
 ADDED_CHANGES: dict[str, dict[str, float]] = {
     "pelvis": {
         "speed": 0.74, "stride": 1.15, "turn": 0.8, "push": 0.65, "back": 0.6, "lift": 0.8,
