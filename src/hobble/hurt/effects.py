@@ -136,7 +136,7 @@ RATIOS = (
 TIMING_FACTOR = 1.85
 # Part -> length of the step onto the hurt foot, as a ratio to the healthy clip. It replaces the ratio of the
 # profiles.
-STEP_RATIO = {"hip": 0.74, "thigh": 0.17, "shank": 0.44, "foot": 0.53}
+STEP_RATIO = {"hip": 0.74, "thigh": 0.15, "shank": 0.44, "foot": 0.5}
 
 
 @functools.cache
