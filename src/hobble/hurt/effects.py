@@ -96,7 +96,7 @@ ADDED_CHANGES: dict[str, dict[str, float]] = {
     },
     "shank": {
         "speed": 0.62, "stride": 1.04, "turn": 0.7, "push": 0.57, "lift": 0.45, "lift_sound": 0.2,
-        "push_sound": 0.1, "strike": 0.0, "crouch": 29.0, "list": -1.0, "off_sound": 0.04, "width": 0.07,
+        "push_sound": 0.05, "strike": 0.0, "crouch": 29.0, "list": -1.0, "off_sound": 0.04, "width": 0.07,
         "out": 0.05, "vault_sound": 0.1, "arm": 0.65, "arm_sound": 0.85, "forward": -5.0,
     },
     "foot": {
