@@ -33,6 +33,10 @@ def test_a_training_section_can_be_given_by_name(folder: Path) -> None:
     named = Catalogue(folder, {"training": "quick"})
     assert [named.configuration(name).training for name in ("base", "child", "quick")] == [quick] * 3
     assert named.configuration("like").channels == ("injury",)
+    (folder / "hurt.yaml").write_text("extends: like\ntraining: {scales: {injury: 0.5}}\n")
+    named = Catalogue(folder, {"training": "hurt"})  # only a network with the channel can divide its inputs
+    scales = [named.configuration(name).training.scales for name in ("base", "like")]
+    assert scales == [{}, {"injury": 0.5}]
 
 
 def test_a_missing_training_and_loops_are_reported(folder: Path) -> None:

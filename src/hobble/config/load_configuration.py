@@ -85,14 +85,19 @@ def with_training(folder: Path, values: dict[str, Any], within: tuple[str, ...] 
     """Replace `training: NAME` in `values` by the section `training` of the configuration NAME.
 
     within: names of the configurations that led here, as in `read_layers`. The last one contains `values`. It
-    is empty if NAME comes from the command line.
+    is empty if NAME comes from the command line. Then `scales` of channels that `values` lack are left out, so
+    that a recipe fits any configuration.
     """
     name = values.get("training")
     if not isinstance(name, str):
         return values
     if name in within:
         raise InputError(folder / f"{name}.yaml", f"`training: {name}` refers to itself")
-    return {**values, "training": read_layers(folder, name, within)[0].get("training", {})}
+    recipe = read_layers(folder, name, within)[0].get("training", {})
+    if not within and isinstance(recipe.get("scales"), dict):
+        scales = {k: scale for k, scale in recipe["scales"].items() if k in values.get("channels", ())}
+        recipe = {**recipe, "scales": scales}
+    return {**values, "training": recipe}
 
 
 def validate(model: type[Model], values: Mapping[str, Any], where: str) -> Model:
