@@ -273,8 +273,7 @@ def test_poses_of_a_clip_and_its_version_move_evenly_to_both_sides(healthy_and_h
     for name, pose, atol in (("walk", 1.0, 0.5), ("walk_hurt1", 3.0, 0.15)):
         of_clip = np.sort(moved[names == name])
         of_clip = of_clip[np.abs(of_clip - pose) > 1e-4]
-        even = np.linspace(pose - 2, pose + 2, len(of_clip))
-        np.testing.assert_allclose(of_clip, even, atol=atol)
+        np.testing.assert_allclose(of_clip, np.linspace(pose - 2, pose + 2, len(of_clip)), atol=atol)
     assert np.allclose(moved[names == "jog"], 9.0, atol=1e-3), "a clip without versions stays"
 
 

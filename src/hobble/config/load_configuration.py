@@ -85,8 +85,8 @@ def with_training(folder: Path, values: dict[str, Any], within: tuple[str, ...] 
     """Replace `training: NAME` in `values` by the section `training` of the configuration NAME.
 
     within: names of the configurations that led here, as in `read_layers`. The last one contains `values`. It
-    is empty if NAME comes from the command line. Then `scales` of channels that `values` lack are left out, so
-    that a recipe fits any configuration.
+    is empty if NAME comes from the command line. Then `scales` of channels that `values` lack are left out,
+    so that a recipe fits any configuration.
     """
     name = values.get("training")
     if not isinstance(name, str):
