@@ -91,18 +91,18 @@ ADDED_CHANGES: dict[str, dict[str, float]] = {
     },
     "thigh": {
         "speed": 0.58, "stride": 1.08, "turn": 0.55, "push": 0.4, "vault": 0.8, "crouch": 2.0, "lift": 0.25,
-        "lift_sound": 0.3, "push_sound": 0.37, "out": 0.07, "strike": 0.4, "toe_out": 8.0,
+        "lift_sound": 0.3, "push_sound": 0.37, "out": 0.07, "strike": 0.4, "list": 1.0, "toe_out": 8.0,
         "vault_sound": 0.5, "arm": 0.65, "arm_sound": 0.85, "forward": -3.0,
     },
     "shank": {
         "speed": 0.62, "stride": 1.04, "turn": 0.7, "push": 0.57, "lift": 0.45, "lift_sound": 0.2,
-        "push_sound": 0.05, "strike": 0.0, "crouch": 29.0, "list": -1.0, "off_sound": 0.04, "width": 0.055,
+        "push_sound": 0.05, "strike": 0.0, "crouch": 29.0, "off_sound": 0.04, "width": 0.055,
         "out": 0.05, "vault_sound": 0.1, "arm": 0.65, "arm_sound": 0.85, "forward": -5.0,
     },
     "foot": {
         "speed": 0.66, "stride": 1.06, "turn": 0.8, "push": 0.12, "lift": 0.7, "lift_sound": 0.3,
-        "push_sound": 0.58, "strike": 1.0, "side": 8.0, "list": -3.0, "toe_out": 18.0, "out": 0.03,
-        "crouch": 4.0, "off": -0.06, "width": 0.01, "vault_sound": 0.5, "arm": 0.65, "arm_sound": 0.85,
+        "push_sound": 0.58, "strike": 1.0, "side": 8.0, "list": -1.5, "toe_out": 18.0, "out": 0.03,
+        "crouch": 3.0, "off": -0.06, "width": 0.01, "vault_sound": 0.5, "arm": 0.65, "arm_sound": 0.85,
         "forward": -6.0,
     },
     "back": {
