@@ -86,8 +86,8 @@ ADDED_CHANGES: dict[str, dict[str, float]] = {
     },
     "hip": {
         "speed": 0.66, "stride": 1.2, "turn": 0.45, "push": 0.7, "vault": 0.2, "lift": 1.0,
-        "crouch": 11.0, "lift_sound": 0.3, "push_sound": 0.3, "out": 0.02, "off_sound": 0.025, "width": 0.055,
-        "vault_sound": 0.5, "arm": 0.75, "arm_sound": 0.85, "forward": -1.0,
+        "crouch": 11.0, "lift_sound": 0.3, "push_sound": 0.3, "out": 0.02, "off_sound": 0.025, "width": 0.07,
+        "vault_sound": 0.5, "arm": 0.75, "arm_sound": 0.85, "forward": 0.0,
     },
     "thigh": {
         "speed": 0.58, "stride": 1.08, "turn": 0.55, "push": 0.4, "vault": 0.8, "crouch": 2.0, "lift": 0.25,
@@ -96,7 +96,7 @@ ADDED_CHANGES: dict[str, dict[str, float]] = {
     },
     "shank": {
         "speed": 0.62, "stride": 1.04, "turn": 0.7, "push": 0.57, "lift": 0.45, "lift_sound": 0.2,
-        "push_sound": 0.05, "strike": 0.0, "crouch": 29.0, "off_sound": 0.04, "width": 0.055,
+        "push_sound": 0.05, "strike": 0.0, "crouch": 29.0, "off_sound": 0.04, "width": 0.07,
         "out": 0.05, "vault_sound": 0.1, "arm": 0.65, "arm_sound": 0.85, "forward": -5.0,
     },
     "foot": {
