@@ -247,8 +247,8 @@ def move_foot(
         u = np.linspace(0.0, 1.0, land - off + 1)  # share of the swing's time
         blend = smoothstep(u / BLEND_SHARE) * smoothstep((1 - u) / BLEND_SHARE)
         step = foot.ankle[land] - foot.ankle[off]
-        slope = (tilts[i] + tilts[i + 1]) / 2
-        evenness = np.exp(-abs(step[1] - slope * np.hypot(step[0], step[2])) / UNEVEN_CM)
+        sloping = (tilts[i] + tilts[i + 1]) / 2 * np.hypot(step[0], step[2])
+        evenness = np.exp(-min(abs(step[1]), abs(step[1] - sloping)) / UNEVEN_CM)
         swing[:, 1] -= (1 - lift[frames]) * evenness * blend * (foot.ankle[frames, 1] - line[:, 1])
         swing += outward[frames] * (np.sin(np.pi * u) ** 2)[:, None]
         ground = soles[i] + (soles[i + 1] - soles[i]) * progress[:, 0]
