@@ -2011,8 +2011,8 @@ static void heel_of_bend(const double *hip, const double *knee, const double *he
 
 /* Lets the arms swing further, or less: see swing_arms in variation.py. */
 static void swing_arms(const model *m, character *c) {
-    double sine = sin(c->yaw), cosine = cos(c->yaw);
     if (c->arm_more[0] == 0 && c->arm_more[1] == 0) return;
+    double sine = sin(c->yaw), cosine = cos(c->yaw);
     for (int side = 0; side < 2; side++) {
         int first = m->arms[2 * side];
         double bone[3], *shoulder = c->pose_position[first];
@@ -2153,11 +2153,7 @@ static void vary(const model *m, character *c, goal *target) {
     double most = 0, more[STREAMS];
     uint32_t half = (uint32_t)(2 * c->phase) % 2;
     c->pace = 1;
-    if (!(c->variation > 0)) {
-        memset(c->knee_more, 0, sizeof c->knee_more);
-        memset(c->arm_more, 0, sizeof c->arm_more);
-        return;
-    }
+    if (!(c->variation > 0)) return;
     c->step += half != c->step % 2;
     for (int k = 0; k < m->size[COLUMNS]; k++)
         if (m->slows[m->channel_of[k]] && m->highest[k] > 0)
@@ -2636,9 +2632,14 @@ int hobble_set(hobble *h, int i, int column, double value) {
 int hobble_vary(hobble *h, int i, double amount, unsigned seed) {
     if (!has_character(h, i)) return HOBBLE_NO_SUCH;
     if (!(amount >= 0 && amount <= 10)) return HOBBLE_BAD_VALUE;
-    h->state[i].variation = amount;
-    h->state[i].seed = seed;
-    h->state[i].pace = h->state[i].shown = 1;
+    character *c = &h->state[i];
+    c->variation = amount;
+    c->seed = seed;
+    c->pace = c->shown = 1;
+    if (amount == 0) {
+        memset(c->knee_more, 0, sizeof c->knee_more);
+        memset(c->arm_more, 0, sizeof c->arm_more);
+    }
     return HOBBLE_OK;
 }
 
