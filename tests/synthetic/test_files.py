@@ -18,7 +18,8 @@ def test_footsteps_are_landings_of_the_right_and_the_left_foot_in_turn(written, 
         down = clip.down(side)
         for frame in clip.landings(side):
             if 3 < frame < len(down) - 4:
-                assert down[frame + 1 : frame + 4].all(), f"{side} is not down after frame {frame}"
+                # In one frame neither heel nor toe may rest: as the foot rolls from one to the other.
+                assert down[frame + 1 : frame + 4].sum() >= 2, f"{side} is not down after frame {frame}"
                 assert not down[frame - 3 : frame - 1].any(), f"{side} is down before frame {frame}"
 
 

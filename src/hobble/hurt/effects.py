@@ -85,25 +85,24 @@ ADDED_CHANGES: dict[str, dict[str, float]] = {
         "lift_sound": 0.3, "push_sound": 0.75, "list": 2.0,
     },
     "hip": {
-        "speed": 0.66, "stride": 1.2, "turn": 0.45, "push": 0.7, "vault": 0.2, "lift": 1.0,
-        "crouch": 11.0, "lift_sound": 0.3, "push_sound": 0.3, "out": 0.02, "off_sound": 0.025, "width": 0.07,
-        "vault_sound": 0.5, "arm": 0.75, "arm_sound": 0.85, "forward": 0.0,
+        "speed": 0.64, "stride": 1.18, "turn": 0.4, "push": 0.85, "vault": 0.35, "lift": 1.0, "crouch": 10.0,
+        "lift_sound": 0.15, "push_sound": 0.08, "off_sound": 0.04, "width": 0.03, "vault_sound": 0.85,
+        "arm": 0.75, "arm_sound": 0.85, "forward": -3.0, "list": -2.0, "back": 0.5,
     },
     "thigh": {
-        "speed": 0.58, "stride": 1.08, "turn": 0.55, "push": 0.4, "vault": 0.8, "crouch": 2.0, "lift": 0.25,
-        "lift_sound": 0.3, "push_sound": 0.37, "out": 0.07, "strike": 0.4, "list": 1.0, "toe_out": 8.0,
-        "vault_sound": 0.5, "arm": 0.65, "arm_sound": 0.85, "forward": -3.0,
+        "speed": 0.633, "stride": 1.08, "turn": 0.27, "push": 0.2, "vault": 0.58, "crouch": 9.0, "lift": 0.1,
+        "lift_sound": 0.15, "push_sound": 0.33, "strike": 1.0, "list": 0.7, "arm": 0.65, "arm_sound": 0.85,
+        "forward": -2.3, "width": 0.004, "side": 1.2, "back": 0.7,
     },
     "shank": {
-        "speed": 0.62, "stride": 1.04, "turn": 0.7, "push": 0.57, "lift": 0.45, "lift_sound": 0.2,
-        "push_sound": 0.05, "strike": 0.0, "crouch": 29.0, "off_sound": 0.04, "width": 0.07,
-        "out": 0.05, "vault_sound": 0.1, "arm": 0.65, "arm_sound": 0.85, "forward": -5.0,
+        "speed": 0.56, "stride": 1.0, "turn": 0.55, "push": 0.47, "lift": 0.31, "lift_sound": 0.15,
+        "push_sound": 0.05, "strike": 0.0, "crouch": 21.8, "off_sound": -0.02, "width": 0.08, "out": 0.015,
+        "arm": 0.65, "arm_sound": 0.85, "forward": -4.7, "side": 5.7, "list": -3.3, "back": 0.53,
     },
     "foot": {
-        "speed": 0.66, "stride": 1.06, "turn": 0.8, "push": 0.12, "lift": 0.7, "lift_sound": 0.3,
-        "push_sound": 0.58, "strike": 1.0, "side": 8.0, "list": -1.5, "toe_out": 18.0, "out": 0.03,
-        "crouch": 3.0, "off": -0.06, "width": 0.01, "vault_sound": 0.5, "arm": 0.65, "arm_sound": 0.85,
-        "forward": -6.0,
+        "speed": 0.577, "stride": 1.0, "turn": 0.7, "push": 0.12, "lift": 0.2, "lift_sound": 0.15,
+        "push_sound": 0.48, "strike": 1.0, "side": -1.0, "list": -3.0, "toe_out": 14.0, "off": -0.115,
+        "width": -0.01, "vault_sound": 1.0, "arm": 0.65, "arm_sound": 0.85, "forward": -7.7,
     },
     "back": {
         "speed": 0.68, "push": 0.6, "push_sound": 0.6, "stride": 1.12, "forward": 17.0, "crouch": 9.0,
@@ -136,7 +135,7 @@ RATIOS = (
 TIMING_FACTOR = 1.85
 # Part -> length of the step onto the hurt foot, as a ratio to the healthy clip. It replaces the ratio of the
 # profiles.
-STEP_RATIO = {"hip": 0.74, "thigh": 0.15, "shank": 0.44, "foot": 0.5}
+STEP_RATIO = {"hip": 0.77, "thigh": 0.2, "shank": 0.39, "foot": 0.44}
 
 
 @functools.cache

@@ -48,7 +48,7 @@ class HealthyClip:
     unwrapped; a whole number as the right foot lands. phase_known: (F,) 1 where the phase is known, 0 where
     it is not, smoothed. jog_share: (F,) share of jogging in the gait, 0 to 1. cycle_frames: (F,) length in
     frames of the cycle around each frame. path: (F, 2) horizontal path of the hips, x and z, cm. heading:
-    (F, 4) rotation of the pelvis about Y. sideways: (F,) share of the movement to a side, 0 to 1.
+    (F, 4) rotation of the pelvis about Y. aside: (F,) share of the movement to a side or backward, 0 to 1.
     leg_length: cm from hip to ankle of a straight leg.
     """
 
@@ -62,7 +62,7 @@ class HealthyClip:
     cycle_frames: Array = field(repr=False)
     path: Array = field(repr=False)
     heading: Array = field(repr=False)
-    sideways: Array = field(repr=False)
+    aside: Array = field(repr=False)
     leg_length: float
 
     def __len__(self) -> int:
@@ -103,7 +103,7 @@ def measure_healthy_clip(clip: Clip, labels: Labels) -> HealthyClip:
         _cycle_lengths(stances, frames, clip.fps),
         path,
         heading,
-        _sideways(path, heading, clip.fps),
+        _aside(path, heading, clip.fps),
         skeleton.leg_length,
     )
 
@@ -145,13 +145,16 @@ def _heading(clip: Clip) -> Array:
     return quat.yaw(np.arctan2(forward[:, 0], forward[:, 2]))
 
 
-def _sideways(path: Array, heading: Array, fps: float) -> Array:
-    """(F,) share of the movement along `path` (F, 2) to a side of `heading` (F, 4); 0 for a standing body."""
+def _aside(path: Array, heading: Array, fps: float) -> Array:
+    """(F,) share of the movement along `path` (F, 2) to a side of `heading` (F, 4) or backward.
+
+    It is 0 for a standing body.
+    """
     velocity = np.gradient(path, axis=0) * fps
-    across = quat.rotate(heading, np.array([1.0, 0.0, 0.0]))[:, [0, 2]]
-    share = np.abs(np.sum(velocity * across, axis=1)) / np.maximum(
-        np.linalg.norm(velocity, axis=1), STANDING_SPEED
+    ahead, across = (
+        np.sum(velocity * quat.rotate(heading, axis)[:, [0, 2]], axis=1) for axis in np.eye(3)[[2, 0]]
     )
+    share = np.maximum(np.abs(across), -ahead) / np.maximum(np.linalg.norm(velocity, axis=1), STANDING_SPEED)
     return gaussian(smoothstep((share - SWAY) / (1 - 2 * SWAY)), HEADING_SECONDS * fps)
 
 

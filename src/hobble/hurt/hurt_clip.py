@@ -37,9 +37,10 @@ MOST_VAULT = np.radians(14.0)  # a knee straightens by at most this, so a crouch
 # Radians of knee flexion. To spare a leg, its knee bends more, but less so if it is bent by more than the
 # first value already, and not at all if by more than the second. So a crouching figure does not sink.
 CROUCHED = np.radians([40.0, 90.0])
-# In a step to the side the leg reaches out straight. A knee that bends to spare the leg in between would move
-# further than a healthy one. So it bends less, by this share.
-SIDEWAYS = 0.8
+# In a step to the side or backward the leg reaches out straight. A knee that bends to spare the leg in
+# between would move further than a healthy one. So it bends less, by this share, and straightens less to
+# vault.
+ASIDE = 0.9
 # Radians of knee flexion. Below the first value, the bend is too small to tell in which direction the knee
 # points. Above the second value, the bend is large enough. Between them, it counts partly.
 BENT = np.radians([6.0, 18.0])
@@ -349,10 +350,10 @@ def _desired_reach(leg: Leg, changes: Effects, source: HealthyClip, timing: Timi
     healthy_bend = knee_flexion(leg.reach, leg.thigh_length, leg.shank_length)
     crouch = np.radians(changes.changes["crouch"][:, side]) * (1 - source.swing_curve[:, side])
     crouch = crouch * smoothstep((CROUCHED[1] - healthy_bend) / (CROUCHED[1] - CROUCHED[0]))
-    crouch = crouch * (1 - SIDEWAYS * source.sideways)
-    bend = interpolate_values(healthy_bend + crouch, when)
-    source_vault = np.clip(changes.changes["vault"][:, side], 0.0, 1.0) * source.swing_curve[:, 1 - side]
-    vault = interpolate_values(source_vault, other_when)
+    ahead = 1 - ASIDE * source.aside
+    bend = interpolate_values(healthy_bend + ahead * crouch, when)
+    vault = np.clip(changes.changes["vault"][:, side], 0.0, 1.0) * source.swing_curve[:, 1 - side]
+    vault = interpolate_values(ahead * vault, other_when)
     bend = bend - vault * np.clip(bend - STRAIGHT_KNEE, 0.0, MOST_VAULT)
     changed = (interpolate_values(crouch, when) > 0) | (vault > 0)
     return np.where(

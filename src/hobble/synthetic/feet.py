@@ -229,8 +229,8 @@ HEEL = np.array([0.0, -4.2, -3.0])  # cm from the ankle joint to the heel, appro
 READY = 0.95  # after this share of the swing, the foot has the pitch with which it lands
 # Exponents of the time in a swing, which runs from 0 to 1. KICK is below 1, so the foot is highest before the
 # middle of the swing. EARLY is below 1, so the foot covers more than half of its way in the first half.
-KICK, EARLY = 0.57, 0.81
-FOLLOW = 0.45  # the pitch begins the swing with this share of its rate of change at the end of the stance
+KICK, EARLY = 0.56, 0.81
+FOLLOW = 0.35  # the pitch begins the swing with this share of its rate of change at the end of the stance
 LANDING_SPEED = 0.36  # speed of the foot as it lands, as a share of its mean speed in the swing
 # Where the ground is in the way, the foot is raised more. The raise grows in the first RISE of the swing, and
 # shrinks in the last SETTLE of it (shares of the swing).

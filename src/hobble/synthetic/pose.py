@@ -19,7 +19,7 @@ TWIST = 12.0  # degrees by which an upper arm is turned inward about its axis
 # The keys of both say whether the ground is flat. MAX_STRETCH: longest distance from hip to ankle, as a share
 # of the leg's length. SMOOTHING_TIME: seconds, for the filter by which the hips come down smoothly to where
 # the legs reach the ground.
-MAX_STRETCH = {True: 0.9975, False: 0.98}
+MAX_STRETCH = {True: 0.992, False: 0.98}
 SMOOTHING_TIME = {True: 0.03, False: 0.06}
 
 
@@ -84,7 +84,7 @@ def _noise(rng: np.random.Generator, frames: int, fps: float, count: int) -> Arr
 def _pelvis_rotation(walk: _Walk, yaw: Array) -> Array:
     """(F, 4) world rotation. yaw: (F, 4) rotation to the facing direction."""
     turn = walk.style.pelvis_yaw * walk.wave(0.0) + 0.6 * walk.noise[:, 0]
-    lean = -walk.style.pelvis_list * walk.wave(0.25)
+    lean = walk.style.pelvis_list * walk.wave(walk.style.list_peak)
     tilt = walk.style.pelvis_tilt + 0.8 * walk.wave(0.0, 2)
     return quat.mul(yaw, quat.mul(_rotation(Y, turn), quat.mul(_rotation(Z, lean), _rotation(X, tilt))))
 

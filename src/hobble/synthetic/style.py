@@ -18,41 +18,43 @@ REFERENCE_SPEED = (0.0, 1.3, 2.8, 0.8)  # m/s, for each gait of GAITS
 # name -> for each gait of GAITS: (value at the gait's reference speed, change per m/s). The values are angles
 # in degrees, lengths in cm, and shares. An amplitude is half the range of a movement in a cycle.
 VALUES_BY_GAIT: dict[str, tuple[tuple[float, float], ...]] = {
-    "duty": ((0.64, 0), (0.604, -0.06), (0.365, -0.05), (0.64, -0.06)),  # share of the cycle on the ground
-    "land_pitch": ((0, 0), (17, 6), (15, 2), (-24, 0)),  # pitch of the foot as it lands, + toe up
-    "off_pitch": ((-15, 0), (-56, -13), (-49, -1), (-58, -8)),  # pitch of the foot as it leaves the ground
-    "rest_pitch": ((0, 0), (0, 0), (0, 0), (-24, 0)),  # pitch of the foot while it stands
-    "flat": ((0.15, 0), (0.16, 0), (0.30, 0), (0.15, 0)),  # share of stance until the toe is down
+    "duty": ((0.64, 0), (0.57, -0.06), (0.365, -0.05), (0.64, -0.06)),  # share of the cycle on the ground
+    "land_pitch": ((0, 0), (27, 6), (15, 2), (-24, 0)),  # pitch of the foot as it lands, + toe up
+    "off_pitch": ((-15, 0), (-60, -12), (-49, -1), (-58, -8)),  # pitch of the foot as it leaves the ground
+    "rest_pitch": ((0, 0), (-3.5, 0), (0, 0), (-24, 0)),  # pitch of the foot while it stands
+    "flat": ((0.15, 0), (0.187, 0), (0.30, 0), (0.15, 0)),  # share of stance until the toe is down
     # share of stance until the heel leaves the ground
-    "heel_off": ((0.6, 0), (0.32, -0.03), (0.30, 0), (0.48, 0)),
+    "heel_off": ((0.6, 0), (0.3, -0.03), (0.30, 0), (0.48, 0)),
     # exponent of the heel's rise over time: slow at first, then fast
-    "roll": ((2.8, 0), (3.3, 0), (2.6, 0), (1.9, 0)),
+    "roll": ((2.8, 0), (4.4, 0), (2.6, 0), (1.9, 0)),
     # greatest height of the swinging foot above the line from its last place on the ground to its next
-    "lift": ((2, 0), (6, 1), (4, 3), (4, 0)),
+    "lift": ((2, 0), (7.3, 1), (4, 3), (4, 0)),
     "circle": ((0, 0), (3.5, 0), (0, 0), (0, 0)),  # greatest distance outward from this line
     "clearance": ((1, 0), (2.5, 0), (3, 0), (2, 0)),  # least height of the sole above the ground in mid-swing
-    "behind": ((4, 0), (10.5, 5.5), (7.5, 3), (10, 5)),  # distance of an ankle behind the body in mid-stance
-    "width": ((9.5, 0), (3.3, 0), (3.5, 0), (9.5, 0)),  # distance of an ankle from the path, sideways
+    "behind": ((4, 0), (13.6, 5.5), (7.5, 3), (10, 5)),  # distance of an ankle behind the body in mid-stance
+    "width": ((9.5, 0), (3.2, 0), (3.5, 0), (9.5, 0)),  # distance of an ankle from the path, sideways
     "toe_out": ((8, 0), (6, 0), (3, 0), (10, 0)),  # angle by which the foot points outward
     # part of a knee's direction outward, where the part forward is 1
-    "knee_out": ((0.06, 0), (-0.02, 0), (0.06, 0), (0.06, 0)),
-    "height": ((94.6, 0), (94.8, -1.0), (94.5, -0.8), (66, 0)),  # height of the hips above the ground
+    "knee_out": ((0.06, 0), (-0.03, 0), (0.06, 0), (0.06, 0)),
+    "height": ((94.6, 0), (94.5, -1.0), (94.5, -0.8), (66, 0)),  # height of the hips above the ground
     # amplitude of the hips' way forward and back; they are slowest in mid-stance
-    "surge": ((0, 0), (1.1, 0.2), (1.2, 0), (0.7, 0)),
+    "surge": ((0, 0), (1.72, 0.2), (1.2, 0), (0.7, 0)),
     # amplitude of the hips' height; positive if they are highest in mid-stance, negative if lowest
     "bob": ((0, 0), (1.6, 1.2), (-2.0, 0.3), (0.8, 0)),
-    "sway": ((1.6, 0), (3.1, -0.8), (0.8, 0), (2.5, 0)),  # amplitude of the hips, sideways
-    "pelvis_yaw": ((0.3, 0), (7, 2), (6, 1), (5, 0)),  # amplitude of the turn about the vertical axis
-    "pelvis_list": ((1.0, 0), (6, 1), (4, 0), (3, 0)),  # amplitude of the sideways tilt
-    "pelvis_tilt": ((3, 0), (4, 1), (6, 1), (34, 0)),  # mean forward tilt
+    "sway": ((1.6, 0), (3.2, -0.8), (0.8, 0), (2.5, 0)),  # amplitude of the hips, sideways
+    "pelvis_yaw": ((0.3, 0), (6.6, 2), (6, 1), (5, 0)),  # amplitude of the turn about the vertical axis
+    "pelvis_list": ((1.0, 0), (5.3, 1), (4, 0), (3, 0)),  # amplitude of the sideways tilt
+    # phase in which the left side is highest
+    "list_peak": ((0.75, 0), (0.94, 0), (0.75, 0), (0.75, 0)),
+    "pelvis_tilt": ((3, 0), (3, 1), (6, 1), (34, 0)),  # mean forward tilt
     "nod": ((0.1, 0), (2.4, 0.6), (3, 0), (1.5, 0)),  # amplitude of the head, forward
     "lean": ((1, 0), (-1.5, 2), (10, 2), (79, 0)),  # lean of the trunk, forward
-    "bow": ((0.8, 0), (2.6, 0), (0.8, 0), (0.8, 0)),  # amplitude of this lean
-    "chest_yaw": ((0.3, 0), (2, 2), (9, 2), (4, 0)),  # amplitude of the turn about the vertical axis
-    "arm_swing": ((0.8, 0), (16.5, 12), (27, 4), (9, 0)),  # amplitude of the upper arm, forward and backward
-    "arm_mean": ((1, 0), (-6.5, 0), (-8, 0), (14, 0)),  # mean angle of the upper arm, + forward
-    "elbow": ((14, 0), (35, 8), (82, 2), (48, 0)),  # mean bend of the elbow
-    "elbow_swing": ((0.5, 0), (13.5, 5), (14, 0), (7, 0)),  # amplitude of the bend of the elbow
+    "bow": ((0.8, 0), (2.75, 0), (0.8, 0), (0.8, 0)),  # amplitude of this lean
+    "chest_yaw": ((0.3, 0), (1.5, 2), (9, 2), (4, 0)),  # amplitude of the turn about the vertical axis
+    "arm_swing": ((0.8, 0), (15.8, 12), (27, 4), (9, 0)),  # amplitude of the upper arm, forward and backward
+    "arm_mean": ((1, 0), (-7, 0), (-8, 0), (14, 0)),  # mean angle of the upper arm, + forward
+    "elbow": ((14, 0), (35.3, 8), (82, 2), (48, 0)),  # mean bend of the elbow
+    "elbow_swing": ((0.5, 0), (13.2, 5), (14, 0), (7, 0)),  # amplitude of the bend of the elbow
     "abduction": ((9, 0), (9, 0), (13, 0), (14, 0)),  # angle of the upper arm, away from the body
 }
 # The names in VALUES_BY_GAIT whose curves have a value for each side of the body.
@@ -95,7 +97,7 @@ def healthy_style(path: PlannedPath) -> Style:
 def _cadences(speed: Array) -> Array:
     """(F, 4) cycles a second of each gait. In a walk they grow with the square root of speed (F,), m/s."""
     stand = np.full_like(speed, 1 / 1.5)
-    walk = 1.042 * np.sqrt(np.maximum(speed, 0.5) / 1.3)
+    walk = 1.0 * np.sqrt(np.maximum(speed, 0.5) / 1.3)
     jog = 1.41 + 0.08 * (np.clip(speed, 1.5, 5.0) - 2.8)
     crouch = 0.80 * np.sqrt(np.maximum(speed, 0.5) / 0.8)
     assert len(GAITS) == 4
@@ -105,8 +107,8 @@ def _cadences(speed: Array) -> Array:
 def _adapt_to_direction(style: Style, path: PlannedPath) -> Style:
     """The style, changed where the figure walks backward or sideways, or turns in place.
 
-    Steps backward and sideways are quicker. The toe lands first, the heel rises less, and the arms swing
-    less.
+    Steps backward and sideways are quicker. The toe lands first, the heel rises less, but the foot more, and
+    the arms swing less.
     """
     speed = np.maximum(path.speed, 1e-6)
     moving = np.clip(path.speed / 30, 0, 1)  # 0 for a standing figure, 1 from 30 cm/s on
@@ -126,7 +128,7 @@ def _adapt_to_direction(style: Style, path: PlannedPath) -> Style:
         # them from crossing.
         "width": style.width + 0.25 * stride / (1 + 0.6 * sideways) * sideways,
         "behind": 4 + (style.behind - 4) * ahead,
-        "lift": style.lift - back - side,
+        "lift": style.lift + 0.8 * back + 0.2 * side,
         "circle": style.circle * np.maximum(ahead, 0),
         "frequency": style.frequency * (1 + 0.6 * sideways + 0.15 * back[:, 0] + SPIN_CADENCE * spin),
         "lean": style.lean * (1 - 0.6 * back[:, 0]),
