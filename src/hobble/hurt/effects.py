@@ -69,7 +69,8 @@ MIXES: dict[str, dict[str, float]] = {
 }
 # Part -> factor on the mixed curves of trunk, pelvis and shoulders.
 CURVE_FACTOR: dict[str, float] = {"pelvis": 1.6, "hip": 1.6, "thigh": 1.1, "shank": 1.2, "foot": 0.9}
-# Part -> changes that the recordings do not show.
+# Part -> changes that the recordings do not show. Those of hip, thigh, shank and foot were fitted, so that
+# the limps of trained networks are like those of people (benchmarks/fit_limps.py).
 # - Ratios to the healthy clip: speed; stride (time); lift (height of the swinging foot); push and strike
 #   (pitch of the foot while the heel is up and while the toe is up); arm (its swing); back and head
 #   (movement of the joints of back and neck). With a smaller push than these, the heel stays on the ground
