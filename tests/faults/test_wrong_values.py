@@ -43,7 +43,7 @@ READERS: dict[str, Callable[[Path], Any]] = {
 @pytest.mark.parametrize("file", READERS)
 def test_a_wrong_value_is_refused_or_harmless(finished, tmp_path: Path, file: str) -> None:
     path, refusals = tmp_path / Path(file).name, []
-    for number in range(40):
+    for number in range(80):  # most values of a report of labels are only for its figure
         shutil.copy(finished.folder / "results" / file, path)
         change_file(Random(f"{file}-{number}"), path)
         try:
