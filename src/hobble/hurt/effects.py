@@ -86,9 +86,9 @@ ADDED_CHANGES: dict[str, dict[str, float]] = {
         "lift_sound": 0.3, "push_sound": 0.75, "list": 2.0,
     },
     "hip": {
-        "speed": 0.64, "stride": 1.18, "turn": 0.4, "push": 0.85, "vault": 0.35, "lift": 1.0, "crouch": 10.0,
+        "speed": 0.64, "stride": 1.18, "turn": 0.4, "push": 0.85, "vault": 0.35, "lift": 1.0, "crouch": 8.0,
         "lift_sound": 0.15, "push_sound": 0.08, "off_sound": 0.04, "width": 0.03, "vault_sound": 0.85,
-        "arm": 0.75, "arm_sound": 0.85, "forward": -3.0, "list": -2.0, "back": 0.5,
+        "arm": 0.85, "arm_sound": 0.85, "forward": -4.0, "list": -1.2, "back": 0.42,
     },
     "thigh": {
         "speed": 0.633, "stride": 1.08, "turn": 0.27, "push": 0.2, "vault": 0.58, "crouch": 9.0, "lift": 0.1,
