@@ -16,9 +16,8 @@ def test_footsteps_are_landings_of_the_right_and_the_left_foot_in_turn(written, 
     assert (np.diff(order) > 10).all()
     for side in ("Right", "Left"):
         down = clip.down(side)
-        for frame in clip.landings(side):
+        for frame in clip.landings(side):  # in one of the next frames the foot may roll from heel to toe
             if 3 < frame < len(down) - 4:
-                # In one frame neither heel nor toe may rest: as the foot rolls from one to the other.
                 assert down[frame + 1 : frame + 4].sum() >= 2, f"{side} is not down after frame {frame}"
                 assert not down[frame - 3 : frame - 1].any(), f"{side} is down before frame {frame}"
 
