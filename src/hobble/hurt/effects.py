@@ -92,7 +92,7 @@ ADDED_CHANGES: dict[str, dict[str, float]] = {
     },
     "thigh": {
         "speed": 0.633, "stride": 1.08, "turn": 0.27, "push": 0.2, "vault": 0.58, "crouch": 9.0, "lift": 0.1,
-        "lift_sound": 0.15, "push_sound": 0.27, "strike": 1.0, "list": 0.7, "arm": 0.65, "arm_sound": 0.85,
+        "lift_sound": 0.15, "push_sound": 0.24, "strike": 1.0, "list": 0.7, "arm": 0.65, "arm_sound": 0.85,
         "forward": -2.3, "width": 0.004, "side": 1.2, "back": 0.7,
     },
     "shank": {
@@ -136,7 +136,7 @@ RATIOS = (
 TIMING_FACTOR = 1.85
 # Part -> length of the step onto the hurt foot, as a ratio to the healthy clip. It replaces the ratio of the
 # profiles.
-STEP_RATIO = {"hip": 0.77, "thigh": 0.2, "shank": 0.39, "foot": 0.42}
+STEP_RATIO = {"hip": 0.77, "thigh": 0.18, "shank": 0.39, "foot": 0.42}
 
 
 @functools.cache
