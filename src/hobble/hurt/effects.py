@@ -91,7 +91,7 @@ ADDED_CHANGES: dict[str, dict[str, float]] = {
         "arm": 0.85, "arm_sound": 0.85, "forward": -4.0, "list": -1.2, "back": 0.42,
     },
     "thigh": {
-        "speed": 0.633, "stride": 1.08, "turn": 0.27, "push": 0.2, "vault": 0.58, "crouch": 9.0, "lift": 0.1,
+        "speed": 0.633, "stride": 1.08, "turn": 0.27, "push": 0.2, "vault": 0.58, "crouch": 9.0, "lift": 0.05,
         "lift_sound": 0.15, "push_sound": 0.24, "strike": 1.0, "list": 0.7, "arm": 0.65, "arm_sound": 0.85,
         "forward": -2.3, "width": 0.004, "side": 1.2, "back": 0.7,
     },
