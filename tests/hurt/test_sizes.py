@@ -138,9 +138,9 @@ def test_the_sound_side_does_less_and_the_body_guards(made, hurting, part) -> No
     assert lean[0.0] < lean[0.6] < lean[1.0] - 3
 
 
-@pytest.mark.parametrize("heading", [90, -90])
+@pytest.mark.parametrize("heading", [90, -90, 180])
 @pytest.mark.parametrize("part", ["thigh", "shank", "foot"])
-def test_the_knee_is_stiff_in_steps_to_the_side(holden31, hurting, part, heading) -> None:
+def test_the_knee_is_stiff_in_steps_to_the_side_and_back(holden31, hurting, part, heading) -> None:
     """At least half of the effect in a straight walk, which is .36 to .57 of the healthy range."""
     plan = [Segment("walk", 72, seconds=10, heading=heading)]
     walk = walk_from_plan("side", holden31, plan, 600, "flat", 60, 1).clip

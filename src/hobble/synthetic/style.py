@@ -97,7 +97,7 @@ def healthy_style(path: PlannedPath) -> Style:
 def _cadences(speed: Array) -> Array:
     """(F, 4) cycles a second of each gait. In a walk they grow with the square root of speed (F,), m/s."""
     stand = np.full_like(speed, 1 / 1.5)
-    walk = 1.0 * np.sqrt(np.maximum(speed, 0.5) / 1.3)
+    walk = np.sqrt(np.maximum(speed, 0.5) / 1.3)
     jog = 1.41 + 0.08 * (np.clip(speed, 1.5, 5.0) - 2.8)
     crouch = 0.80 * np.sqrt(np.maximum(speed, 0.5) / 0.8)
     assert len(GAITS) == 4
