@@ -352,8 +352,8 @@ def _desired_reach(leg: Leg, changes: Effects, source: HealthyClip, timing: Timi
     crouch = crouch * smoothstep((CROUCHED[1] - healthy_bend) / (CROUCHED[1] - CROUCHED[0]))
     ahead = 1 - ASIDE * source.aside
     bend = interpolate_values(healthy_bend + ahead * crouch, when)
-    vault = np.clip(changes.changes["vault"][:, side], 0.0, 1.0) * source.swing_curve[:, 1 - side]
-    vault = interpolate_values(ahead * vault, other_when)
+    source_vault = np.clip(changes.changes["vault"][:, side], 0.0, 1.0) * source.swing_curve[:, 1 - side]
+    vault = interpolate_values(ahead * source_vault, other_when)
     bend = bend - vault * np.clip(bend - STRAIGHT_KNEE, 0.0, MOST_VAULT)
     changed = (interpolate_values(crouch, when) > 0) | (vault > 0)
     return np.where(
