@@ -15,33 +15,26 @@ again on networks that were trained with the new tables.
 
 import argparse
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 from derive_gait import REFERENCE
-from limps import PARTS, SKELETONS, read
+from limps import PARTS, generated_walk, hurt_walk, read
 
 from hobble.core.clip import Clip
 from hobble.core.quat import Array
-from hobble.core.skeleton import Skeleton
-from hobble.gait.cycles import measure_clip
 from hobble.gait.judge import Limp, area_under_curve, beyond_people
-from hobble.gait.profile import LEFT, PROFILE_NAMES, RIGHT, Profile, measure_effects, profile_of_walk
+from hobble.gait.profile import LEFT, PROFILE_NAMES, RIGHT, Profile, measure_effects
 from hobble.gait.recognise import grade_walk
 from hobble.hurt import effects
-from hobble.hurt.hurt_clip import hurt_clip
-from hobble.labels import LabelOptions
 from hobble.labels.clip_labels import Labels
-from hobble.labels.label import label_clip
 from hobble.measures.limp_goals import GOALS, GUARDINGS, LEG, USUAL, between_guardings, limp_values
 from hobble.measures.limp_run import leg_limps, walk_figures
 from hobble.models.load import load_network
-from hobble.motion.skeleton_file import load_skeleton
 from hobble.runtime import Runtime
-from hobble.synthetic.generate_clip import walk_from_plan
-from hobble.synthetic.plan import Segment
 
 # Entry -> (step by which it is changed, least and greatest value). `step_ratio` is that of STEP_RATIO.
 ENTRIES: dict[str, tuple[float, float, float]] = {
@@ -69,43 +62,30 @@ LEAST_LEAN, LEAST_STANCE = 3.4, 0.14  # of hip and thigh, degrees; of thigh, sha
 SURE = 3.0  # logarithm of how much likelier the recogniser finds a limp of the right side than anything else
 STAY = 0.03  # how much a step away from the tables of now costs
 Case = tuple[str, float]  # part and guarding
-CASES: list[Case] = [(part, guarding) for part in LEG for guarding in (USUAL, *GUARDINGS)]
+Sources = Mapping[str, Sequence[tuple[Clip, Labels]]]  # kind -> healthy clips and their labels
 
 
 class Entry(NamedTuple):
-    """An entry of a table, and how a step of it changes the profiles: kind of clip -> case -> (52,)."""
+    """An entry of a table. now: its value."""
 
     part: str
     name: str
     now: float
-    slopes: dict[str, dict[Case, Array]]
-
-
-def clips(folder: Path, skeleton: Skeleton) -> dict[str, list[tuple[Clip, Labels]]]:
-    """Kind -> healthy clips and their labels."""
-    walk = walk_from_plan("generated", skeleton, [Segment("walk", 130, seconds=20)], 1200, "flat", 60, 1).clip
-    source = {"source_frames": len(walk), "source_fps": walk.fps}
-    generated = walk, label_clip(walk, [], source, "walk", "flat", LabelOptions())[0]
-    people = [names[0] for names in REFERENCE.values()][:CLIPS]
-    return {"generated": [generated], "captured": [read(folder, name) for name in people]}
 
 
 def as_array(profile: Profile) -> Array:
     return np.array([profile[name] for name in PROFILE_NAMES])
 
 
-def versions(some: Sequence[tuple[Clip, Labels]], part: str) -> dict[Case, Array]:
-    """The mean profile of the hurt versions of some clips, for each guarding."""
-    found: dict[Case, Array] = {}
-    for _, guarding in (case for case in CASES if case[0] == part):
-        profiles = []
-        for clip, labels in some:
-            hurt = np.zeros((len(clip), len(clip.skeleton.links)))
-            hurt[:, clip.skeleton.link_names.index(PARTS[part])] = 10.0
-            version = hurt_clip(clip, labels, hurt, guarding=guarding).clip
-            profiles.append(as_array(profile_of_walk(measure_clip(version))))
-        found[part, guarding] = np.mean(profiles, axis=0)
-    return found
+def versions(sources: Sources, part: str) -> dict[tuple[str, Case], Array]:
+    """(kind, case) -> the mean profile (52,) of the hurt versions of its clips, for each guarding."""
+    return {
+        (kind, (part, guarding)): np.mean(
+            [as_array(hurt_walk(*source, part, 10.0, guarding)) for source in some], axis=0
+        )
+        for kind, some in sources.items()
+        for guarding in (USUAL, *GUARDINGS)
+    }
 
 
 def table_of(part: str, name: str) -> tuple[dict[str, float], str]:
@@ -113,24 +93,26 @@ def table_of(part: str, name: str) -> tuple[dict[str, float], str]:
     return (effects.STEP_RATIO, part) if name == "step_ratio" else (effects.ADDED_CHANGES[part], name)
 
 
-def entries(sources: Mapping[str, list[tuple[Clip, Labels]]]) -> Iterator[Entry]:
+def entries_and_slopes(sources: Sources) -> tuple[list[Entry], dict[tuple[str, Case], Array]]:
+    """The n entries, and (kind, case) -> (n, 52): how a step of each entry changes the profile."""
+    entries: list[Entry] = []
+    changes: list[dict[tuple[str, Case], Array]] = []
     for part in LEG:
-        before = {kind: versions(some, part) for kind, some in sources.items()}
+        before = versions(sources, part)
         for name, (step, _, _) in ENTRIES.items():
             table, key = table_of(part, name)
             if key not in table:
                 continue
-            now = table[key]
-            table[key] = now + step
+            entries.append(Entry(part, name, table[key]))
+            table[key] += step
             effects.changes_of_hurt_part.cache_clear()
-            after = {kind: versions(some, part) for kind, some in sources.items()}
-            table[key] = now
+            after = versions(sources, part)
+            table[key] = entries[-1].now
             effects.changes_of_hurt_part.cache_clear()
-            slopes = {
-                kind: {case: after[kind][case] - profile for case, profile in of_kind.items()}
-                for kind, of_kind in before.items()
-            }
-            yield Entry(part, name, now, slopes)
+            changes.append({which: after[which] - profile for which, profile in before.items()})
+    unchanged = np.zeros(len(PROFILE_NAMES))
+    every = dict.fromkeys(which for change in changes for which in change)
+    return entries, {which: np.array([change.get(which, unchanged) for change in changes]) for which in every}
 
 
 def limps_of(weights: Path) -> list[Limp]:
@@ -141,16 +123,14 @@ def limps_of(weights: Path) -> list[Limp]:
     return leg_limps(network, crowd, 20.0, Runtime())[RIGHT]
 
 
-def moved(limps: Sequence[Limp], kind: str, table: Sequence[Entry], steps: Array) -> list[Limp]:
+def moved(
+    limps: Sequence[Limp], kind: str, slopes: Mapping[tuple[str, Case], Array], steps: Array
+) -> list[Limp]:
     """The limps with other tables. steps: (n,) by how many steps each entry differs from now."""
     out = []
     for limp in limps:
-        profile = as_array(limp.walk)
-        for entry, amount in zip(table, steps, strict=True):
-            if entry.part == limp.part:
-                profile = profile + amount * entry.slopes[kind][limp.part, limp.guarding]
-        walk = dict(zip(PROFILE_NAMES, profile.tolist(), strict=True))
-        out.append(Limp(limp.part, limp.severity, limp.guarding, walk, limp.healthy))
+        profile = as_array(limp.walk) + steps @ slopes[kind, (limp.part, limp.guarding)]
+        out.append(replace(limp, walk=dict(zip(PROFILE_NAMES, profile.tolist(), strict=True))))
     return out
 
 
@@ -185,22 +165,18 @@ def shortfalls(limps: Sequence[Limp]) -> dict[str, float]:
     return out
 
 
-def search(networks: Sequence[tuple[str, list[Limp]]], table: Sequence[Entry], minutes: float) -> Array:
-    """(n,) the best steps that a random search finds."""
-    limits = np.array([ENTRIES[entry.name] for entry in table])
-    now = np.array([entry.now for entry in table])
+def search(entries: Sequence[Entry], cost: Callable[[Array], float], minutes: float) -> Array:
+    """(n,) the steps with the lowest cost that a random search finds."""
+    limits = np.array([ENTRIES[entry.name] for entry in entries])
+    now = np.array([entry.now for entry in entries])
     least, most = ((limits[:, k] - now) / limits[:, 0] for k in (1, 2))
     least, most = np.clip(least, -MOST_STEPS, 0), np.clip(most, 0, MOST_STEPS)
 
-    def cost(steps: Array) -> float:
-        falls = (shortfalls(moved(limps, kind, table, steps)).values() for kind, limps in networks)
-        return sum(map(sum, falls)) + STAY * float(steps @ steps)
-
-    rng, best, until = np.random.default_rng(1), np.zeros(len(table)), time.monotonic() + 60 * minutes
+    rng, best, until = np.random.default_rng(1), np.zeros(len(entries)), time.monotonic() + 60 * minutes
     lowest = cost(best)
     while time.monotonic() < until:
-        changes = rng.random(len(table)) < rng.integers(1, 5) * 3 / len(table)
-        trial = np.clip(best + changes * rng.normal(size=len(table)) * rng.choice([0.3, 1.0]), least, most)
+        changes = rng.random(len(entries)) < rng.integers(1, 5) * 3 / len(entries)
+        trial = np.clip(best + changes * rng.normal(size=len(entries)) * rng.choice([0.3, 1.0]), least, most)
         if (found := cost(trial)) < lowest:
             best, lowest = trial, found
     return best
@@ -219,19 +195,30 @@ def main() -> None:
     files = [(kind, file) for kind in ("generated", "captured") for file in getattr(options, kind)]
     if not files:
         parser.error("name at least one network with --generated or --captured")
-    networks = [(kind, limps_of(file)) for kind, file in files]
-    sources = clips(options.folder, load_skeleton(SKELETONS / "holden31.yaml").skeleton)
-    table = list(entries({kind: some for kind, some in sources.items() if kind in dict(files)}))
-    steps = search(networks, table, options.minutes)
-    for title, at in (("now", np.zeros(len(table))), ("fitted", steps)):
+    networks = [(kind, file, limps_of(file)) for kind, file in files]
+    people = [names[0] for names in REFERENCE.values()][:CLIPS]
+    sources: dict[str, list[tuple[Clip, Labels]]] = {}
+    if options.generated:
+        sources["generated"] = [generated_walk()]
+    if options.captured:
+        sources["captured"] = [read(options.folder, name) for name in people]
+    entries, slopes = entries_and_slopes(sources)
+
+    def short(kind: str, limps: Sequence[Limp], steps: Array) -> dict[str, float]:
+        return shortfalls(moved(limps, kind, slopes, steps))
+
+    def cost(steps: Array) -> float:
+        falls = (sum(short(kind, limps, steps).values()) for kind, _, limps in networks)
+        return sum(falls) + STAY * float(steps @ steps)
+
+    steps = search(entries, cost, options.minutes)
+    for title, at in (("now", np.zeros(len(entries))), ("fitted", steps)):
         print(f"{title}: shortfall of each row")
-        for (kind, limps), (_, file) in zip(networks, files, strict=True):
-            short = {
-                row: fall for row, fall in shortfalls(moved(limps, kind, table, at)).items() if fall > 0.01
-            }
-            print(f"  {file}: {', '.join(f'{row} {fall:.1f}' for row, fall in short.items()) or 'none'}")
+        for kind, file, limps in networks:
+            falls = [f"{row} {fall:.1f}" for row, fall in short(kind, limps, at).items() if fall > 0.01]
+            print(f"  {file}: {', '.join(falls) or 'none'}")
     print("entries: now, fitted")
-    for entry, amount in zip(table, steps, strict=True):
+    for entry, amount in zip(entries, steps, strict=True):
         if abs(amount) > 0.1:
             fitted = entry.now + amount * ENTRIES[entry.name][0]
             print(f"  {entry.part} {entry.name}: {entry.now:g}, {fitted:.3g}")

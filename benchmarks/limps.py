@@ -250,19 +250,28 @@ def print_goals(limps: Mapping[str, Sequence[Limp]], sizes: Sequence[Mapping[str
         print(f"    differs: {names[k]} {means} ({away[k]:+.1f})")
 
 
-def sizes_of_versions(folder: Path) -> None:
+def generated_walk() -> tuple[Clip, Labels]:
+    """A healthy walk of the generated walker, 20 s at 1.3 m/s, and its labels."""
     skeleton = load_skeleton(SKELETONS / "holden31.yaml").skeleton
     walk = walk_from_plan("generated", skeleton, [Segment("walk", 130, seconds=20)], 1200, "flat", 60, 1).clip
     source = {"source_frames": len(walk), "source_fps": 60.0}
-    generated = walk, label_clip(walk, [], source, "walk", "flat", LabelOptions())[0]
-    for clip, labels in (generated, *(read(folder, name) for name in HEALTHY_WALKS)):
+    return walk, label_clip(walk, [], source, "walk", "flat", LabelOptions())[0]
+
+
+def hurt_walk(clip: Clip, labels: Labels, part: str, severity: float, guarding: float) -> Profile:
+    """The profile of a clip's hurt version in which a part of the right leg hurts."""
+    hurt = np.zeros((len(clip), len(clip.skeleton.links)))
+    hurt[:, clip.skeleton.link_names.index(PARTS[part])] = severity
+    return profile_of_walk(measure_clip(hurt_clip(clip, labels, hurt, guarding=guarding).clip))
+
+
+def sizes_of_versions(folder: Path) -> None:
+    for clip, labels in (generated_walk(), *(read(folder, name) for name in HEALTHY_WALKS)):
         healthy, limps = profile_of_walk(measure_clip(clip)), []
         cases = [(severity, USUAL) for severity in SEVERITIES] + [(10.0, guarding) for guarding in GUARDINGS]
-        for (part, link), (severity, guarding) in itertools.product(PARTS.items(), cases):
-            hurt = np.zeros((len(clip), len(skeleton.links)))
-            hurt[:, skeleton.link_names.index(link)] = severity
-            version = hurt_clip(clip, labels, hurt, guarding=guarding).clip
-            limps.append(Limp(part, severity, guarding, profile_of_walk(measure_clip(version)), healthy))
+        for part, (severity, guarding) in itertools.product(PARTS, cases):
+            walk = hurt_walk(clip, labels, part, severity, guarding)
+            limps.append(Limp(part, severity, guarding, walk, healthy))
         print_sizes(f"hurt versions of {clip.name}", limps)
         print_goals({RIGHT: limps, LEFT: []})
 
