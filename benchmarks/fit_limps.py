@@ -7,7 +7,7 @@ a network makes of its hurt versions differs from one training to the next by mo
 table does. So several networks together show what they have in common: with other tables, their limps are
 taken to be those of now, plus what the tables change in hurt versions. Each entry is changed by itself to
 find that out. Then a random search looks for the entries with which all networks meet all goals by the
-largest margin. Prints the goals that a network would miss, before and after, and the new entries.
+largest margin. Prints what each network falls short of, before and after, and the new entries.
 
 This holds for a few steps of an entry, since changes are only nearly proportional. After larger ones, run it
 again on networks that were trained with the new tables.
