@@ -12,6 +12,7 @@ from hobble.core.skeleton import Skeleton, forward_kinematics, two_bone_knee
 from hobble.measures.walks import bend
 from hobble.runtime.feet import (
     BODY_FREE,
+    LEVEL_STRETCH,
     LOCK_AT,
     RELEASE,
     STEP_FRAMES,
@@ -49,7 +50,7 @@ class Feet:
         self.ahead, self.fastest = rest_facing(skeleton), 1e8
         self.base = crouched(skeleton, *bent)
         self.shown, self.height = self.base[0][None, self.legs[:, 1:]], np.zeros(1)
-        self.more = np.zeros((1, 2))
+        self.sink, self.more = np.zeros(1), np.zeros((1, 2))
 
     def __call__(
         self, moved: np.ndarray, contact: float, ground: float | None = None, other: float = 0.0
@@ -59,7 +60,8 @@ class Feet:
         position, rotation = self.base[0][None] + moved, self.base[1][None].copy()
         contacts = np.array([[contact, contact, other, other]], np.float32)
         legs = self.legs, self.below, np.array([5.0, 4.0]), self.ahead, self.fastest
-        feet = self.held, self.lift, self.added, self.shown, self.height, np.zeros(1), self.more
+        body = self.height, np.zeros(1), self.sink, self.more
+        feet = self.held, self.lift, self.added, self.shown, *body
         place_feet(contacts, np.full((1, 4), ground), True, legs, feet, position, rotation)
         self.contacts, self.rotation = contacts[0], rotation[0]
         return position[0]
@@ -167,6 +169,25 @@ def test_the_heel_of_a_held_foot_rises_before_its_leg_is_straight(holden31: Skel
     under = Feet(holden31, 0.05, 0.36)  # the toe is 1 cm ahead of the hip, the heel behind it
     lengths = [stretched(under(np.array([0.0, 0, z]), 1.0), under.legs) for z in np.arange(0, 5.5, 0.5)]
     assert lengths[-1] < STRETCH + 0.0005, "the knee does not snap straight there, either"
+
+
+@pytest.mark.parametrize("way", [[1.0, 0, 0], [0, 0, -1.0]])
+def test_a_foot_held_beside_or_ahead_pulls_the_hips_down(holden31: Skeleton, way: list[float]) -> None:
+    """The toe stays, the knee keeps its bend, the other foot is where it was; then the hips rise slowly."""
+    feet = Feet(holden31, 0.3, 0.55)
+    hip, toe, other = holden31.role("hips"), feet.legs[0, 3], feet.legs[1, 2:]
+    heights = []
+    for far in np.arange(0, 16, 0.5):
+        moved = far * np.array(way)
+        shown = feet(moved, 1.0)
+        np.testing.assert_allclose(shown[toe], feet.base[0][toe], atol=1e-6)
+        np.testing.assert_allclose(shown[other], (feet.base[0] + moved)[other], atol=1e-6)
+        heights.append(shown[hip, 1])
+    assert stretched(shown, feet.legs) == pytest.approx(LEVEL_STRETCH, abs=1e-9)
+    assert heights[0] - heights[-1] > 0.9
+    heights += [feet(moved, 0.0)[hip, 1] for _ in range(40)]
+    assert np.abs(np.diff(heights)).max() < 1.0
+    assert heights[-1] == pytest.approx(heights[0], abs=0.01)
 
 
 def test_standing_feet_raise_and_lower_the_body(holden31: Skeleton) -> None:

@@ -20,7 +20,7 @@ from hobble.models.network import Network
 AT_ZERO: dict[str, tuple[int, ...]] = {
     "root_height": (), "smoothed_velocity": (2,), "strafe": (), "correction": (2,), "earlier": (2,),
     "foot_lock": (2,), "foot_hold": (2, 2), "foot_step": (2,), "foot_missed": (2,), "foot_lift": (2,),
-    "body_lift": (), "step": (), "knee_more": (2,), "arm_more": (2,), "arm_mean": (2,),
+    "body_lift": (), "hips_sink": (), "step": (), "knee_more": (2,), "arm_more": (2,), "arm_mean": (2,),
 }  # fmt: skip
 SHOWN_JOINTS = ("knee", "heel", "toe")  # the joints of each leg in `Character.leg_shown`, in this order
 
@@ -41,8 +41,8 @@ class Character:
     target, see `Smoothed` in `hobble.runtime.trajectory`.
     foot_lock (C, 2), foot_hold (C, 2, 2), foot_step (C, 2), foot_missed (C, 2): where and how firmly feet are
     held, see `Hold` in `hobble.runtime.feet`.
-    foot_lift (C, 2), foot_added (C, 2, 2, 4), leg_shown (C, 2, 3, 3), body_lift (C,): the rest of foot
-    placement, see `Feet` and `carry_body` in `hobble.runtime.feet`.
+    foot_lift (C, 2), foot_added (C, 2, 2, 4), leg_shown (C, 2, 3, 3), body_lift, hips_sink (C,): the rest
+    of foot placement, see `Feet` and `carry_body` in `hobble.runtime.feet`.
     placed: (C,) bool, whether the joints have been lifted to the ground, which happens once, at the start.
     step (C,), half cycles since the start, knee_more, arm_more, arm_mean (C, 2): what differs from step to
     step, see `hobble.runtime.variation`.
@@ -73,6 +73,7 @@ class Character:
     foot_added: Array
     leg_shown: Array
     body_lift: Array
+    hips_sink: Array
     placed: np.ndarray
     step: Array
     knee_more: Array

@@ -236,7 +236,7 @@ class Controller:
         self.drawn = (self.root, self.yaw, self.pose_position, self.pose_rotation)
         self._feet = (
             (c.foot_lock, c.foot_hold, c.foot_step, c.foot_missed),
-            *(c.foot_lift, c.foot_added, c.leg_shown, c.root_height, c.body_lift, c.knee_more),
+            *(c.foot_lift, c.foot_added, c.leg_shown, c.root_height, c.body_lift, c.hips_sink, c.knee_more),
         )
         self._contacts = self.y[:, self.layout.y_contacts]
         self._predicted_hips = self.y[:, self._y_joints + 3 * self._hips + 1]

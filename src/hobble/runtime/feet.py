@@ -316,6 +316,11 @@ STRETCH = 0.99
 # The rule sets in as the toe comes within UNDER cm ahead of the hip, and applies in full BEHIND cm later. A
 # foot further ahead stays flat.
 UNDER, BEHIND = 8.0, 10.0
+# A held foot that is not behind the hip, as in steps to the side or backward, may stretch the leg to this
+# share of its length, or as far as the network stretches it. Instead of stretching more, the leg pulls the
+# hips down, by MOST_SINK cm at most. They come up again by SINK_KEPT a frame. Without this rule, a stiff knee
+# became straight at the end of each step to the side, and healthy legs snapped straight in steps backward.
+LEVEL_STRETCH, MOST_SINK, SINK_KEPT = 0.97, 6.0, 0.85
 BODY_MIX = 0.15  # a share of the way that is left, each frame, for the body lift, up and down
 BODY_FREE = 3.0  # cm that standing feet may be off the ground before the body is raised or lowered
 BODY_MIN_CONTACT = 0.3  # if the contacts of both feet sum to less, the feet do not decide the body's height
@@ -336,10 +341,10 @@ FOOT, TOES = 1, 2  # the part of a foot to which a joint belongs, see `foot_part
 Legs = tuple[Any, Any, Any, Any, float]
 # The state of the feet between frames: held, see `Hold`; lift (C, 2), the foot lift; added (C, 2, 2, 4),
 # rotations added to thigh and shank of each leg; shown (C, 2, 3, 3), knee, heel and toe of each leg as they
-# were drawn; root_height (C,), mean ground height on the path; body_lift (C,); more (C, 2), radians that each
-# knee bends more in the air. The heights in `shown` are above root_height + body_lift, because the whole body
-# may rise in a frame.
-Feet = tuple[Hold, Any, Any, Any, Any, Any, Any]
+# were drawn; root_height (C,), mean ground height on the path; body_lift (C,); hips_sink (C,), cm by which
+# held feet pull the hips down; more (C, 2), radians that each knee bends more in the air. The heights in
+# `shown` are above root_height + body_lift, because the whole body may rise in a frame.
+Feet = tuple[Hold, Any, Any, Any, Any, Any, Any, Any]
 
 
 def leg_joints(skeleton: Skeleton) -> np.ndarray:
@@ -370,6 +375,17 @@ def rest_facing(skeleton: Skeleton) -> np.ndarray:
 
 
 @njit
+def leg_squares(position: Any, hip: int, knee: int, heel: int) -> tuple[float, float, float]:
+    """Squares of the lengths of thigh and shank, and of the distance from hip to heel. position: (J, 3)."""
+    upper, lower, apart = 0.0, 0.0, 0.0
+    for i in range(3):
+        upper += (position[knee, i] - position[hip, i]) ** 2
+        lower += (position[heel, i] - position[knee, i]) ** 2
+        apart += (position[heel, i] - position[hip, i]) ** 2
+    return upper, lower, apart
+
+
+@njit
 def raise_heel(position: Any, hip: int, knee: int, heel: int, toe: int, shift: Any, roll: Any) -> None:
     """Raise the heel of a foot that `shift` moves behind the hip, so that the leg obeys STRETCH.
 
@@ -377,12 +393,9 @@ def raise_heel(position: Any, hip: int, knee: int, heel: int, toe: int, shift: A
     about its toe, by MOST_ADDED at most. This rotation is written to `roll` (4,), once the identity, and the
     heel's movement is added to `shift`. A foot ahead of the hip by UNDER stays flat.
     """
-    # Squares of: the lengths of thigh and shank, the distance from hip to heel before the shift and after it.
-    upper, lower, before, needed = 0.0, 0.0, 0.0, 0.0
+    upper, lower, before = leg_squares(position, hip, knee, heel)
+    needed = 0.0  # square of the distance from hip to heel after the shift
     for i in range(3):
-        upper += (position[knee, i] - position[hip, i]) ** 2
-        lower += (position[heel, i] - position[knee, i]) ** 2
-        before += (position[heel, i] - position[hip, i]) ** 2
         needed += (position[heel, i] + shift[i] - position[hip, i]) ** 2
     most = max(before, (STRETCH * (np.sqrt(upper) + np.sqrt(lower))) ** 2)  # what `needed` may be
     # The foot from heel to toe has the horizontal direction (fx, fz) and length `along`. The heel is `high`
@@ -410,6 +423,28 @@ def raise_heel(position: Any, hip: int, knee: int, heel: int, toe: int, shift: A
     shift[1] += along * np.sin(angle) - high * (1 - np.cos(angle))
     shift[2] += forward * fz
     roll[0], roll[1], roll[3] = np.cos(angle / 2), np.sin(angle / 2) * fz, -np.sin(angle / 2) * fx
+
+
+@njit
+def needed_sink(position: Any, leg: Any, hold: Any, rise: float) -> float:
+    """By how much the hips have to sink, cm, so that a held foot obeys LEVEL_STRETCH.
+
+    position: (J, 3) of the pose. leg: (4,) hip, knee, heel and toe joint. hold: (2,) how far the foot moves
+    along x and z, rise: how far it moves up, cm.
+    """
+    hip, knee, heel, toe = leg[0], leg[1], leg[2], leg[3]
+    upper, lower, before = leg_squares(position, hip, knee, heel)
+    most = max(before, (LEVEL_STRETCH * (np.sqrt(upper) + np.sqrt(lower))) ** 2)
+    # The held heel is at (wx, wz) from the hip, `down` below it.
+    wx, wz = position[heel, 0] + hold[0] - position[hip, 0], position[heel, 2] + hold[1] - position[hip, 2]
+    down, across = position[hip, 1] - position[heel, 1] - rise, wx * wx + wz * wz
+    fx, fz = position[toe, 0] - position[heel, 0], position[toe, 2] - position[heel, 2]
+    along = np.sqrt(fx * fx + fz * fz)
+    if across + down * down <= most or along < 1e-6:
+        return 0.0
+    ahead = (wx * fx + wz * fz) / along + along  # as in `raise_heel`
+    share = min(max(1.0 + (ahead - UNDER) / BEHIND, 0.0), 1.0)
+    return share * min(max(down - np.sqrt(max(most - across, 0.0)), 0.0), MOST_SINK)
 
 
 @njit
@@ -526,11 +561,7 @@ def heel_of_bend(position: Any, hip: int, knee: int, heel: int, more: float) -> 
 
     If `more` is negative, it moves away from the hip, but the knee stays bent by BENT, if it was.
     """
-    upper, lower, before = 0.0, 0.0, 0.0  # squares of the lengths, and of the distance from hip to heel
-    for i in range(3):
-        upper += (position[knee, i] - position[hip, i]) ** 2
-        lower += (position[heel, i] - position[knee, i]) ** 2
-        before += (position[heel, i] - position[hip, i]) ** 2
+    upper, lower, before = leg_squares(position, hip, knee, heel)
     both = 2.0 * np.sqrt(upper * lower)
     if before < 1.0 or both < 1.0:
         return 0.0, 0.0, 0.0
@@ -552,19 +583,29 @@ def place_feet(
     held at all. position (C, J, 3), rotation (C, J, 4): the pose.
     """
     joints, parts, sole, ahead, fastest = legs
-    held, lift, added, shown, root_height, body_lift, more = feet
+    held, lift, added, shown, root_height, body_lift, hips_sink, more = feet
     lock, hold, step, missed = held
-    shift, roll = np.zeros(3), np.zeros(4)
+    shift, roll, holds = np.zeros(3), np.zeros(4), np.zeros((2, 2))
     for c in range(position.shape[0]):
         base = root_height[c] + body_lift[c]
+        sink = SINK_KEPT * hips_sink[c]
         for f in range(2):
-            hip, knee, heel, toe = joints[f, 0], joints[f, 1], joints[f, 2], joints[f, 3]
+            heel, toe = joints[f, 2], joints[f, 3]
             at = position[c, toe, 0], position[c, toe, 2]
-            shift[0], shift[2] = hold_foot(
+            holds[f, 0], holds[f, 1] = hold_foot(
                 c, f, at, contacts[c, 2 * f + 1], locking, shown[c, f, 2], fastest, held
             )
-            # Lift a foot out of the ground; lower a held foot that floats; raise a foot that steps.
             depth = sole_depth(position[c], heel, toe, ground[c, 2 * f], ground[c, 2 * f + 1], sole)
+            sink = max(sink, needed_sink(position[c], joints[f], holds[f], max(depth, 0.0)))
+        hips_sink[c] = sink  # the feet stay where they are
+        for j in range(position.shape[1]):
+            position[c, j, 1] -= sink
+        for f in range(2):
+            hip, knee, heel, toe = joints[f, 0], joints[f, 1], joints[f, 2], joints[f, 3]
+            shift[0], shift[2] = holds[f]
+            # Lift a foot out of the ground; lower a held foot that floats; raise a foot that steps.
+            under = ground[c, 2 * f], ground[c, 2 * f + 1]
+            depth = sole_depth(position[c], heel, toe, under[0], under[1], sole) - sink
             x, y, z = 0.0, 0.0, 0.0
             if more[c, f] != 0.0:
                 # Only in the air: nothing changes as the foot leaves the ground, and little as it lands.
@@ -580,7 +621,7 @@ def place_feet(
             if change < 0.0:
                 change *= HEIGHT_MIX
             lift[c, f] += min(max(change, -FASTEST_LIFT), FASTEST_LIFT)
-            shift[1] = lift[c, f] + y
+            shift[1] = lift[c, f] + y + sink
             if step[c, f] > 0.0:
                 # It leaves the ground slowly, and comes back slowly. The network's may be above it already.
                 height = STEP_HEIGHT * (4.0 * step[c, f] * (1.0 - step[c, f])) ** 2

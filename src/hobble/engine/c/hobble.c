@@ -75,6 +75,9 @@ enum {
 #define STRETCH 0.99
 #define UNDER 8.0
 #define BEHIND 10.0
+#define LEVEL_STRETCH 0.97
+#define MOST_SINK 6.0
+#define SINK_KEPT 0.85
 #define BODY_MIX 0.15
 #define BODY_FREE 3.0
 #define BODY_MIN_CONTACT 0.3
@@ -608,7 +611,7 @@ typedef struct {
     double root_height, phase, smoothed_velocity[2], smoothed_direction[2], strafe, correction[2],
         earlier[2];
     double foot_lock[2], foot_hold[2][2], foot_step[2], foot_missed[2], foot_lift[2], foot_added[2][2][4];
-    double leg_shown[2][3][3], body_lift;
+    double leg_shown[2][3][3], body_lift, hips_sink;
     double root[3], yaw, report[6]; /* report: what hobble_state returns */
     int placed;
     /* Steps that differ, see vary. pace and shown: factors of the change of phase and of the values. */
@@ -2034,13 +2037,43 @@ static void swing_arms(const model *m, character *c) {
     }
 }
 
-/* Holds foot `f` if it is in contact, and keeps it out of the ground. Writes contact 0 for a foot that steps.
- */
-static void place_foot(const model *m, character *c, int f, float *contacts, const double *ground) {
+/* By how much the hips have to sink so that a held foot beside or ahead of them does not stretch its leg: see
+   feet.py. The foot moves by `hold` along x and z, and up by `rise`. */
+static double needed_sink(const model *m, const character *c, int f, const double *hold, double rise) {
     const int32_t *leg = m->legs + 4 * f;
-    double shift[3], horizontal[2], roll[4] = {1, 0, 0, 0}, old[3], *heel = c->pose_position[leg[HEEL]];
-    hold_foot(m, c, f, contacts[2 * f + 1], horizontal);
-    double depth = sole_depth(m, c, f, ground + 2 * f), done = c->foot_step[f], bend[3] = {0};
+    const double *hip = c->pose_position[leg[HIP]], *knee = c->pose_position[leg[KNEE]],
+                 *heel = c->pose_position[leg[HEEL]], *toe = c->pose_position[leg[TOE]];
+    double thigh[3], shank[3], line[3]; /* most, across: squares */
+    minus(knee, hip, thigh);
+    minus(heel, knee, shank);
+    minus(heel, hip, line);
+    double longest = LEVEL_STRETCH * (sqrt(dot3(thigh, thigh)) + sqrt(dot3(shank, shank))),
+           most = larger(dot3(line, line), longest * longest);
+    double wx = line[0] + hold[0], wz = line[2] + hold[1], down = -line[1] - rise, across = wx * wx + wz * wz;
+    double fx = toe[0] - heel[0], fz = toe[2] - heel[2], along = length2(fx, fz);
+    if (across + down * down <= most || along < 1e-6) return 0;
+    double ahead = (wx * fx + wz * fz) / along + along;
+    return clamp(1 + (ahead - UNDER) / BEHIND, 0, 1)
+           * clamp(down - sqrt(larger(most - across, 0)), 0, MOST_SINK);
+}
+
+/* Lets the hips sink for feet that move by `holds` along x and z. The feet are placed afterwards. */
+static void sink_hips(const model *m, character *c, double (*holds)[2], const double *ground) {
+    c->hips_sink *= SINK_KEPT;
+    for (int f = 0; f < 2; f++) {
+        double rise = larger(sole_depth(m, c, f, ground + 2 * f), 0);
+        c->hips_sink = larger(c->hips_sink, needed_sink(m, c, f, holds[f], rise));
+    }
+    for (int j = 0; j < m->size[JOINTS]; j++) c->pose_position[j][1] -= c->hips_sink;
+}
+
+/* Moves foot `f` by `held` along x and z, and keeps it out of the ground. Writes contact 0 for a foot that
+   steps. */
+static void place_foot(const model *m, character *c, int f, const double *held, float *contacts,
+                       const double *ground) {
+    const int32_t *leg = m->legs + 4 * f;
+    double shift[3], roll[4] = {1, 0, 0, 0}, old[3], *heel = c->pose_position[leg[HEEL]];
+    double depth = sole_depth(m, c, f, ground + 2 * f) - c->hips_sink, done = c->foot_step[f], bend[3] = {0};
     if (c->knee_more[f] != 0) { /* only in the air */
         double near = larger(c->foot_lock[f], smaller(contacts[2 * f + 1] / LOCK_AT, 1));
         double high = (heel[1] - ground[2 * f] - m->sole[0]) / BENDS_ABOVE;
@@ -2054,9 +2087,9 @@ static void place_foot(const model *m, character *c, int f, float *contacts, con
     double change = rise - c->foot_lift[f];
     if (change < 0) change *= HEIGHT_MIX;
     c->foot_lift[f] += clamp(change, -FASTEST_LIFT, FASTEST_LIFT);
-    shift[0] = horizontal[0] + bend[0];
-    shift[1] = c->foot_lift[f] + bend[1];
-    shift[2] = horizontal[1] + bend[2];
+    shift[0] = held[0] + bend[0];
+    shift[1] = c->foot_lift[f] + bend[1] + c->hips_sink;
+    shift[2] = held[1] + bend[2];
     if (done > 0) { /* the foot leaves the ground slowly, and comes back slowly */
         double share = 4 * done * (1 - done);
         shift[1] += larger(STEP_HEIGHT * share * share - larger(-depth, 0), 0);
@@ -2189,7 +2222,8 @@ static int sound_character(const hobble *h, const character *c) {
            && sound(c->memory, (size_t)h->memory_size) && sound(&c->phase, 1)
            && sound(c->smoothed_velocity, 2) && sound(c->smoothed_direction, 2) && sound(c->correction, 2)
            && sound(c->earlier, 2) && sound(c->foot_hold, 4) && sound(c->foot_lift, 2)
-           && sound(c->foot_added, 16) && sound(c->leg_shown, 18) && sound(&c->body_lift, 1);
+           && sound(c->foot_added, 16) && sound(c->leg_shown, 18) && sound(&c->body_lift, 1)
+           && sound(&c->hips_sink, 1);
 }
 
 /* The height of a grid of heights at x, z, bilinear. */
@@ -2274,7 +2308,10 @@ static int place(hobble *h, const hobble_ground *ground) {
         for (int k = 0; k < 4; k++) heights[k] = larger(heights[k], heights[5 + k]);
         carry_body(m, c, y, heights);
         swing_arms(m, c);
-        for (int f = 0; f < 2; f++) place_foot(m, c, f, contacts, heights);
+        double holds[2][2];
+        for (int f = 0; f < 2; f++) hold_foot(m, c, f, contacts[2 * f + 1], holds[f]);
+        sink_hips(m, c, holds, heights);
+        for (int f = 0; f < 2; f++) place_foot(m, c, f, holds[f], contacts, heights);
         for (int k = 0; k < 4; k++) c->report[2 + k] = clamp(contacts[k], 0, 1);
     }
     return error;
