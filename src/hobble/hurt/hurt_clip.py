@@ -41,6 +41,9 @@ CROUCHED = np.radians([40.0, 90.0])
 # between would move further than a healthy one. So it bends less, by this share, and straightens less to
 # vault.
 ASIDE = 0.9
+# A knee is bent by up to this more as its foot lands than later in the stance, radians, on flat ground.
+LANDING_BEND = np.radians(15.0)
+NEARER = 0.1  # a foot lands near the body if its step is shorter by this share of the healthy step
 # Radians of knee flexion. Below the first value, the bend is too small to tell in which direction the knee
 # points. Above the second value, the bend is large enough. Between them, it counts partly.
 BENT = np.radians([6.0, 18.0])
@@ -348,6 +351,7 @@ def _desired_reach(leg: Leg, changes: Effects, source: HealthyClip, timing: Timi
     """
     when, other_when = timing.leg_frames[:, side], timing.leg_frames[:, 1 - side]
     healthy_bend = knee_flexion(leg.reach, leg.thigh_length, leg.shank_length)
+    healthy_bend = _straighter_climb(healthy_bend, changes, source, side)
     crouch = np.radians(changes.changes["crouch"][:, side]) * (1 - source.swing_curve[:, side])
     crouch = crouch * smoothstep((CROUCHED[1] - healthy_bend) / (CROUCHED[1] - CROUCHED[0]))
     ahead = 1 - ASIDE * source.aside
@@ -361,3 +365,20 @@ def _desired_reach(leg: Leg, changes: Effects, source: HealthyClip, timing: Timi
         reach_at_flexion(bend, leg.thigh_length, leg.shank_length),
         interpolate_values(leg.reach, when),
     )
+
+
+def _straighter_climb(bend: Array, changes: Effects, source: HealthyClip, side: int) -> Array:
+    """The knee flexion (F,) of the healthy clip, radians, but less where a hurt foot lands.
+
+    Uphill, and in steps backward, a knee is bent far as its foot lands away from the body, and straightens
+    as the body follows. A hurt foot lands near the body, and its leg stays as stiff as on the level: of the
+    bend beyond LANDING_BEND, it keeps only the share by which it still lifts the foot.
+    """
+    lift, step = np.minimum(changes.ratio("lift")[:, side], 1.0), changes.changes["step"][:, side]
+    stiff = (1 - lift) * np.clip(-step / NEARER, 0.0, 1.0)
+    less = np.zeros(len(bend))
+    for stance in source.stances[side]:
+        frames = slice(stance.land, round(stance.middle) + 1)
+        least = bend[stance.land : stance.off + 1].min()
+        less[frames] = stiff[frames] * np.maximum(bend[frames] - least - LANDING_BEND, 0.0)
+    return bend - gaussian(less, 2.0)
