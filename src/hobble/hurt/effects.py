@@ -86,24 +86,24 @@ ADDED_CHANGES: dict[str, dict[str, float]] = {
         "lift_sound": 0.3, "push_sound": 0.75, "list": 2.0,
     },
     "hip": {
-        "speed": 0.64, "stride": 1.18, "turn": 0.4, "push": 0.85, "vault": 0.35, "lift": 1.0, "crouch": 8.0,
-        "lift_sound": 0.15, "push_sound": 0.08, "off_sound": 0.04, "width": 0.03, "vault_sound": 0.85,
-        "arm": 0.85, "arm_sound": 0.85, "forward": -4.0, "list": -1.2, "back": 0.42,
+        "speed": 0.614, "stride": 1.23, "turn": 0.3, "push": 0.81, "vault": 0.53, "lift": 0.94, "crouch": 10.7,
+        "lift_sound": 0.2, "push_sound": 0.08, "off_sound": 0.043, "width": 0.008, "vault_sound": 0.93,
+        "arm": 0.85, "arm_sound": 0.85, "forward": -6.7, "list": 1.1, "back": 0.42,
     },
     "thigh": {
-        "speed": 0.633, "stride": 1.08, "turn": 0.27, "push": 0.2, "vault": 0.58, "crouch": 9.0, "lift": 0.05,
-        "lift_sound": 0.15, "push_sound": 0.24, "strike": 1.0, "list": 0.7, "arm": 0.65, "arm_sound": 0.85,
-        "forward": -2.3, "width": 0.004, "side": 1.2, "back": 0.7,
+        "speed": 0.633, "stride": 1.08, "turn": 0.24, "push": 0.18, "vault": 0.41, "crouch": 9.3, "lift": 0.05,
+        "lift_sound": 0.15, "push_sound": 0.15, "strike": 0.92, "list": -0.1, "arm": 0.65, "arm_sound": 0.85,
+        "forward": -0.4, "width": -0.018, "side": 3.2, "back": 0.83,
     },
     "shank": {
-        "speed": 0.56, "stride": 1.0, "turn": 0.55, "push": 0.47, "lift": 0.31, "lift_sound": 0.15,
-        "push_sound": 0.05, "strike": 0.0, "crouch": 21.8, "off_sound": -0.02, "width": 0.08, "out": 0.015,
-        "arm": 0.65, "arm_sound": 0.85, "forward": -4.7, "side": 5.7, "list": -3.3, "back": 0.53,
+        "speed": 0.55, "stride": 1.0, "turn": 0.71, "push": 0.27, "lift": 0.2, "lift_sound": 0.24,
+        "push_sound": 0.25, "strike": 0.0, "crouch": 15.8, "off_sound": -0.02, "width": 0.075, "out": 0.055,
+        "arm": 0.65, "arm_sound": 0.85, "forward": -3.4, "side": 0.7, "list": -1.1, "back": 0.71,
     },
     "foot": {
-        "speed": 0.62, "stride": 1.0, "turn": 0.7, "push": 0.12, "lift": 0.2, "lift_sound": 0.15,
-        "push_sound": 0.48, "strike": 1.0, "side": -1.0, "list": -3.0, "toe_out": 14.0, "off": -0.115,
-        "width": -0.01, "vault_sound": 1.0, "arm": 0.65, "arm_sound": 0.85, "forward": -7.7,
+        "speed": 0.597, "stride": 1.01, "turn": 0.59, "push": 0.32, "lift": 0.5, "lift_sound": 0.15,
+        "push_sound": 0.35, "strike": 0.63, "side": 4.0, "list": -3.6, "toe_out": 14.0, "off": -0.12,
+        "width": -0.02, "vault_sound": 1.0, "arm": 0.65, "arm_sound": 0.85, "forward": -6.7,
     },
     "back": {
         "speed": 0.68, "push": 0.6, "push_sound": 0.6, "stride": 1.12, "forward": 17.0, "crouch": 9.0,
@@ -136,7 +136,7 @@ RATIOS = (
 TIMING_FACTOR = 1.85
 # Part -> length of the step onto the hurt foot, as a ratio to the healthy clip. It replaces the ratio of the
 # profiles.
-STEP_RATIO = {"hip": 0.77, "thigh": 0.18, "shank": 0.39, "foot": 0.42}
+STEP_RATIO = {"hip": 0.79, "thigh": 0.13, "shank": 0.44, "foot": 0.39}
 
 
 @functools.cache
