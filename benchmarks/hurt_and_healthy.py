@@ -77,7 +77,7 @@ def main() -> None:
     print(f"{'':28}{arguments.hurt.name:>12}{arguments.healthy.name:>12}{'ratio':>8}")
     for name, value in hurt.items():
         other = healthy[name]
-        if isinstance(value, float) and isinstance(other, float):
+        if isinstance(value, float) and isinstance(other, float) and other:
             print(f"{name:28}{value:12.4g}{other:12.4g}{value / other:8.2f}")
         else:
             print(f"{name:28}{value!s:>12}{other!s:>12}")

@@ -86,14 +86,14 @@ ADDED_CHANGES: dict[str, dict[str, float]] = {
         "lift_sound": 0.3, "push_sound": 0.75, "list": 2.0,
     },
     "hip": {
-        "speed": 0.614, "stride": 1.23, "turn": 0.3, "push": 0.81, "vault": 0.53, "lift": 0.94, "crouch": 10.7,
-        "lift_sound": 0.2, "push_sound": 0.08, "off_sound": 0.043, "width": 0.008, "vault_sound": 0.93,
-        "arm": 0.85, "arm_sound": 0.85, "forward": -6.7, "list": 1.1, "back": 0.42,
+        "speed": 0.614, "stride": 1.23, "turn": 0.3, "push": 0.81, "vault": 0.53, "lift": 0.94,
+        "crouch": 10.7, "lift_sound": 0.2, "push_sound": 0.08, "off_sound": 0.043, "width": 0.008,
+        "vault_sound": 0.93, "arm": 0.85, "arm_sound": 0.85, "forward": -6.7, "list": 1.1, "back": 0.42,
     },
     "thigh": {
-        "speed": 0.633, "stride": 1.08, "turn": 0.24, "push": 0.18, "vault": 0.41, "crouch": 9.3, "lift": 0.05,
-        "lift_sound": 0.15, "push_sound": 0.15, "strike": 0.92, "list": -0.1, "arm": 0.65, "arm_sound": 0.85,
-        "forward": -0.4, "width": -0.018, "side": 3.2, "back": 0.83,
+        "speed": 0.633, "stride": 1.08, "turn": 0.24, "push": 0.18, "vault": 0.41, "crouch": 9.3,
+        "lift": 0.05, "lift_sound": 0.15, "push_sound": 0.15, "strike": 0.92, "list": -0.1, "arm": 0.65,
+        "arm_sound": 0.85, "forward": -0.4, "width": -0.018, "side": 3.2, "back": 0.83,
     },
     "shank": {
         "speed": 0.55, "stride": 1.0, "turn": 0.71, "push": 0.27, "lift": 0.2, "lift_sound": 0.24,
