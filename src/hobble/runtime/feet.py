@@ -308,19 +308,17 @@ HEIGHT_MIX = 0.5  # a foot comes down by this share of the way that is left, eac
 # Largest change of the foot lift, cm a frame. It is needed because a network may predict contact while the
 # foot is at knee height.
 FASTEST_LIFT = 8.0
-# A held foot whose heel is behind the hip may stretch the leg to this share of the leg's full length, or as
-# far as the network stretches it if that is further. Instead of stretching more, the leg raises its heel.
-# Without this rule, holding a foot 5 cm behind the network's foot straightens a knee that is bent by 26
-# degrees, and a leg that should stay stiff bends and stretches.
-STRETCH = 0.99
-# The rule sets in as the toe comes within UNDER cm ahead of the hip, and applies in full BEHIND cm later. A
-# foot further ahead stays flat.
+# A held foot may stretch its leg to this share of the leg's full length, or as far as the network stretches
+# it if that is further. Instead of stretching more, a leg behind the hip raises its heel, and any other, as
+# in steps to the side or backward, pulls the hips down. Without this rule, holding a foot 5 cm behind the
+# network's foot straightens a knee that is bent by 26 degrees, and a leg that should stay stiff bends and
+# stretches. Healthy legs snapped straight in steps backward.
+STRETCH = 0.97
+# The heel begins to rise as the toe comes within UNDER cm ahead of the hip, and the rule applies in full
+# BEHIND cm later. A foot further ahead stays flat.
 UNDER, BEHIND = 8.0, 10.0
-# A held foot that is not behind the hip, as in steps to the side or backward, may stretch the leg to this
-# share of its length, or as far as the network stretches it. Instead of stretching more, the leg pulls the
-# hips down, by MOST_SINK cm at most. They come up again by SINK_KEPT a frame. Without this rule, a stiff knee
-# became straight at the end of each step to the side, and healthy legs snapped straight in steps backward.
-LEVEL_STRETCH, MOST_SINK, SINK_KEPT = 0.97, 6.0, 0.85
+MOST_SINK = 6.0  # cm that the hips sink at most
+SINK_KEPT = 0.85  # they come up again gradually: this share is left in the next frame
 BODY_MIX = 0.15  # a share of the way that is left, each frame, for the body lift, up and down
 BODY_FREE = 3.0  # cm that standing feet may be off the ground before the body is raised or lowered
 BODY_MIN_CONTACT = 0.3  # if the contacts of both feet sum to less, the feet do not decide the body's height
@@ -427,14 +425,14 @@ def raise_heel(position: Any, hip: int, knee: int, heel: int, toe: int, shift: A
 
 @njit
 def needed_sink(position: Any, leg: Any, hold: Any, rise: float) -> float:
-    """By how much the hips have to sink, cm, so that a held foot obeys LEVEL_STRETCH.
+    """By how much the hips have to sink, cm, so that a held foot obeys STRETCH.
 
     position: (J, 3) of the pose. leg: (4,) hip, knee, heel and toe joint. hold: (2,) how far the foot moves
     along x and z, rise: how far it moves up, cm.
     """
     hip, knee, heel, toe = leg[0], leg[1], leg[2], leg[3]
     upper, lower, before = leg_squares(position, hip, knee, heel)
-    most = max(before, (LEVEL_STRETCH * (np.sqrt(upper) + np.sqrt(lower))) ** 2)
+    most = max(before, (STRETCH * (np.sqrt(upper) + np.sqrt(lower))) ** 2)
     # The held heel is at (wx, wz) from the hip, `down` below it.
     wx, wz = position[heel, 0] + hold[0] - position[hip, 0], position[heel, 2] + hold[1] - position[hip, 2]
     down, across = position[hip, 1] - position[heel, 1] - rise, wx * wx + wz * wz

@@ -72,10 +72,9 @@ enum {
 #define HEIGHT_MIX 0.5
 #define FEET_AHEAD 4.0
 #define FASTEST_LIFT 8.0
-#define STRETCH 0.99
+#define STRETCH 0.97
 #define UNDER 8.0
 #define BEHIND 10.0
-#define LEVEL_STRETCH 0.97
 #define MOST_SINK 6.0
 #define SINK_KEPT 0.85
 #define BODY_MIX 0.15
@@ -2047,7 +2046,7 @@ static double needed_sink(const model *m, const character *c, int f, const doubl
     minus(knee, hip, thigh);
     minus(heel, knee, shank);
     minus(heel, hip, line);
-    double longest = LEVEL_STRETCH * (sqrt(dot3(thigh, thigh)) + sqrt(dot3(shank, shank))),
+    double longest = STRETCH * (sqrt(dot3(thigh, thigh)) + sqrt(dot3(shank, shank))),
            most = larger(dot3(line, line), longest * longest);
     double wx = line[0] + hold[0], wz = line[2] + hold[1], down = -line[1] - rise, across = wx * wx + wz * wz;
     double fx = toe[0] - heel[0], fz = toe[2] - heel[2], along = length2(fx, fz);
