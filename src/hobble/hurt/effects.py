@@ -80,6 +80,9 @@ CURVE_FACTOR: dict[str, float] = {"pelvis": 1.6, "hip": 1.6, "thigh": 1.1, "shan
 # - Degrees: toe_out; crouch (knee flexion added in stance); forward and side (lean of the trunk forward and
 #   to the hurt side); list (pelvis up on the hurt side while that leg swings; negative: it drops further);
 #   nod (head forward).
+# - Cycles: off, off_sound and land_sound, in place of those of the profiles: see `changes_of_hurt_part`. In
+#   steps to the side, backward and crouched, a sound foot has no room to land earlier, but a hurt foot can
+#   leave earlier.
 ADDED_CHANGES: dict[str, dict[str, float]] = {
     "pelvis": {
         "speed": 0.74, "stride": 1.15, "turn": 0.8, "push": 0.65, "back": 0.6, "lift": 0.8,
