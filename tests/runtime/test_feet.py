@@ -1,7 +1,5 @@
 """Feet stay where they landed and on the ground; legs reach them without moving too fast."""
 
-import itertools
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -149,7 +147,6 @@ def test_the_heel_of_a_held_foot_rises_before_its_leg_is_straight(holden31: Skel
     _, _, heel, toe = feet.legs[0]
     start, turns = feet.base[0], feet.base[1]
     foot, first = start[toe] - start[heel], start[toe]
-    leg = sum(np.linalg.norm(start[a] - start[b]) for a, b in itertools.pairwise(feet.legs[0][:3]))
     rolls, lengths = [], []
     for z in np.arange(0, 16, 0.5):
         shown = feet(np.array([0.0, 0, z]), 1.0)
@@ -159,12 +156,9 @@ def test_the_heel_of_a_held_foot_rises_before_its_leg_is_straight(holden31: Skel
         np.testing.assert_array_equal(feet.rotation[toe], turns[toe])
         rolls.append(2 * np.degrees(np.arcsin(np.linalg.norm(turned[1:]))))
         lengths.append(stretched(shown, feet.legs))
-    assert rolls[0] == 0
-    assert rolls[-1] > 10
+    assert rolls[0] == 0 < 10 < rolls[-1]
     assert 0 <= np.diff(rolls).min() <= np.diff(rolls).max() < 1.5  # it does not set in at once
     assert lengths[-1] == pytest.approx(STRETCH, abs=1e-9)
-    without = np.linalg.norm(first - [0, 0, 15.5] - foot - start[feet.legs[0][0]]) / leg
-    assert without > lengths[-1] + 0.005
     under = Feet(holden31, 0.05, 0.36)  # the toe is 1 cm ahead of the hip, the heel behind it
     lengths = [stretched(under(np.array([0.0, 0, z]), 1.0), under.legs) for z in np.arange(0, 5.5, 0.5)]
     assert lengths[-1] < lengths[0] + 0.0005, "the knee does not snap straight there, either"
@@ -174,17 +168,15 @@ def test_the_heel_of_a_held_foot_rises_before_its_leg_is_straight(holden31: Skel
 def test_a_foot_held_beside_or_ahead_pulls_the_hips_down(holden31: Skeleton, way: list[float]) -> None:
     """The toe stays, the knee keeps its bend, the other foot is where it was; then the hips rise slowly."""
     feet = Feet(holden31, 0.3, 0.55)
-    hip, toe, other = holden31.role("hips"), feet.legs[0, 3], feet.legs[1, 2:]
-    heights = []
-    for far in np.arange(0, 16, 0.5):
-        moved = far * np.array(way)
+    toe, other, heights = feet.legs[0, 3], feet.legs[1, 2:], []
+    for moved in np.outer(np.arange(0, 16, 0.5), way):
         shown = feet(moved, 1.0)
         np.testing.assert_allclose(shown[toe], feet.base[0][toe], atol=1e-6)
         np.testing.assert_allclose(shown[other], (feet.base[0] + moved)[other], atol=1e-6)
-        heights.append(shown[hip, 1])
+        heights.append(shown[0, 1])
     assert stretched(shown, feet.legs) == pytest.approx(STRETCH, abs=1e-9)
     assert heights[0] - heights[-1] > 0.9
-    heights += [feet(moved, 0.0)[hip, 1] for _ in range(40)]
+    heights += [feet(moved, 0.0)[0, 1] for _ in range(40)]
     assert np.abs(np.diff(heights)).max() < 1.0
     assert heights[-1] == pytest.approx(heights[0], abs=0.01)
 
@@ -207,11 +199,10 @@ def test_standing_feet_raise_and_lower_the_body(holden31: Skeleton) -> None:
         return float(moved[0, 1])
 
     far, stands = 1e6, [1.0, 1.0, 0.0, 0.0]
-    up, down = soles[0] + 20, soles[0] - 20
-    assert carried_to(up, 0.0, stands, -far, far) == pytest.approx(20 - BODY_FREE, abs=1e-3)
-    assert carried_to(down, 0.0, stands, -far, far) == pytest.approx(BODY_FREE - 20, abs=1e-3)
+    assert carried_to(soles[0] + 20, 0.0, stands, -far, far) == pytest.approx(20 - BODY_FREE, abs=1e-3)
+    assert carried_to(soles[0] - 20, 0.0, stands, -far, far) == pytest.approx(BODY_FREE - 20, abs=1e-3)
     assert carried_to(soles[0] + 2, 90.0, stands, -far, far) == 0.0
-    assert carried_to(up, up, [0.0] * 4, -far, far) == 0.0
+    assert carried_to(90.0, 90.0, [0.0] * 4, -far, far) == 0.0
     above = base[hips, 1] - soles[0]
     assert carried_to(soles[0], soles[0], stands, -far, above - 6) == pytest.approx(-6)
     assert carried_to(soles[0], soles[0], [0.0] * 4, above + 5, far) == pytest.approx(5)
@@ -232,13 +223,11 @@ def test_reaching_with_a_leg_equals_two_bone_ik(holden31: Skeleton, x: float, y:
     pole = quat.rotate(quat.between(leg, leg + shift), before[knee] - before[hip])
     expected = two_bone_knee(before[hip], before[heel] + shift, pole, upper, lower)
     np.testing.assert_allclose(position[[knee, heel]], expected, atol=1e-6)
-    # The bones' rotations go with them, the others stay.
     for joint, child in ((hip, knee), (knee, heel)):
         bone = quat.rotate(quat.inv(turned[joint]), before[child] - before[joint])
         moved = quat.rotate(rotation[joint], bone)
         np.testing.assert_allclose(moved, position[child] - position[joint], atol=1e-6)
-    others = np.setdiff1d(np.arange(31), [hip, knee])
-    np.testing.assert_array_equal(rotation[others], turned[others])
+    np.testing.assert_array_equal(*(np.delete(one, [hip, knee], axis=0) for one in (rotation, turned)))
 
 
 def test_knee_heel_and_toe_move_no_further_in_a_frame_than_allowed(holden31: Skeleton) -> None:
