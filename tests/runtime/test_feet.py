@@ -143,7 +143,7 @@ def stretched(position: np.ndarray, legs: np.ndarray) -> float:
 
 def test_the_heel_of_a_held_foot_rises_before_its_leg_is_straight(holden31: Skeleton) -> None:
     """As the body goes on, the toe stays, the knee stays bent, and the foot turns about the toe, rigid."""
-    feet = Feet(holden31, 0.15, 0.55)
+    feet = Feet(holden31, 0.15, 0.6)
     _, _, heel, toe = feet.legs[0]
     start, turns = feet.base[0], feet.base[1]
     foot, first = start[toe] - start[heel], start[toe]
@@ -167,7 +167,7 @@ def test_the_heel_of_a_held_foot_rises_before_its_leg_is_straight(holden31: Skel
 @pytest.mark.parametrize("way", [[1.0, 0, 0], [0, 0, -1.0]])
 def test_a_foot_held_beside_or_ahead_pulls_the_hips_down(holden31: Skeleton, way: list[float]) -> None:
     """The toe stays, the knee keeps its bend, the other foot is where it was; then the hips rise slowly."""
-    feet = Feet(holden31, 0.3, 0.55)
+    feet = Feet(holden31, 0.3, 0.6)
     toe, other, heights = feet.legs[0, 3], feet.legs[1, 2:], []
     for moved in np.outer(np.arange(0, 16, 0.5), way):
         shown = feet(moved, 1.0)

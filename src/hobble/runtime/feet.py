@@ -313,7 +313,7 @@ FASTEST_LIFT = 8.0
 # in steps to the side or backward, pulls the hips down. Without this rule, holding a foot 5 cm behind the
 # network's foot straightens a knee that is bent by 26 degrees, and a leg that should stay stiff bends and
 # stretches. Healthy legs snapped straight in steps backward.
-STRETCH = 0.97
+STRETCH = 0.96
 # The heel begins to rise as the toe comes within UNDER cm ahead of the hip, and the rule applies in full
 # BEHIND cm later. A foot further ahead stays flat.
 UNDER, BEHIND = 8.0, 10.0

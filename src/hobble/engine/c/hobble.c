@@ -72,7 +72,7 @@ enum {
 #define HEIGHT_MIX 0.5
 #define FEET_AHEAD 4.0
 #define FASTEST_LIFT 8.0
-#define STRETCH 0.97
+#define STRETCH 0.96
 #define UNDER 8.0
 #define BEHIND 10.0
 #define MOST_SINK 6.0
