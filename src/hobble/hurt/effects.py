@@ -97,7 +97,7 @@ ADDED_CHANGES: dict[str, dict[str, float]] = {
     "thigh": {
         "speed": 0.65, "stride": 1.09, "turn": 0.22, "push": 0.11, "vault": 0.34, "crouch": 11.5,
         "lift": 0.05, "lift_sound": 0.15, "push_sound": 0.14, "strike": 0.87, "list": 0.8, "arm": 0.65,
-        "arm_sound": 0.85, "forward": -0.4, "width": -0.004, "side": 2.8, "back": 0.83, "off": -0.14,
+        "arm_sound": 0.85, "forward": -0.9, "width": -0.004, "side": 2.8, "back": 0.83, "off": -0.14,
         "off_sound": 0.056, "land_sound": -0.098,
     },
     "shank": {
