@@ -91,19 +91,19 @@ ADDED_CHANGES: dict[str, dict[str, float]] = {
     "hip": {
         "speed": 0.61, "stride": 1.19, "turn": 0.38, "push": 0.9, "vault": 0.38, "lift": 0.99,
         "crouch": 11.8, "lift_sound": 0.22, "push_sound": 0.08, "off_sound": 0.04, "width": 0.02,
-        "vault_sound": 0.98, "arm": 0.85, "arm_sound": 0.85, "forward": -6.7, "list": 0.4,
-        "back": 0.42, "side": -0.15,
+        "vault_sound": 0.98, "arm": 0.85, "arm_sound": 0.85, "forward": -6.7, "list": -0.6,
+        "back": 0.42, "side": -0.25,
     },
     "thigh": {
         "speed": 0.65, "stride": 1.09, "turn": 0.22, "push": 0.11, "vault": 0.34, "crouch": 11.5,
-        "lift": 0.05, "lift_sound": 0.15, "push_sound": 0.14, "strike": 0.87, "list": 0.8, "arm": 0.65,
+        "lift": 0.05, "lift_sound": 0.15, "push_sound": 0.14, "strike": 0.87, "list": -0.4, "arm": 0.65,
         "arm_sound": 0.85, "forward": -0.9, "width": -0.004, "side": 2.8, "back": 0.83, "off": -0.14,
         "off_sound": 0.056, "land_sound": -0.098,
     },
     "shank": {
         "speed": 0.555, "stride": 1.0, "turn": 0.71, "push": 0.24, "lift": 0.27, "lift_sound": 0.21,
         "push_sound": 0.27, "strike": 0.0, "crouch": 15.2, "off_sound": -0.02, "width": 0.086, "out": 0.055,
-        "arm": 0.65, "arm_sound": 0.85, "forward": -3.8, "side": -0.5, "list": -1.1, "back": 0.79,
+        "arm": 0.65, "arm_sound": 0.85, "forward": -3.8, "side": -0.5, "list": -2.0, "back": 0.79,
         "off": -0.105, "land_sound": -0.115,
     },
     "foot": {
