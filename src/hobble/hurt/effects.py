@@ -95,20 +95,21 @@ ADDED_CHANGES: dict[str, dict[str, float]] = {
         "back": 0.42, "side": -0.25,
     },
     "thigh": {
-        "speed": 0.65, "stride": 1.09, "turn": 0.03, "push": 0.11, "vault": 0.34, "crouch": 10.5,
+        "speed": 0.642, "stride": 1.09, "turn": 0.03, "push": 0.11, "vault": 0.34, "crouch": 10.5,
         "lift": 0.05, "lift_sound": 0.15, "push_sound": 0.14, "strike": 0.87, "list": -0.4, "arm": 0.65,
-        "arm_sound": 0.85, "forward": -0.9, "width": -0.004, "side": 2.8, "back": 0.83, "off": -0.14,
+        "arm_sound": 0.85, "forward": -0.9, "width": -0.004, "side": 2.2, "back": 0.83, "off": -0.14,
         "off_sound": 0.056, "land_sound": -0.098,
     },
     "shank": {
         "speed": 0.555, "stride": 1.0, "turn": 0.62, "push": 0.24, "lift": 0.27, "lift_sound": 0.21,
-        "push_sound": 0.27, "strike": 0.0, "crouch": 15.2, "off_sound": -0.02, "width": 0.086, "out": 0.055,
-        "arm": 0.65, "arm_sound": 0.85, "forward": -3.8, "side": -0.5, "list": -2.0, "back": 0.79,
+        "push_sound": 0.27, "strike": 0.0, "crouch": 15.2, "off_sound": -0.02, "width": 0.086, "out": 0.045,
+        "arm": 0.65, "arm_sound": 0.85, "forward": -3.8, "side": 0.3, "list": -2.0, "back": 0.79,
         "off": -0.105, "land_sound": -0.115,
     },
     "foot": {
-        "speed": 0.615, "stride": 1.03, "turn": 0.5, "push": 0.44, "lift": 0.64, "lift_sound": 0.18,
-        "push_sound": 0.26, "strike": 0.61, "side": 3.7, "list": -3.6, "toe_out": 14.0, "off": -0.12,
+        "speed": 0.615, "stride": 1.03, "turn": 0.5, "push": 0.48, "lift": 0.72, "lift_sound": 0.18,
+        "push_sound": 0.26, "strike": 0.61, "side": 3.7, "list": -3.6, "toe_out": 14.0, "off": -0.128,
+        "off_sound": 0.052, "land_sound": -0.105,
         "width": -0.02, "vault_sound": 1.0, "arm": 0.65, "arm_sound": 0.85, "forward": -6.0,
     },
     "back": {
@@ -142,7 +143,7 @@ RATIOS = (
 TIMING_FACTOR = 1.85
 # Part -> length of the step onto the hurt foot, as a ratio to the healthy clip. It replaces the ratio of the
 # profiles.
-STEP_RATIO = {"hip": 0.8, "thigh": 0.19, "shank": 0.44, "foot": 0.39}
+STEP_RATIO = {"hip": 0.8, "thigh": 0.18, "shank": 0.43, "foot": 0.41}
 
 
 @functools.cache
