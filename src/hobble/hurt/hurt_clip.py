@@ -351,7 +351,7 @@ def _desired_reach(leg: Leg, changes: Effects, source: HealthyClip, timing: Timi
     """
     when, other_when = timing.leg_frames[:, side], timing.leg_frames[:, 1 - side]
     healthy_bend = knee_flexion(leg.reach, leg.thigh_length, leg.shank_length)
-    healthy_bend = _straighter_climb(healthy_bend, changes, source, side)
+    healthy_bend = _stiffer_landing(healthy_bend, changes, source, side)
     crouch = np.radians(changes.changes["crouch"][:, side]) * (1 - source.swing_curve[:, side])
     crouch = crouch * smoothstep((CROUCHED[1] - healthy_bend) / (CROUCHED[1] - CROUCHED[0]))
     ahead = 1 - ASIDE * source.aside
@@ -367,7 +367,7 @@ def _desired_reach(leg: Leg, changes: Effects, source: HealthyClip, timing: Timi
     )
 
 
-def _straighter_climb(bend: Array, changes: Effects, source: HealthyClip, side: int) -> Array:
+def _stiffer_landing(bend: Array, changes: Effects, source: HealthyClip, side: int) -> Array:
     """The knee flexion (F,) of the healthy clip, radians, but less where a hurt foot lands.
 
     Uphill, and in steps backward, a knee is bent far as its foot lands away from the body, and straightens
