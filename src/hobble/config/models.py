@@ -69,7 +69,7 @@ class ClipEntry(Section):
     )
     share: PositiveFloat = Field(1.0, description="for synthetic clips: length relative to the other clips")
     source_fps: PositiveFloat | None = Field(None, description="overrides the file's Frame Time")
-    hurt: Annotated[float, Field(ge=0, le=60, allow_inf_nan=False)] | None = Field(
+    hurt: Annotated[float, Field(ge=0, le=9, allow_inf_nan=False)] | None = Field(
         None,
         description="total length of the clip's hurt versions, as a multiple of the clip's length; overrides "
         "`hurt.versions` and `hurt.longest` of the data set",
