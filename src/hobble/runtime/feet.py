@@ -384,6 +384,13 @@ def leg_squares(position: Any, hip: int, knee: int, heel: int) -> tuple[float, f
 
 
 @njit
+def allowed_square(position: Any, hip: int, knee: int, heel: int) -> float:
+    """Square of the distance from hip to heel, cm, to which a held foot may stretch its leg, see STRETCH."""
+    upper, lower, before = leg_squares(position, hip, knee, heel)
+    return max(before, (STRETCH * (np.sqrt(upper) + np.sqrt(lower))) ** 2)
+
+
+@njit
 def raise_heel(position: Any, hip: int, knee: int, heel: int, toe: int, shift: Any, roll: Any) -> None:
     """Raise the heel of a foot that `shift` moves behind the hip, so that the leg obeys STRETCH.
 
@@ -391,11 +398,9 @@ def raise_heel(position: Any, hip: int, knee: int, heel: int, toe: int, shift: A
     about its toe, by MOST_ADDED at most. This rotation is written to `roll` (4,), once the identity, and the
     heel's movement is added to `shift`. A foot ahead of the hip by UNDER stays flat.
     """
-    upper, lower, before = leg_squares(position, hip, knee, heel)
-    needed = 0.0  # square of the distance from hip to heel after the shift
+    most, needed = allowed_square(position, hip, knee, heel), 0.0  # squares of the distance, cm
     for i in range(3):
         needed += (position[heel, i] + shift[i] - position[hip, i]) ** 2
-    most = max(before, (STRETCH * (np.sqrt(upper) + np.sqrt(lower))) ** 2)  # what `needed` may be
     # The foot from heel to toe has the horizontal direction (fx, fz) and length `along`. The heel is `high`
     # above the toe.
     fx, fz = position[toe, 0] - position[heel, 0], position[toe, 2] - position[heel, 2]
@@ -431,8 +436,7 @@ def needed_sink(position: Any, leg: Any, hold: Any, rise: float) -> float:
     along x and z, rise: how far it moves up, cm.
     """
     hip, knee, heel, toe = leg[0], leg[1], leg[2], leg[3]
-    upper, lower, before = leg_squares(position, hip, knee, heel)
-    most = max(before, (STRETCH * (np.sqrt(upper) + np.sqrt(lower))) ** 2)
+    most = allowed_square(position, hip, knee, heel)
     # The held heel is at (wx, wz) from the hip, `down` below it.
     wx, wz = position[heel, 0] + hold[0] - position[hip, 0], position[heel, 2] + hold[1] - position[hip, 2]
     down, across = position[hip, 1] - position[heel, 1] - rise, wx * wx + wz * wz
@@ -583,7 +587,7 @@ def place_feet(
     joints, parts, sole, ahead, fastest = legs
     held, lift, added, shown, root_height, body_lift, hips_sink, more = feet
     lock, hold, step, missed = held
-    shift, roll, holds = np.zeros(3), np.zeros(4), np.zeros((2, 2))
+    shift, roll, holds, depths = np.zeros(3), np.zeros(4), np.zeros((2, 2)), np.zeros(2)
     for c in range(position.shape[0]):
         base = root_height[c] + body_lift[c]
         sink = SINK_KEPT * hips_sink[c]
@@ -593,8 +597,8 @@ def place_feet(
             holds[f, 0], holds[f, 1] = hold_foot(
                 c, f, at, contacts[c, 2 * f + 1], locking, shown[c, f, 2], fastest, held
             )
-            depth = sole_depth(position[c], heel, toe, ground[c, 2 * f], ground[c, 2 * f + 1], sole)
-            sink = max(sink, needed_sink(position[c], joints[f], holds[f], max(depth, 0.0)))
+            depths[f] = sole_depth(position[c], heel, toe, ground[c, 2 * f], ground[c, 2 * f + 1], sole)
+            sink = max(sink, needed_sink(position[c], joints[f], holds[f], max(depths[f], 0.0)))
         hips_sink[c] = sink  # the feet stay where they are
         for j in range(position.shape[1]):
             position[c, j, 1] -= sink
@@ -602,8 +606,7 @@ def place_feet(
             hip, knee, heel, toe = joints[f, 0], joints[f, 1], joints[f, 2], joints[f, 3]
             shift[0], shift[2] = holds[f]
             # Lift a foot out of the ground; lower a held foot that floats; raise a foot that steps.
-            under = ground[c, 2 * f], ground[c, 2 * f + 1]
-            depth = sole_depth(position[c], heel, toe, under[0], under[1], sole) - sink
+            depth = depths[f]
             x, y, z = 0.0, 0.0, 0.0
             if more[c, f] != 0.0:
                 # Only in the air: nothing changes as the foot leaves the ground, and little as it lands.

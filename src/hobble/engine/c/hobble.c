@@ -1898,19 +1898,29 @@ static void hold_foot(const model *m, character *c, int f, double contact, doubl
     limit_shift(shift, x, z, shown, fastest);
 }
 
+/* Squares of the lengths of thigh and shank, and of the distance from hip to heel. */
+static void leg_squares(const double *hip, const double *knee, const double *heel, double *squares) {
+    double thigh[3], shank[3], line[3];
+    minus(knee, hip, thigh);
+    minus(heel, knee, shank);
+    minus(heel, hip, line);
+    squares[0] = dot3(thigh, thigh), squares[1] = dot3(shank, shank), squares[2] = dot3(line, line);
+}
+
+/* The square of the distance from hip to heel that a held foot may stretch its leg to. */
+static double allowed_square(const double *hip, const double *knee, const double *heel) {
+    double squares[3];
+    leg_squares(hip, knee, heel, squares);
+    double longest = STRETCH * (sqrt(squares[0]) + sqrt(squares[1]));
+    return larger(squares[2], longest * longest);
+}
+
 /* Raises the heel of a foot that `shift` moves behind the hip, so that the leg is not stretched: see feet.py.
    The foot turns about its toe by the rotation `roll`, and the heel's movement is added to `shift`. */
 static void raise_heel(const double *hip, const double *knee, const double *heel, const double *toe,
                        double *shift, double *roll) {
-    double upper = 0, lower = 0, before = 0,
-           needed = 0; /* squares of lengths and of distances from hip to heel */
-    for (int i = 0; i < 3; i++) {
-        upper += (knee[i] - hip[i]) * (knee[i] - hip[i]);
-        lower += (heel[i] - knee[i]) * (heel[i] - knee[i]);
-        before += (heel[i] - hip[i]) * (heel[i] - hip[i]);
-        needed += (heel[i] + shift[i] - hip[i]) * (heel[i] + shift[i] - hip[i]);
-    }
-    double longest = STRETCH * (sqrt(upper) + sqrt(lower)), most = larger(before, longest * longest);
+    double most = allowed_square(hip, knee, heel), needed = 0; /* square of the distance after the shift */
+    for (int i = 0; i < 3; i++) needed += (heel[i] + shift[i] - hip[i]) * (heel[i] + shift[i] - hip[i]);
     double fx = toe[0] - heel[0], fz = toe[2] - heel[2], along = length2(fx, fz), high = heel[1] - toe[1];
     if (needed <= most || along < 1e-6) return;
     fx /= along;
@@ -1998,17 +2008,14 @@ static void carry_body(const model *m, character *c, const float *y, const doubl
 /* How the heel moves if the knee bends by `more` radians more: see heel_of_bend in feet.py. */
 static void heel_of_bend(const double *hip, const double *knee, const double *heel, double more,
                          double *move) {
-    double thigh[3], shank[3], line[3];
-    minus(knee, hip, thigh);
-    minus(heel, knee, shank);
-    minus(heel, hip, line);
-    double upper = dot3(thigh, thigh), lower = dot3(shank, shank), before = dot3(line, line),
-           both = 2 * sqrt(upper * lower);
+    double squares[3];
+    leg_squares(hip, knee, heel, squares);
+    double upper = squares[0], lower = squares[1], before = squares[2], both = 2 * sqrt(upper * lower);
     if (before < 1 || both < 1) return;
     double bent = acos(clamp((before - upper - lower) / both, -1, 1));
     bent = clamp(bent + more, smaller(bent, BENT), larger(bent, MOST_BENT));
     double share = sqrt((upper + lower + both * cos(bent)) / before) - 1;
-    for (int i = 0; i < 3; i++) move[i] = share * line[i];
+    for (int i = 0; i < 3; i++) move[i] = share * (heel[i] - hip[i]);
 }
 
 /* Lets the arms swing further, or less: see swing_arms in variation.py. */
@@ -2042,13 +2049,10 @@ static double needed_sink(const model *m, const character *c, int f, const doubl
     const int32_t *leg = m->legs + 4 * f;
     const double *hip = c->pose_position[leg[HIP]], *knee = c->pose_position[leg[KNEE]],
                  *heel = c->pose_position[leg[HEEL]], *toe = c->pose_position[leg[TOE]];
-    double thigh[3], shank[3], line[3]; /* most, across: squares */
-    minus(knee, hip, thigh);
-    minus(heel, knee, shank);
-    minus(heel, hip, line);
-    double longest = STRETCH * (sqrt(dot3(thigh, thigh)) + sqrt(dot3(shank, shank))),
-           most = larger(dot3(line, line), longest * longest);
-    double wx = line[0] + hold[0], wz = line[2] + hold[1], down = -line[1] - rise, across = wx * wx + wz * wz;
+    double most = allowed_square(hip, knee, heel);
+    /* The held heel is at (wx, wz) from the hip, `down` below it. */
+    double wx = heel[0] + hold[0] - hip[0], wz = heel[2] + hold[1] - hip[2], down = hip[1] - heel[1] - rise,
+           across = wx * wx + wz * wz;
     double fx = toe[0] - heel[0], fz = toe[2] - heel[2], along = length2(fx, fz);
     if (across + down * down <= most || along < 1e-6) return 0;
     double ahead = (wx * fx + wz * fz) / along + along;
@@ -2056,23 +2060,22 @@ static double needed_sink(const model *m, const character *c, int f, const doubl
            * clamp(down - sqrt(larger(most - across, 0)), 0, MOST_SINK);
 }
 
-/* Lets the hips sink for feet that move by `holds` along x and z. The feet are placed afterwards. */
-static void sink_hips(const model *m, character *c, double (*holds)[2], const double *ground) {
+/* Lets the hips sink for feet that move by `holds` along x and z. The feet, which are `depths` deep in the
+   ground, are placed afterwards. */
+static void sink_hips(const model *m, character *c, double (*holds)[2], const double *depths) {
     c->hips_sink *= SINK_KEPT;
-    for (int f = 0; f < 2; f++) {
-        double rise = larger(sole_depth(m, c, f, ground + 2 * f), 0);
-        c->hips_sink = larger(c->hips_sink, needed_sink(m, c, f, holds[f], rise));
-    }
+    for (int f = 0; f < 2; f++)
+        c->hips_sink = larger(c->hips_sink, needed_sink(m, c, f, holds[f], larger(depths[f], 0)));
     for (int j = 0; j < m->size[JOINTS]; j++) c->pose_position[j][1] -= c->hips_sink;
 }
 
-/* Moves foot `f` by `held` along x and z, and keeps it out of the ground. Writes contact 0 for a foot that
-   steps. */
-static void place_foot(const model *m, character *c, int f, const double *held, float *contacts,
+/* Moves foot `f` by `held` along x and z, and keeps it out of the ground, in which it is `depth` deep. Writes
+   contact 0 for a foot that steps. */
+static void place_foot(const model *m, character *c, int f, const double *held, double depth, float *contacts,
                        const double *ground) {
     const int32_t *leg = m->legs + 4 * f;
     double shift[3], roll[4] = {1, 0, 0, 0}, old[3], *heel = c->pose_position[leg[HEEL]];
-    double depth = sole_depth(m, c, f, ground + 2 * f) - c->hips_sink, done = c->foot_step[f], bend[3] = {0};
+    double done = c->foot_step[f], bend[3] = {0};
     if (c->knee_more[f] != 0) { /* only in the air */
         double near = larger(c->foot_lock[f], smaller(contacts[2 * f + 1] / LOCK_AT, 1));
         double high = (heel[1] - ground[2 * f] - m->sole[0]) / BENDS_ABOVE;
@@ -2307,10 +2310,13 @@ static int place(hobble *h, const hobble_ground *ground) {
         for (int k = 0; k < 4; k++) heights[k] = larger(heights[k], heights[5 + k]);
         carry_body(m, c, y, heights);
         swing_arms(m, c);
-        double holds[2][2];
-        for (int f = 0; f < 2; f++) hold_foot(m, c, f, contacts[2 * f + 1], holds[f]);
-        sink_hips(m, c, holds, heights);
-        for (int f = 0; f < 2; f++) place_foot(m, c, f, holds[f], contacts, heights);
+        double holds[2][2], depths[2];
+        for (int f = 0; f < 2; f++) {
+            hold_foot(m, c, f, contacts[2 * f + 1], holds[f]);
+            depths[f] = sole_depth(m, c, f, heights + 2 * f);
+        }
+        sink_hips(m, c, holds, depths);
+        for (int f = 0; f < 2; f++) place_foot(m, c, f, holds[f], depths[f], contacts, heights);
         for (int k = 0; k < 4; k++) c->report[2 + k] = clamp(contacts[k], 0, 1);
     }
     return error;
