@@ -214,9 +214,17 @@ def join_steps(
 
 
 def move_foot(
-    source: HealthyClip, effects: Effects, foot: HurtFoot, new_footprints: list[Array], side: int
+    source: HealthyClip,
+    effects: Effects,
+    foot: HurtFoot,
+    new_footprints: list[Array],
+    shift: Array,
+    side: int,
 ) -> HurtFoot:
-    """The foot that `reduce_pitch` returned, moved to new footprints, one for each stance."""
+    """The foot that `reduce_pitch` returned, moved to new footprints, one for each stance.
+
+    shift: (F, 3) by how much the body moves, cm, from `shorten`.
+    """
     stances = source.stances[side]
     old_footprints = footprints_of(foot, stances)
     yaw = quat.yaw(np.radians(OUTWARD_SIGN[side] * effects.changes["toe_out"][:, side]))
@@ -244,6 +252,11 @@ def move_foot(
         # The ankle keeps its distance from the straight line between two footprints, but the line moves.
         line = foot.ankle[off] + (foot.ankle[land] - foot.ankle[off]) * progress
         swing = ankle[off] + (ankle[land] - ankle[off]) * progress + foot.ankle[frames] - line
+        # In a turn, the foot swings along an arc. It gets narrower as the body's does.
+        ends = np.array([[interpolate_curve(c, s.middle) for c in shift.T] for s in (here, there)])
+        when = here.middle + (there.middle - here.middle) * progress[:, 0]
+        arc = np.stack([interpolate_curve(c, when) for c in shift.T], axis=1)
+        swing[:, [0, 2]] += (arc - ends[0] - (ends[1] - ends[0]) * progress)[:, [0, 2]]
         u = np.linspace(0.0, 1.0, land - off + 1)  # share of the swing's time
         blend = smoothstep(u / BLEND_SHARE) * smoothstep((1 - u) / BLEND_SHARE)
         step = foot.ankle[land] - foot.ankle[off]

@@ -117,7 +117,7 @@ def hurt_clip(
     footprints = place_footprints(source, changes, shift, feet)
     if not flat:
         join_steps(source, changes, feet, footprints)
-    feet = [move_foot(source, changes, feet[side], footprints[side], side) for side in (LEFT, RIGHT)]
+    feet = [move_foot(source, changes, feet[side], footprints[side], shift, side) for side in (LEFT, RIGHT)]
     out = _assemble(source, changes, timing, shift, feet, name)
     source_frame = np.clip(np.floor(timing.body_frames + 1e-6).astype(int), 0, len(clip) - 1)
     return HurtClip(

@@ -185,7 +185,11 @@ def _place_foot(
     z = _at(path.position[:, 1], mid_stance) - to_left * np.sin(facing) + forward * np.cos(facing)
     if other_foot is not None:
         from_other = x - other_foot.ankle[0], z - other_foot.ankle[2]
-        apart = SIDE_SIGN[side] * (from_other[0] * np.cos(facing) - from_other[1] * np.sin(facing))
+        # In a turn, the other foot is on the same arc, further back. Seen from the facing direction in
+        # between, it is straight behind.
+        then = _at(path.facing, (other_foot.land + other_foot.leave) / 2)
+        between = (facing + then) / 2
+        apart = SIDE_SIGN[side] * (from_other[0] * np.cos(between) - from_other[1] * np.sin(between))
         to_left = SIDE_SIGN[side] * max(0.0, MIN_ANKLE_DISTANCE - apart)
         x, z = x + to_left * np.cos(facing), z - to_left * np.sin(facing)
     return _plant_foot(ground, np.array([x, z]), yaw)
@@ -235,6 +239,7 @@ LANDING_SPEED = 0.36  # speed of the foot as it lands, as a share of its mean sp
 # Where the ground is in the way, the foot is raised more. The raise grows in the first RISE of the swing, and
 # shrinks in the last SETTLE of it (shares of the swing).
 RISE, SETTLE = 0.36, 0.3
+MOST_ARC = 1.5  # a swing's arc is at most this many times as wide as the body's
 SOLE_HEIGHT = 2.0  # cm: heel, toe joint and toe tip count as this high above the sole
 
 
@@ -250,8 +255,8 @@ class FootPoses:
     toes: Array
 
 
-def move_foot(stances: list[Stance], style: Style, side: int, ground: Ground) -> FootPoses:
-    """The path of one foot through its stances.
+def move_foot(stances: list[Stance], path: PlannedPath, style: Style, side: int, ground: Ground) -> FootPoses:
+    """The way of one foot through its stances along the path.
 
     side: LEFT or RIGHT of `hobble.synthetic.style`. In frames before the first landing, and from the last
     landing on, positions are 0 and rotations are the identity.
@@ -268,7 +273,7 @@ def move_foot(stances: list[Stance], style: Style, side: int, ground: Ground) ->
         # While the heel is up, the toes stay flat on the ground.
         foot.toes[t] = quat.mul(here.turn, quat.from_axis_angle(X_AXIS, -np.maximum(pitch, 0)))
         if not stays:
-            _swing(foot, here, there, style, side, ground)
+            _swing(foot, here, there, path, style, side, ground)
     return foot
 
 
@@ -277,7 +282,15 @@ def _frames(start: float, end: float) -> np.ndarray:
     return np.arange(int(np.ceil(start)), int(np.ceil(end)))
 
 
-def _swing(foot: FootPoses, here: Stance, there: Stance, style: Style, side: int, ground: Ground) -> None:
+def _swing(
+    foot: FootPoses,
+    here: Stance,
+    there: Stance,
+    path: PlannedPath,
+    style: Style,
+    side: int,
+    ground: Ground,
+) -> None:
     """Set the frames of the swing from the stance `here` to the stance `there`."""
     start, end = here.leave, there.land
     t = _frames(start, end)
@@ -299,6 +312,7 @@ def _swing(foot: FootPoses, here: Stance, there: Stance, style: Style, side: int
     share = np.stack([along, smoothstep(u), along], axis=1)  # of the way in x, y and z
     first_toe = here.toe_at(first_pitch)
     toe = first_toe + (there.toe_at(last_pitch) - first_toe) * share
+    toe[:, [0, 2]] += _arc(path.position, here, there, along)
     toe[:, 1] += style.lift[t, side] * bump
     toe += quat.rotate(turn, SIDE_SIGN[side] * X_AXIS) * (style.circle[t] * bump)[:, None]
     toe[:, 1] += (
@@ -307,6 +321,24 @@ def _swing(foot: FootPoses, here: Stance, there: Stance, style: Style, side: int
         * smoothstep((1 - u) / SETTLE)
     )
     foot.ankle[t], foot.foot[t], foot.toes[t] = toe - quat.rotate(rotation, ANKLE_TO_TOE), rotation, toes
+
+
+def _arc(body: Array, here: Stance, there: Stance, along: Array) -> Array:
+    """(N, 2) cm by which a swing is beside the straight way (x, z): in a turn it follows the body's arc.
+
+    In turns of 50 to 70 degrees a second, people's feet leave the straight way by 5 to 25 cm, and the knee of
+    the inner leg bends as far as on a straight walk (CMU). body: (F, 2) place of the body. along: (N,) share
+    of the way that the foot has made.
+    """
+    first, last = ((stance.land + stance.leave) / 2 for stance in (here, there))
+    begin, end = (np.array([_at(x, when) for x in body.T]) for when in (first, last))
+    chord = end - begin
+    beside = np.stack([interpolate_curve(x, first + along * (last - first)) for x in body.T], axis=1) - begin
+    length = max(float(np.linalg.norm(chord)), 1e-9)
+    across = np.array([chord[1], -chord[0]]) / length
+    # A foot on the inside of a turn makes less way than the body, on a smaller arc.
+    ratio = min(float(np.linalg.norm((there.ankle - here.ankle)[[0, 2]])) / length, MOST_ARC)
+    return ratio * (beside @ across)[:, None] * across
 
 
 def _missing_height(toe: Array, rotation: Array, toes: Array, clearance: Array, ground: Ground) -> Array:

@@ -86,7 +86,7 @@ def walk_from_plan(
     rng = rng_of(seed, clip, "walk")
     terrain = make_ground(ground, rng)
     steps = plan_stances(path, style, phase, terrain, rng)
-    feet = (move_foot(steps[LEFT], style, LEFT, terrain), move_foot(steps[RIGHT], style, RIGHT, terrain))
+    feet = tuple(move_foot(steps[side], path, style, side, terrain) for side in (LEFT, RIGHT))
     rotations, root = pose_figure(skeleton, path, style, phase, feet, terrain, rng)
     in_clip = slice(path.first, path.first + total)  # the path also has frames before and after the clip
     motion = Clip(clip, skeleton, fps, rotations[in_clip], root[in_clip])

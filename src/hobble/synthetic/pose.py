@@ -15,6 +15,7 @@ from hobble.synthetic.style import LEFT, RIGHT, SIDE_SIGN, Style
 X, Y, Z = np.eye(3)  # the three axes
 # Shares of the swing of an arm, degrees by degrees, by which the shoulder girdle and the hand turn as well.
 GIRDLE, HAND = 0.25, 0.5
+GRAVITY = 981.0  # cm/s^2
 TWIST = 12.0  # degrees by which an upper arm is turned inward about its axis
 # The keys of both say whether the ground is flat. MAX_STRETCH: longest distance from hip to ankle, as a share
 # of the leg's length. SMOOTHING_TIME: seconds, for the filter by which the hips come down smoothly to where
@@ -93,7 +94,14 @@ def _chest_rotation(walk: _Walk, yaw: Array) -> Array:
     """(F, 4) world rotation. The chest turns opposite to the pelvis. yaw: see `_pelvis_rotation`."""
     turn = -walk.style.chest_yaw * walk.wave(0.03) + 0.8 * walk.noise[:, 1]
     lean = walk.style.lean + walk.style.bow * walk.wave(0.05, 2) + 0.8 * walk.noise[:, 2]
-    return quat.mul(yaw, quat.mul(_rotation(Y, turn), _rotation(X, lean)))
+    inward = quat.from_axis_angle(Z, -_lean_into_turn(walk.path))
+    return quat.mul(yaw, quat.mul(inward, quat.mul(_rotation(Y, turn), _rotation(X, lean))))
+
+
+def _lean_into_turn(path: PlannedPath) -> Array:
+    """(F,) radians by which the body leans to the left, so that it does not fall outward in a turn."""
+    rate = np.gradient(path.facing) * path.fps  # radians a second
+    return np.arctan(rate * path.velocity[:, 1] / GRAVITY)
 
 
 def _hip_positions(walk: _Walk, feet: tuple[FootPoses, FootPoses], ground: Ground, hips: Array) -> Array:
@@ -111,7 +119,8 @@ def _hip_positions(walk: _Walk, feet: tuple[FootPoses, FootPoses], ground: Groun
     middle = (right + left - 0.5) / 2
     surge = (style.surge * walk.wave(middle - 0.125, 2))[:, None]
     ahead = path.velocity / np.maximum(path.speed, 1e-6)[:, None] * surge
-    aside, forward = sway + ahead[:, 0], ahead[:, 1]
+    aside = sway + ahead[:, 0] + style.height * np.tan(_lean_into_turn(path))
+    forward = ahead[:, 1]
     x = path.position[:, 0] + aside * np.cos(path.facing) + forward * np.sin(path.facing)
     z = path.position[:, 1] - aside * np.sin(path.facing) + forward * np.cos(path.facing)
     ground_height = gaussian_filter1d(ground(x, z), 0.16 * path.fps, mode="nearest")  # over 0.16 s
