@@ -239,7 +239,7 @@ LANDING_SPEED = 0.36  # speed of the foot as it lands, as a share of its mean sp
 # Where the ground is in the way, the foot is raised more. The raise grows in the first RISE of the swing, and
 # shrinks in the last SETTLE of it (shares of the swing).
 RISE, SETTLE = 0.36, 0.3
-MOST_ARC = 1.5  # a swing's arc is at most this many times as wide as the body's
+MOST_ARC = 0.25  # a swing leaves the straight way by at most this share of its length
 SOLE_HEIGHT = 2.0  # cm: heel, toe joint and toe tip count as this high above the sole
 
 
@@ -333,12 +333,14 @@ def _arc(body: Array, here: Stance, there: Stance, along: Array) -> Array:
     first, last = ((stance.land + stance.leave) / 2 for stance in (here, there))
     begin, end = (np.array([_at(x, when) for x in body.T]) for when in (first, last))
     chord = end - begin
-    beside = np.stack([interpolate_curve(x, first + along * (last - first)) for x in body.T], axis=1) - begin
     length = max(float(np.linalg.norm(chord)), 1e-9)
     across = np.array([chord[1], -chord[0]]) / length
+    arc = np.stack([interpolate_curve(x, first + along * (last - first)) for x in body.T], axis=1) - begin
+    beside = arc @ across
     # A foot on the inside of a turn makes less way than the body, on a smaller arc.
-    ratio = min(float(np.linalg.norm((there.ankle - here.ankle)[[0, 2]])) / length, MOST_ARC)
-    return ratio * (beside @ across)[:, None] * across
+    way = float(np.linalg.norm((there.ankle - here.ankle)[[0, 2]]))
+    ratio = way * min(1 / length, MOST_ARC / max(float(np.abs(beside).max()), 1e-9))
+    return ratio * beside[:, None] * across
 
 
 def _missing_height(toe: Array, rotation: Array, toes: Array, clearance: Array, ground: Ground) -> Array:
