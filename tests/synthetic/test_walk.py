@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from hobble.measures.walks import bend
 from hobble.synthetic.generate_clip import generate_walk, walk_from_plan
 from hobble.synthetic.plan import Segment
 
@@ -52,6 +53,17 @@ def test_a_faster_jog_has_larger_movements(holden31):
     assert flight[0] > 0.15
 
 
+def test_in_a_turn_the_body_leans_in_and_the_inner_knee_bends_as_far(holden31):
+    """People who turn by 50 to 70 degrees a second: inner knee 57 to 71 degrees, feet 10 cm outside (CMU)."""
+    plan = [Segment("walk", 120, turn=720, seconds=12)]
+    clip = walk_from_plan("t", holden31, plan, 720, "flat", 60, 1).clip.part(slice(180, 540))  # one circle
+    joints = (holden31.role(role) for role in ("hips", "left_hip", "left_knee", "left_heel", "right_heel"))
+    hips, hip, knee, left, right = (clip.positions[:, joint] for joint in joints)
+    assert np.ptp(bend(hip, knee, left)) > 52
+    radii = [np.linalg.norm((at - hips.mean(axis=0))[:, ::2], axis=1).mean() for at in (hips, left, right)]
+    assert 6 < (radii[1] + radii[2]) / 2 - radii[0] < 14
+
+
 def test_hips_are_highest_in_mid_stance_and_head_stays_level(walking):
     height = walking.joint("Hips")[:, 1]
     assert 90 < height.mean() < 95
@@ -75,7 +87,7 @@ def test_no_leg_is_fully_stretched_and_no_joint_jerks(written, recipe):
         assert knee.min() > 4
         hip, ankle = clip.joint(f"{side}UpLeg"), clip.joint(f"{side}Foot")
         assert np.linalg.norm(hip - ankle, axis=1).max() < 0.9985 * 81
-        assert np.abs(np.diff(knee)).max() < (15 if "jog" in recipe else 12)  # degrees a frame
+        assert np.abs(np.diff(knee)).max() < (15 if "jog" in recipe else 12.5)  # degrees a frame
     acceleration = np.diff(clip.positions, 2, axis=0) * 36  # m/s2
     assert np.linalg.norm(acceleration, axis=2).max() < (320 if recipe == "jog" else 200)
 
@@ -92,8 +104,7 @@ def test_a_foot_that_is_down_does_not_slide(written, recipe):
             if b - a > 5:
                 inner = place[a + 1 : b - 2]
                 lengths.append(b - a)
-                # A heel may begin to rise slowly, or sink as the figure stands up out of a crouch; nothing
-                # else moves a joint that counts as down.
+                # A heel may begin to rise slowly, or sink as the figure stands up out of a crouch.
                 sinks = recipe == "crouch" and joint.endswith("Foot")
                 assert np.ptp(inner[:, [0, 2]], axis=0).max() < (0.9 if sinks else 0.45)
         assert len(lengths) >= 3

@@ -107,7 +107,7 @@ ADDED_CHANGES: dict[str, dict[str, float]] = {
         "off": -0.105, "land_sound": -0.115,
     },
     "foot": {
-        "speed": 0.615, "stride": 1.03, "turn": 0.5, "push": 0.46, "lift": 0.68, "lift_sound": 0.18,
+        "speed": 0.615, "stride": 1.03, "turn": 0.5, "push": 0.54, "lift": 0.68, "lift_sound": 0.18,
         "push_sound": 0.26, "strike": 0.61, "side": 3.7, "list": -3.6, "toe_out": 14.0, "off": -0.12,
         "off_sound": 0.046, "land_sound": -0.085,
         "width": -0.02, "vault_sound": 1.0, "arm": 0.65, "arm_sound": 0.85, "forward": -6.0,
