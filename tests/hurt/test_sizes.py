@@ -141,7 +141,7 @@ def test_the_sound_side_does_less_and_the_body_guards(made, hurting, part) -> No
 @pytest.mark.parametrize("heading", [90, -90, 180])
 @pytest.mark.parametrize("part", ["thigh", "shank", "foot"])
 def test_the_knee_is_stiff_in_steps_to_the_side_and_back(holden31, hurting, part, heading) -> None:
-    """At least half of the effect in a straight walk, which is .36 to .57 of the healthy range."""
+    """At least half of the effect in a straight walk: .36 to .57 of the healthy range, a hurt foot .67."""
     plan = [Segment("walk", 72, seconds=10, heading=heading)]
     walk = walk_from_plan("side", holden31, plan, 600, "flat", 60, 1).clip
     clip, labels, _ = labelled(walk, "walk", True)
@@ -150,4 +150,4 @@ def test_the_knee_is_stiff_in_steps_to_the_side_and_back(holden31, hurting, part
         knee = bend(*(one.positions[:, one.skeleton.role(f"right_{j}")] for j in ("hip", "knee", "heel")))
         starts = np.flatnonzero(np.diff(of_one.phase) < -0.5)[1:-1]
         ranges.append(np.median([np.ptp(knee[a:b]) for a, b in itertools.pairwise(starts)]))
-    assert ranges[0] < 0.8 * ranges[1]
+    assert ranges[0] < (0.84 if part == "foot" else 0.79) * ranges[1]

@@ -78,10 +78,9 @@ class Files:
 
     def cycles(self, side: str, slowest: float = 0.0, fastest: float = np.inf) -> list[tuple[int, int]]:
         """First and last frame of each cycle of a foot whose mean speed lies between the two, cm/s."""
-        at = self.landings(side)
         hips = self.joint("Hips")[:, [0, 2]]
         out = []
-        for a, b in itertools.pairwise(at):
+        for a, b in itertools.pairwise(self.landings(side)):
             speed = np.sum(np.linalg.norm(np.diff(hips[a : b + 1], axis=0), axis=1)) / (b - a) * 60
             if slowest <= speed <= fastest:
                 out.append((int(a), int(b)))
@@ -95,8 +94,7 @@ def written(tmp_path_factory: pytest.TempPathFactory, holden31: Skeleton) -> Cal
 
     @functools.cache
     def write(name: str, recipe: str, frames: int = 600) -> Files:
-        here = folder / f"{frames}-{recipe}"
-        paths: dict[str, Any] = {"bvh": here / f"{name}.bvh"}
+        paths: dict[str, Any] = {"bvh": (here := folder / f"{frames}-{recipe}") / f"{name}.bvh"}
         paths |= {ending: here / f"{name}_{ending}.txt" for ending in ("footsteps", "gait")}
         write_clip(name, holden31.to_dict(), frames, recipe, Synthetic(), **paths)
         return Files(here, name)
