@@ -86,8 +86,8 @@ def walk_from_plan(
     rng = rng_of(seed, clip, "walk")
     terrain = make_ground(ground, rng)
     steps = plan_stances(path, style, phase, terrain, rng)
-    feet = tuple(move_foot(steps[side], path, style, side, terrain) for side in (LEFT, RIGHT))
-    rotations, root = pose_figure(skeleton, path, style, phase, feet, terrain, rng)
+    left_foot, right_foot = (move_foot(steps[side], path, style, side, terrain) for side in (LEFT, RIGHT))
+    rotations, root = pose_figure(skeleton, path, style, phase, (left_foot, right_foot), terrain, rng)
     in_clip = slice(path.first, path.first + total)  # the path also has frames before and after the clip
     motion = Clip(clip, skeleton, fps, rotations[in_clip], root[in_clip])
     return GeneratedWalk(motion, right, left, gait_keys(segments, total, fps), terrain)
