@@ -101,16 +101,16 @@ ADDED_CHANGES: dict[str, dict[str, float]] = {
         "off_sound": 0.056, "land_sound": -0.098,
     },
     "shank": {
-        "speed": 0.555, "stride": 1.0, "turn": 0.62, "push": 0.24, "lift": 0.27, "lift_sound": 0.21,
-        "push_sound": 0.27, "strike": 0.0, "crouch": 15.2, "off_sound": -0.02, "width": 0.086, "out": 0.045,
+        "speed": 0.555, "stride": 1.0, "turn": 0.62, "push": 0.21, "lift": 0.27, "lift_sound": 0.21,
+        "push_sound": 0.27, "strike": 0.0, "crouch": 15.2, "off_sound": -0.02, "width": 0.091, "out": 0.045,
         "arm": 0.65, "arm_sound": 0.85, "forward": -3.8, "side": 0.3, "list": -2.0, "back": 0.79,
         "off": -0.105, "land_sound": -0.115,
     },
     "foot": {
-        "speed": 0.615, "stride": 1.03, "turn": 0.5, "push": 0.54, "lift": 0.68, "lift_sound": 0.18,
+        "speed": 0.615, "stride": 1.03, "turn": 0.5, "push": 0.56, "lift": 0.68, "lift_sound": 0.18,
         "push_sound": 0.26, "strike": 0.61, "side": 3.7, "list": -3.6, "toe_out": 14.0, "off": -0.12,
         "off_sound": 0.046, "land_sound": -0.085,
-        "width": -0.02, "vault_sound": 1.0, "arm": 0.65, "arm_sound": 0.85, "forward": -6.0,
+        "width": -0.024, "vault_sound": 1.0, "arm": 0.65, "arm_sound": 0.85, "forward": -6.0,
     },
     "back": {
         "speed": 0.68, "push": 0.6, "push_sound": 0.6, "stride": 1.12, "forward": 17.0, "crouch": 9.0,
