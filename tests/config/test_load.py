@@ -139,7 +139,7 @@ def test_shipped_configurations_are_the_published_ones(root: Path) -> None:
     hurried = Catalogue(root / "config", {"training": "fast"}).configuration("holden-xt").training
     assert hurried == catalogue.configuration("fast").training != t
     assert catalogue.dataset("synthetic").terrain.fits == 10
-    assert catalogue.dataset("synthetic").synthetic.frames == 13_430
+    assert catalogue.dataset("synthetic").synthetic.frames == 14_640
 
 
 def test_the_shipped_release_lists_forty_clips_and_their_ground(root: Path) -> None:

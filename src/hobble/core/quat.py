@@ -73,7 +73,7 @@ def between(a: ArrayLike, b: ArrayLike) -> Array:
     # For the angle t, (1 + cos t, sin t * axis) is a multiple of (cos t/2, sin t/2 * axis).
     w = 1.0 + np.sum(a * b, axis=-1, keepdims=True)
     q = np.concatenate([w, np.cross(a, b)], axis=-1)
-    opposite = w[..., 0] < 1e-9
+    opposite = w[..., 0] < 1e-12
     if np.any(opposite):
         y_or_x = np.where(np.abs(a[..., 1:2]) < 0.9, [0.0, 1.0, 0.0], [1.0, 0.0, 0.0])
         axis = y_or_x - a * np.sum(a * y_or_x, axis=-1, keepdims=True)
