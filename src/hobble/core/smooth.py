@@ -83,3 +83,17 @@ def interpolate_curve(curve: Array, when: Array | float) -> Array:
     25.0
     """
     return np.asarray(np.interp(when, np.arange(len(curve)), curve))
+
+
+def beside_chord(curve: Array, first: float, last: float, share: Array) -> tuple[Array, float]:
+    """How far a curve (F, 2) is beside the straight line between two of its points, and this line's length.
+
+    first, last: the frames of the two points, with fractions. share: (N,) shares of the time between them,
+    from 0 to 1. The distances are vectors (N, 2) at right angles to the line.
+    """
+    when = first + (last - first) * np.array([0.0, 1.0, *share])
+    start, end, *points = np.stack([interpolate_curve(column, when) for column in curve.T], axis=1)
+    along = end - start
+    length = max(float(np.linalg.norm(along)), 1e-9)
+    across = np.array([along[1], -along[0]]) / length
+    return ((np.array(points) - start) @ across)[:, None] * across, length

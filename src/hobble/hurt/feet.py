@@ -12,7 +12,7 @@ import numpy as np
 
 from hobble.core import quat
 from hobble.core.quat import Array
-from hobble.core.smooth import gaussian, interpolate_curve, smooth_above, smoothstep
+from hobble.core.smooth import beside_chord, gaussian, interpolate_curve, smooth_above, smoothstep
 from hobble.hurt.effects import SIDES, Effects
 from hobble.hurt.healthy_clip import FORWARD, UP, HealthyClip, SourceStance
 
@@ -252,7 +252,8 @@ def move_foot(
         # The ankle keeps its distance from the straight line between two footprints, but the line moves.
         line = foot.ankle[off] + (foot.ankle[land] - foot.ankle[off]) * progress
         swing = ankle[off] + (ankle[land] - ankle[off]) * progress + foot.ankle[frames] - line
-        swing[:, [0, 2]] += _narrower_arc(shift[:, [0, 2]], here, there, progress)
+        # In a turn, a foot swings along an arc. It gets narrower as the arc of the body does.
+        swing[:, [0, 2]] += beside_chord(shift[:, [0, 2]], here.middle, there.middle, progress[:, 0])[0]
         u = np.linspace(0.0, 1.0, land - off + 1)  # share of the swing's time
         blend = smoothstep(u / BLEND_SHARE) * smoothstep((1 - u) / BLEND_SHARE)
         step = foot.ankle[land] - foot.ankle[off]
@@ -269,18 +270,6 @@ def move_foot(
     # Raise the foot where its ball would be too low.
     ankle[:, 1] += smooth_above(np.maximum(least_ball - ankle[:, 1] - along[:, 1], 0.0), 1)
     return HurtFoot(ankle, ankle + along, quat.mul(yaw, foot.rotation), foot.toe_rotation)
-
-
-def _narrower_arc(shift: Array, here: SourceStance, there: SourceStance, progress: Array) -> Array:
-    """(n, 2) cm, x and z, by which a swing's arc in a turn gets narrower, as the arc of the body does.
-
-    shift: (F, 2) by how much the body moves, cm. progress: (n, 1) of the swing, 0 to 1.
-    """
-    when = here.middle + (there.middle - here.middle) * np.array([0.0, 1.0, *progress[:, 0]])
-    first, last, *moved = np.stack([interpolate_curve(x, when) for x in shift.T], axis=1)
-    chord = last - first
-    across = np.array([chord[1], -chord[0]]) / max(float(np.linalg.norm(chord)), 1e-9)
-    return ((np.array(moved) - first) @ across)[:, None] * across
 
 
 def _progress(ankle: Array) -> Array:

@@ -10,7 +10,7 @@ import numpy as np
 
 from hobble.core import quat
 from hobble.core.quat import Array
-from hobble.core.smooth import gaussian, interpolate_curve, smooth_above, smoothstep
+from hobble.core.smooth import beside_chord, gaussian, interpolate_curve, smooth_above, smoothstep
 from hobble.synthetic.plan import Ground, PlannedPath
 from hobble.synthetic.style import LEFT, RIGHT, SIDE_SIGN, Style
 
@@ -55,6 +55,11 @@ class Stance:
     flat: float
     heel_off: float
     power: float
+
+    @property
+    def middle(self) -> float:
+        """The frame, with fractions, in the middle of the stance."""
+        return (self.land + self.leave) / 2
 
     def pitch(self, t: Array | float, lands: bool = True, leaves: bool = True) -> Array:
         """The pitch, radians, at frames `t` in the stance or just outside it.
@@ -187,8 +192,7 @@ def _place_foot(
         from_other = x - other_foot.ankle[0], z - other_foot.ankle[2]
         # In a turn, the other foot is on the same arc, further back. Seen from the facing direction in
         # between, it is straight behind.
-        then = _at(path.facing, (other_foot.land + other_foot.leave) / 2)
-        between = (facing + then) / 2
+        between = (facing + _at(path.facing, other_foot.middle)) / 2
         apart = SIDE_SIGN[side] * (from_other[0] * np.cos(between) - from_other[1] * np.sin(between))
         to_left = SIDE_SIGN[side] * max(0.0, MIN_ANKLE_DISTANCE - apart)
         x, z = x + to_left * np.cos(facing), z - to_left * np.sin(facing)
@@ -330,17 +334,11 @@ def _arc(body: Array, here: Stance, there: Stance, along: Array) -> Array:
     the inner leg bends as far as on a straight walk (CMU). body: (F, 2) place of the body. along: (N,) share
     of the way that the foot has made.
     """
-    first, last = ((stance.land + stance.leave) / 2 for stance in (here, there))
-    begin, end = (np.array([_at(x, when) for x in body.T]) for when in (first, last))
-    chord = end - begin
-    length = max(float(np.linalg.norm(chord)), 1e-9)
-    across = np.array([chord[1], -chord[0]]) / length
-    arc = np.stack([interpolate_curve(x, first + along * (last - first)) for x in body.T], axis=1) - begin
-    beside = arc @ across
+    beside, length = beside_chord(body, here.middle, there.middle, along)
+    widest = max(float(np.linalg.norm(beside, axis=1).max()), 1e-9)
     # A foot on the inside of a turn makes less way than the body, on a smaller arc.
     way = float(np.linalg.norm((there.ankle - here.ankle)[[0, 2]]))
-    ratio = way * min(1 / length, MOST_ARC / max(float(np.abs(beside).max()), 1e-9))
-    return ratio * beside[:, None] * across
+    return beside * way * min(1 / length, MOST_ARC / widest)
 
 
 def _missing_height(toe: Array, rotation: Array, toes: Array, clearance: Array, ground: Ground) -> Array:
