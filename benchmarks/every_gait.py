@@ -18,9 +18,10 @@ from typing import Any
 import numpy as np
 
 from hobble.core.quat import Array
+from hobble.core.smooth import true_runs
 from hobble.gait.cycles import CURVES, measure_cycles
 from hobble.gait.profile import profile_of_walk
-from hobble.measures.walks import SHORTEST_STANCE, SIDES, bend, feet_in_stance, runs_of_true
+from hobble.measures.walks import SHORTEST_STANCE, SIDES, bend, feet_in_stance
 from hobble.models.load import load_network
 from hobble.models.network import Network
 from hobble.runtime.animation import ProceduralAnimation
@@ -161,7 +162,7 @@ def first_on_a_step(walks: Walks, figure: int) -> Iterator[tuple[float, bool]]:
     """(rise, whether the left foot is first) of each step of the stairs on which a figure stands."""
     standing, stances = feet_in_stance(walks.contacts[:, figure]), []
     for side, role in enumerate(("left_toe", "right_toe")):
-        for start, end in runs_of_true(standing[:, side]):
+        for start, end in true_runs(standing[:, side]):
             if end - start >= SHORTEST_STANCE:
                 x, _, z = walks.at(role)[(start + end) // 2, figure]
                 stances.append((start, z, float(flights(x, z)), side))

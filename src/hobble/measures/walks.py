@@ -13,6 +13,7 @@ import numpy as np
 
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
+from hobble.core.smooth import true_runs
 from hobble.models.network import Network
 from hobble.rows.clip_rows import rotate_by_yaw
 from hobble.runtime import Runtime
@@ -21,16 +22,6 @@ from hobble.runtime.caller_targets import Pose
 
 STANCE = 0.5  # a foot counts as standing if its predicted contact is at least this
 SHORTEST_STANCE = 4  # frames; a shorter contact is neither a stance nor a step
-
-
-def runs_of_true(on: np.ndarray) -> np.ndarray:
-    """(N, 2) for each run of true values in `on` (F,): its first frame, and the first frame after it.
-
-    >>> runs_of_true(np.array([False, True, True, False, True])).tolist()
-    [[1, 3], [4, 5]]
-    """
-    edges = np.diff(np.concatenate([[0], np.asarray(on, np.int8), [0]]))
-    return np.flatnonzero(edges).reshape(-1, 2)
 
 
 def feet_in_stance(contacts: Array) -> np.ndarray:
@@ -47,7 +38,7 @@ def foot_slide(toes: Array, contacts: Array) -> Array:
     out = []
     for side in range(2):
         moved = np.linalg.norm(np.diff(toes[:, side, ::2], axis=0), axis=1)
-        for start, end in runs_of_true(contacts[:, 2 * side + 1] >= STANCE):
+        for start, end in true_runs(contacts[:, 2 * side + 1] >= STANCE):
             if end - start >= SHORTEST_STANCE:
                 out.append(moved[start : end - 1].sum())
     return np.array(out)
@@ -123,7 +114,7 @@ def gait_measures(
     heels = local[:, [role("left_heel"), role("right_heel")], 2]  # how far forward
     steps: list[list[float]] = [[], []]  # lengths of the left foot's steps, then of the right foot's
     for side in range(2):
-        for start, end in runs_of_true(standing[:, side]):
+        for start, end in true_runs(standing[:, side]):
             if start > 0 and end - start >= SHORTEST_STANCE:  # a stance from frame 0 has no landing
                 steps[side].append(heels[start, side] - heels[start, 1 - side])
     step_lengths = [float(np.mean(lengths)) if lengths else None for lengths in steps]
