@@ -26,6 +26,9 @@ DEFAULT_MARGIN = 50.0  # in the unit of each column: cm for positions
 # Then the hips stay within these multiples of their mean height above the ground. Without such limits, a
 # character whose ground is switched under it folds up or hangs in the air until the body has followed.
 DEFAULT_HIPS = (0.67, 1.175)
+# A body that does not crouch keeps its hips above this multiple of its leg's length. (A multiple of their mean
+# height in training sank when training got more crouched frames.)
+UPRIGHT_LEGS = 0.75
 SPEED_MARGIN = 1.5  # largest joint speed, as a multiple of the fastest joint in training
 # A larger number is called unsound, like one that is not finite. A working character never has such values.
 LARGEST_SOUND = 1e8
@@ -72,7 +75,8 @@ class Bounds:
         y_low[phase_change] = np.maximum(y_low[phase_change], np.minimum(facts.y_low[phase_change], 0.0))
         hips = float(facts.y_low[hips_height]), float(facts.y_high[hips_height])
         fastest = SPEED_MARGIN * facts.fastest
-        return cls(x_low, x_high, y_low, facts.y_high + y_margin, fastest, hips, max(low, hips[0]))
+        upright = max(UPRIGHT_LEGS * network.skeleton.leg_length, hips[0])
+        return cls(x_low, x_high, y_low, facts.y_high + y_margin, fastest, hips, upright)
 
 
 @njit

@@ -36,7 +36,7 @@ VALUES_BY_GAIT: dict[str, tuple[tuple[float, float], ...]] = {
     "toe_out": ((8, 0), (6, 0), (3, 0), (10, 0)),  # angle by which the foot points outward
     # part of a knee's direction outward, where the part forward is 1
     "knee_out": ((0.06, 0), (-0.03, 0), (0.06, 0), (0.06, 0)),
-    "height": ((94.6, 0), (94.5, -1.0), (94.5, -0.8), (66.6, 0)),  # height of the hips above the ground
+    "height": ((94.6, 0), (94.5, -1.0), (94.5, -0.8), (66, 0)),  # height of the hips above the ground
     # amplitude of the hips' way forward and back; they are slowest in mid-stance
     "surge": ((0, 0), (1.72, 0.2), (1.2, 0), (0.7, 0)),
     # amplitude of the hips' height; positive if they are highest in mid-stance, negative if lowest
