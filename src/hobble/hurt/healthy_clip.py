@@ -23,7 +23,7 @@ HEADING_SECONDS = 0.2  # sigma of the Gaussian that smooths the heading
 SWAY = 0.3  # a smaller share of movement to a side is only the sway of a walk
 STANDING_SPEED = 30.0  # cm/s: below this, movement to a side counts less
 PHASE_KNOWN_SECONDS = 0.2  # sigma of the Gaussian that smooths `phase_known`
-JOG_SECONDS = 0.1  # sigma of the Gaussian that smooths the share of jogging
+GAIT_SECONDS = 0.1  # sigma of the Gaussian that smooths the share of a gait
 
 
 @dataclass(frozen=True)
@@ -49,6 +49,7 @@ class HealthyClip:
     it is not, smoothed. jog_share: (F,) share of jogging in the gait, 0 to 1. cycle_frames: (F,) length in
     frames of the cycle around each frame. path: (F, 2) horizontal path of the hips, x and z, cm. heading:
     (F, 4) rotation of the pelvis about Y. aside: (F,) share of the movement to a side or backward, 0 to 1.
+    low: (F,) share of crouching in the gait, 0 to 1.
     leg_length: cm from hip to ankle of a straight leg.
     """
 
@@ -63,6 +64,7 @@ class HealthyClip:
     path: Array = field(repr=False)
     heading: Array = field(repr=False)
     aside: Array = field(repr=False)
+    low: Array = field(repr=False)
     leg_length: float
 
     def __len__(self) -> int:
@@ -99,13 +101,19 @@ def measure_healthy_clip(clip: Clip, labels: Labels) -> HealthyClip:
         swing_curve,
         phase[0] + np.cumsum(np.where(change < -0.5, change + 1.0, change)),
         gaussian(known.astype(float), PHASE_KNOWN_SECONDS * clip.fps),
-        gaussian(labels.gait[:, GAITS.index("jog")], JOG_SECONDS * clip.fps),
+        _share_of_gait(labels, "jog", clip.fps),
         _cycle_lengths(stances, frames, clip.fps),
         path,
         heading,
         _aside(path, heading, clip.fps),
+        _share_of_gait(labels, "crouch", clip.fps),
         skeleton.leg_length,
     )
+
+
+def _share_of_gait(labels: Labels, name: str, fps: float) -> Array:
+    """(F,) share of the gait `name` in the labels, smoothed."""
+    return gaussian(labels.gait[:, GAITS.index(name)], GAIT_SECONDS * fps)
 
 
 def _without_contacts(start: int, end: int, touches: np.ndarray) -> tuple[int, int]:

@@ -19,7 +19,8 @@ ANKLE_HEIGHT = 7.0  # cm from the sole up to the ankle joint
 ANKLE_TO_TOE = np.array([0.0, -4.5, 13.5])  # x, y, z from the ankle joint to the toe joint of a flat foot, cm
 # cm and radians: a standing figure keeps a foot in place if it would move and turn by less than these.
 SMALLEST_STEP = (7.0, np.radians(12.0))
-MIN_ANKLE_DISTANCE = 8.0  # cm: least sideways distance between the ankles
+# cm: least distance between the ankles, and least sideways distance where one is ahead
+MIN_ANKLE_DISTANCE, MIN_ANKLE_WIDTH = 8.0, 5.0
 CADENCE_SPREAD = 0.025  # standard deviation of the cadence
 CADENCE_SECONDS = 0.6  # seconds over which it varies
 STANDING_SPEED = 12.0  # cm/s: a slower figure counts as standing
@@ -193,8 +194,10 @@ def _place_foot(
         # In a turn, the other foot is on the same arc, further back. Seen from the facing direction in
         # between, it is straight behind.
         between = (facing + _at(path.facing, other_foot.middle)) / 2
+        ahead = from_other[0] * np.sin(between) + from_other[1] * np.cos(between)
         apart = SIDE_SIGN[side] * (from_other[0] * np.cos(between) - from_other[1] * np.sin(between))
-        to_left = SIDE_SIGN[side] * max(0.0, MIN_ANKLE_DISTANCE - apart)
+        least = max(MIN_ANKLE_WIDTH, np.sqrt(max(MIN_ANKLE_DISTANCE**2 - ahead**2, 0.0)))
+        to_left = SIDE_SIGN[side] * max(0.0, least - apart)
         x, z = x + to_left * np.cos(facing), z - to_left * np.sin(facing)
     return _plant_foot(ground, np.array([x, z]), yaw)
 

@@ -32,16 +32,16 @@ VALUES_BY_GAIT: dict[str, tuple[tuple[float, float], ...]] = {
     "circle": ((0, 0), (3.5, 0), (0, 0), (0, 0)),  # greatest distance outward from this line
     "clearance": ((1, 0), (2.5, 0), (3, 0), (2, 0)),  # least height of the sole above the ground in mid-swing
     "behind": ((4, 0), (13.6, 5.5), (7.5, 3), (10, 5)),  # distance of an ankle behind the body in mid-stance
-    "width": ((9.5, 0), (3.2, 0), (3.5, 0), (9.5, 0)),  # distance of an ankle from the path, sideways
+    "width": ((9.5, 0), (2.5, 0), (3.5, 0), (9.5, 0)),  # distance of an ankle from the path, sideways
     "toe_out": ((8, 0), (6, 0), (3, 0), (10, 0)),  # angle by which the foot points outward
     # part of a knee's direction outward, where the part forward is 1
-    "knee_out": ((0.06, 0), (-0.03, 0), (0.06, 0), (0.06, 0)),
-    "height": ((94.6, 0), (94.5, -1.0), (94.5, -0.8), (66, 0)),  # height of the hips above the ground
+    "knee_out": ((0.06, 0), (-0.05, 0), (0.06, 0), (0.06, 0)),
+    "height": ((94.6, 0), (94.2, -1.0), (94.5, -0.8), (66, 0)),  # height of the hips above the ground
     # amplitude of the hips' way forward and back; they are slowest in mid-stance
     "surge": ((0, 0), (1.72, 0.2), (1.2, 0), (0.7, 0)),
     # amplitude of the hips' height; positive if they are highest in mid-stance, negative if lowest
     "bob": ((0, 0), (1.6, 1.2), (-2.0, 0.3), (0.8, 0)),
-    "sway": ((1.6, 0), (3.2, -0.8), (0.8, 0), (2.5, 0)),  # amplitude of the hips, sideways
+    "sway": ((1.6, 0), (4.2, -0.8), (0.8, 0), (2.5, 0)),  # amplitude of the hips, sideways
     "pelvis_yaw": ((0.3, 0), (6.6, 2), (6, 1), (5, 0)),  # amplitude of the turn about the vertical axis
     "pelvis_list": ((1.0, 0), (5.3, 1), (4, 0), (3, 0)),  # amplitude of the sideways tilt
     # phase in which the left side is highest
@@ -126,7 +126,7 @@ def _adapt_to_direction(style: Style, path: PlannedPath) -> Style:
         "off_pitch": style.off_pitch * forward + 8 * back - 16 * side,
         # In steps to the side, the distance between the feet varies by half a stride. The extra width keeps
         # them from crossing.
-        "width": style.width + 0.25 * stride / (1 + 0.6 * sideways) * sideways,
+        "width": style.width + (0.7 + 0.25 * stride / (1 + 0.6 * sideways)) * sideways,
         "behind": 4 + (style.behind - 4) * ahead,
         "lift": style.lift + 0.8 * back + 0.2 * side,
         "circle": style.circle * np.maximum(ahead, 0),
