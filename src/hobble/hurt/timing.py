@@ -21,7 +21,7 @@ LEAST_SHARE = 0.57
 # A jog gets only this share of a change of stride time, because gravity sets how long its flight lasts.
 JOG_STRIDE = 0.15
 JOG_SHIFT = 0.6  # a jog gets only this share of the shifts of landing and leaving, as its stances are short
-# Crouched steps and those to a side or backward get this share, since a foot that hardly rolls off hides a limp.
+# Crouched steps and those to a side or backward get this share: a foot that hardly rolls off hides a limp.
 OTHER_SHIFT = 1.2
 # While the hurt foot stands, the body hurries less than the sound foot, which so lands further ahead of the
 # hips. The path gets this share of an early landing.

@@ -26,7 +26,7 @@ DEFAULT_MARGIN = 50.0  # in the unit of each column: cm for positions
 # Then the hips stay within these multiples of their mean height above the ground. Without such limits, a
 # character whose ground is switched under it folds up or hangs in the air until the body has followed.
 DEFAULT_HIPS = (0.67, 1.175)
-# A body that does not crouch keeps its hips above this multiple of its leg's length. (A multiple of their mean
+# A body that does not crouch keeps its hips above this multiple of its leg's length. (A share of their mean
 # height in training sank when training got more crouched frames.)
 UPRIGHT_LEGS = 0.75
 SPEED_MARGIN = 1.5  # largest joint speed, as a multiple of the fastest joint in training
