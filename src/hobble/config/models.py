@@ -64,10 +64,10 @@ class ClipEntry(Section):
     )
     recipe: str | None = Field(
         None,
-        description="for synthetic clips: what the generated walker does, a key of "
+        description="makes this a generated clip, not one of the folder: what the walker does, a key of "
         "`hobble.synthetic.plan.RECIPES`",
     )
-    share: PositiveFloat = Field(1.0, description="for synthetic clips: length relative to the other clips")
+    share: PositiveFloat = Field(1.0, description="of a generated clip: length relative to the other ones")
     source_fps: PositiveFloat | None = Field(None, description="overrides the file's Frame Time")
     hurt: Annotated[float, Field(ge=0, le=9, allow_inf_nan=False)] | None = Field(
         None,
@@ -125,7 +125,10 @@ class Dataset(Section):
         if self.synthetic is None and self.folder is None:
             raise ValueError("a data set needs `folder` (BVH files) or `synthetic` (generated clips)")
         if self.synthetic is not None and not self.clips:
-            raise ValueError("a synthetic data set needs a list of its `clips`")
+            raise ValueError("a data set with generated clips needs a list of its `clips`")
+        for name, entry in self.clips.items():
+            if entry is not None and entry.recipe is not None and self.synthetic is None:
+                raise ValueError(f"clips.{name} has a `recipe`, so the data set needs the section `synthetic`")
         if self.download is not None and not (self.folder and self.clips):
             raise ValueError("a data set that downloads its clips needs a list of its `clips` and a `folder`")
         unknown = [c for c in self.held_out if self.clips and c not in self.clips]

@@ -180,14 +180,16 @@ class NamedDataset:
             raise HobbleError(f"data set {self.name} has no clip {name!r}; it has: {', '.join(self.listed)}")
         return self.listed[name]
 
+    def is_generated(self, clip: str) -> bool:
+        """Whether the clip is one of the generated walker, and not one of the folder."""
+        return self.settings.folder is None or self.entry(clip).recipe is not None
+
     @property
     def folder(self) -> Path:
-        """The folder of the data set's BVH files.
+        """The folder of the data set's captured BVH files.
 
         Raises InputError if there is no such folder and its clips cannot be downloaded.
         """
-        if self.settings.synthetic is not None:
-            return Path(DATASETS, self.source_name, "synthetic")
         path = self.mocap / (self.settings.folder or "")
         if self.settings.download is not None and not path.exists():
             return path
@@ -199,9 +201,9 @@ class NamedDataset:
 
     def source(self, clip: str) -> str:
         """Path of the clip's BVH file. Raises HobbleError if there is no such clip or no file."""
+        if self.is_generated(clip):
+            return f"{self._generated_stem(clip)}.bvh"
         name = self.entry(clip).file or clip
-        if self.settings.synthetic is not None:
-            return str(self.folder / f"{clip}.bvh")
         if name in self._files:
             return str(require_single_file(name, self._files[name]))
         if name in self._checksums:
@@ -210,6 +212,10 @@ class NamedDataset:
         problem = f"no such file, but data set {self.name} lists this clip{nor}"
         fix = "Put the file there, or take the clip out of the data set."
         raise InputError(self.folder / f"{name}.bvh", problem, fix=fix)
+
+    def _generated_stem(self, clip: str) -> str:
+        """Path of the files of a generated clip, without suffixes."""
+        return f"{DATASETS}/{self.source_name}/synthetic/{clip}"
 
     def download(self, clip: str) -> dict[str, str]:
         """How to download a clip, as a mapping with three keys.
@@ -227,17 +233,17 @@ class NamedDataset:
 
     @functools.cache  # noqa: B019 - a data set lives as long as the process
     def label_files(self, clip: str) -> list[str]:
-        """Paths of the label files beside the clip: hand-made files, or the files of a synthetic clip."""
-        has_files = self.settings.synthetic is not None or self.settings.labels.files
+        """Paths of the label files beside the clip: hand-made files, or the files of a generated clip."""
+        has_files = self.is_generated(clip) or self.settings.labels.files
         return self._side_files(clip, *LABEL_SUFFIXES) if has_files else []
 
     def _side_files(self, clip: str, *suffixes: str) -> list[str]:
         """Paths of the existing files <clip><suffix> beside a clip, for the given suffixes.
 
-        Files of a synthetic clip need not exist yet, because a rule makes them.
+        Files of a generated clip need not exist yet, because a rule makes them.
         """
-        if self.settings.synthetic is not None:
-            return [f"{self.folder / clip}{end}" for end in suffixes if end in WRITTEN_LABEL_SUFFIXES]
+        if self.is_generated(clip):
+            return [f"{self._generated_stem(clip)}{end}" for end in suffixes if end in WRITTEN_LABEL_SUFFIXES]
         stem = self._files[clip][0].with_suffix("") if clip in self._files else self.folder / clip
         return [file for file in (f"{stem}{end}" for end in suffixes) if Path(file).is_file()]
 
@@ -261,7 +267,7 @@ class NamedDataset:
         A clip's own skeleton (its rig) is the known one that has the most joints of the clip's BVH file.
         """
         target = self.settings.skeleton
-        if self.settings.synthetic is not None:
+        if self.is_generated(clip):
             rig = self.catalogue.dataset(self.source_name).skeleton
         else:
             joints = joint_names(Path(self.source(clip)))
@@ -295,7 +301,7 @@ class NamedDataset:
 
     def notes_on_unused_files(self) -> list[str]:
         """Sentences that say which files in the user's folder are not used, and why."""
-        if self.settings.synthetic is not None or not self.folder.is_dir():
+        if self.settings.folder is None or not self.folder.is_dir():
             return []
         notes = unused_file_notes(self.folder, {*self._files, *self._checksums})
         mirrors = [] if self.settings.clips or self.settings.mirror else self._mirrors()
@@ -321,7 +327,9 @@ class NamedDataset:
     @cached_property
     def _files(self) -> dict[str, list[Path]]:
         """Clip -> its BVH files in the user's folder."""
-        return find_clips(self.folder) if self.folder.is_dir() else {}
+        if self.settings.folder is None or not self.folder.is_dir():
+            return {}
+        return find_clips(self.folder)
 
     # The channels, and the sources of their values.
 
@@ -357,8 +365,8 @@ class NamedDataset:
         """Whether all values of channel `name` are 0 in a clip."""
         if is_hurt_version(clip) and name == HURT_CHANNEL:
             return False
-        # The file beside a synthetic clip is not read, because it need not exist yet.
-        files = self._tables(name) if self.settings.synthetic is not None else self.channel_files(clip, name)
+        # The file beside a generated clip is not read, because it need not exist yet.
+        files = self._tables(name) if self.is_generated(clip) else self.channel_files(clip, name)
         definition = channel(name)
         return definition.is_neutral(definition.make_source(self.channel_source(clip, name), files))
 
@@ -398,9 +406,9 @@ class NamedDataset:
         }
 
     def frames(self, clip: str) -> int:
-        """Number of frames, at 60 Hz, of a synthetic clip: its share of the frames of the data set."""
+        """Number of frames, at 60 Hz, of a generated clip: its share of all generated frames."""
         assert self.settings.synthetic is not None
-        all_shares = sum(entry.share for entry in self.listed.values())
+        all_shares = sum(entry.share for name, entry in self.listed.items() if self.is_generated(name))
         return round(self.settings.synthetic.frames * self.entry(clip).share / all_shares)
 
     @cached_property
@@ -491,13 +499,12 @@ class NamedDataset:
     def clips_to_compare(self, channels: Sequence[str]) -> list[str]:
         """The clips that a job compares to find copies, so that no motion is both trained on and held out.
 
-        Mirrors and hurt versions are not compared. The list is empty if no clip is held out, or if the clips
-        are synthetic.
+        Mirrors, hurt versions and generated clips are not compared. The list is empty if no clip is held out.
         """
         splits = self.splits(channels)
-        if self.settings.synthetic is not None or len(set(splits.values())) < 2:
+        if len(set(splits.values())) < 2:
             return []
-        return [clip for clip in splits if clip == original(clip)]
+        return [clip for clip in splits if clip == original(clip) and not self.is_generated(clip)]
 
     @property
     def autoencoder(self) -> list[str]:

@@ -188,7 +188,7 @@ def _joints(dataset: NamedDataset) -> int:
 @functools.cache
 def _frames(dataset: NamedDataset, clip: str) -> float:
     """Estimated number of frames of a clip, after it is resampled to the data set's frame rate."""
-    if dataset.settings.synthetic is not None:
+    if dataset.is_generated(clip):
         return dataset.frames(clip)
     seconds = bvh_seconds(Path(dataset.source(clip)))
     return ASSUMED_FRAMES if seconds is None else seconds * dataset.settings.motion.fps
