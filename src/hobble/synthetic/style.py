@@ -128,7 +128,7 @@ def _adapt_to_direction(style: Style, path: PlannedPath) -> Style:
         # them from crossing.
         "width": style.width + (0.7 + 0.25 * stride / (1 + 0.6 * sideways)) * sideways,
         "behind": 4 + (style.behind - 4) * ahead,
-        "lift": style.lift + 0.8 * back + 0.2 * side,
+        "lift": style.lift + 0.8 * back + 0.8 * side,
         "circle": style.circle * np.maximum(ahead, 0),
         "frequency": style.frequency * (1 + 0.6 * sideways + 0.15 * back[:, 0] + SPIN_CADENCE * spin),
         "lean": style.lean * (1 - 0.6 * back[:, 0]),
