@@ -7,13 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hobble.database.statistics import (
-    SILENCING_STD,
-    UNSEEN,
-    Moments,
-    clip_moments,
-    statistics_of_moments,
-)
+from hobble.database.statistics import SILENCING_STD, UNSEEN, Moments, clip_moments, statistics_of_moments
 from hobble.rows.clip_rows import ClipRows, pair_batches
 
 

@@ -5,12 +5,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hobble.terrain.heightmaps import TerrainMap
-from hobble.terrain.patches import (
-    FootPoints,
-    Patches,
-    best_patches,
-    draw_patches,
-)
+from hobble.terrain.patches import FootPoints, Patches, best_patches, draw_patches
 
 CELL = 3.937007874
 SIZE = 128

@@ -15,16 +15,7 @@ from hobble.database.reader import Block, Database
 from hobble.database.write import write_database
 from hobble.measures.accuracy_run import RollOutInputs
 from hobble.rows.clip_rows import ClipRows
-from hobble.training.augment import (
-    BEYOND,
-    NEAR,
-    RISE,
-    OtherPaces,
-    OtherPoses,
-    RollOut,
-    VersionPoses,
-    x_pose,
-)
+from hobble.training.augment import BEYOND, NEAR, RISE, OtherPaces, OtherPoses, RollOut, VersionPoses, x_pose
 from tests.measures.made_up import roll_out
 
 from .conftest import change, clip_rows
@@ -320,8 +311,7 @@ def test_the_ground_of_a_pose_is_subtracted(tmp_path: Path) -> None:
     raised = high.x.copy()
     raised[:, high.layout.x_joint_position.start + 1 : high.layout.x_joint_position.stop : 3] += 30.0
     data = database(
-        tmp_path / "database",
-        {"walk": low, "walk_hurt1": replace(high, x=raised, mean=high.mean + 30)},
+        tmp_path / "database", {"walk": low, "walk_hurt1": replace(high, x=raised, mean=high.mean + 30)}
     )
     block, moved = mixed(data)
     np.testing.assert_allclose(moved, block.x, atol=1e-4)

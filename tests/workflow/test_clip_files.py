@@ -80,3 +80,15 @@ def test_plan_and_job_use_the_same_skeleton_file(root: Path, shared: Path) -> No
         rig = load_source(file, target, root / "config/skeletons", options).match.rig
         files = project.dataset("ferre").clip_skeleton_files(clip)
         assert [Path(f).stem for f in files] == [rig] * (rig != "holden31")
+
+
+def test_a_data_set_may_have_generated_clips_beside_captured_ones(base: Path) -> None:
+    mine = base / "config/datasets/mine.yaml"
+    entries = "clips: {b: , low: {recipe: crouch, share: .3}}\n"
+    mine.write_text(f"{DATASET}{entries}synthetic: {{frames: 600}}\n")
+    clips = Project(base, {}).dataset("mine")
+    assert [clips.source(clip)[-8:] for clip in clips.listed] == ["ne/b.bvh", "/low.bvh"]
+    assert (clips.frames("low"), len(clips.label_files("low"))) == (600, 2)
+    mine.write_text(DATASET + entries)
+    with pytest.raises(HobbleError, match=r"clips.low has a `recipe`, but the data set no .* `synthetic`"):
+        Project(base, {}).dataset("mine")

@@ -128,7 +128,7 @@ class Dataset(Section):
             raise ValueError("a data set with generated clips needs a list of its `clips`")
         for name, entry in self.clips.items():
             if entry is not None and entry.recipe is not None and self.synthetic is None:
-                raise ValueError(f"clips.{name} has a `recipe`, so the data set needs the section `synthetic`")
+                raise ValueError(f"clips.{name} has a `recipe`, but the data set no section `synthetic`")
         if self.download is not None and not (self.folder and self.clips):
             raise ValueError("a data set that downloads its clips needs a list of its `clips` and a `folder`")
         unknown = [c for c in self.held_out if self.clips and c not in self.clips]
