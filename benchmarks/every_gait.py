@@ -25,7 +25,8 @@ from hobble.measures.walks import SHORTEST_STANCE, SIDES, bend, feet_in_stance
 from hobble.models.load import load_network
 from hobble.models.network import Network
 from hobble.runtime.animation import ProceduralAnimation
-from hobble.runtime.feet import leg_joints, sole_heights
+from hobble.runtime.feet import sole_heights
+from hobble.runtime.leg import leg_joints
 
 PARTS = {"thigh": "RightUpLeg-RightLeg", "shank": "RightLeg-RightFoot", "foot": "RightFoot-RightToeBase"}
 WARM_UP = 300  # frames

@@ -24,7 +24,8 @@ from hobble.models.network import Network
 from hobble.models.pfnn import OPTIONS
 from hobble.runtime import Runtime
 from hobble.runtime.animation import ProceduralAnimation
-from hobble.runtime.feet import leg_joints, sole_heights
+from hobble.runtime.feet import sole_heights
+from hobble.runtime.leg import leg_joints
 
 FPS = 60
 # kind of target -> (speed in cm a frame, whether to face a random direction, gait)

@@ -16,14 +16,12 @@ from hobble.runtime.feet import (
     STEP_HEIGHT,
     STRETCH,
     TOO_FAR,
-    bend_leg,
     carry_body,
     foot_parts,
     held_share,
-    leg_joints,
     place_feet,
-    rest_facing,
 )
+from hobble.runtime.leg import bend_leg, leg_joints, rest_facing
 
 
 def crouched(skeleton: Skeleton, thigh: float = 0.5, knee: float = 0.9) -> tuple[np.ndarray, np.ndarray]:

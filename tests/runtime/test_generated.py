@@ -10,8 +10,8 @@ from hobble.core import quat
 from hobble.core.skeleton import forward_kinematics
 from hobble.motion.read import decode_channels, read_bvh
 from hobble.runtime import Runtime, generated
-from hobble.runtime.feet import leg_joints
 from hobble.runtime.generated import export_bvh, restore_bone_lengths
+from hobble.runtime.leg import leg_joints
 from tests.figure.glb import Glb
 
 

@@ -24,7 +24,8 @@ from hobble.runtime import Runtime
 from hobble.runtime.bounds import Bounds
 from hobble.runtime.character import start_characters
 from hobble.runtime.controller import FPS
-from hobble.runtime.feet import foot_parts, leg_joints, rest_facing, sole_heights
+from hobble.runtime.feet import foot_parts, sole_heights
+from hobble.runtime.leg import leg_joints, rest_facing
 from hobble.runtime.stairs import leg_of_columns
 from hobble.runtime.variation import find_arms
 

@@ -21,8 +21,8 @@ from hobble.models.network import Network
 from hobble.rows.clip_rows import ClipRows, load_clip_rows, unbroken_stretches
 from hobble.runtime import Runtime
 from hobble.runtime.animation import ProceduralAnimation
-from hobble.runtime.feet import leg_joints
 from hobble.runtime.generated import restore_bone_lengths
+from hobble.runtime.leg import leg_joints
 
 AHEAD = (0.0, 2.5)  # target velocity, cm a frame: as fast as walking in the page's section Play
 

@@ -16,7 +16,7 @@ from hobble.core.compiled import njit
 from hobble.core.quat import Array
 from hobble.models.network import Predictor
 from hobble.rows.layout import BODY, RowLayout
-from hobble.runtime import feet, network_rows, trajectory
+from hobble.runtime import feet, leg, network_rows, trajectory
 from hobble.runtime.bounds import Bounds, limit_rows
 from hobble.runtime.character import Character
 from hobble.runtime.trajectory import STILL, Trajectory, movement_share, phase_change
@@ -217,8 +217,8 @@ class Controller:
         self._y_columns = advance_columns(layout)
         self._y_joints = layout.y_joint_position.start
         assert network.skeleton is not None
-        legs = feet.leg_joints(network.skeleton)
-        parts, ahead = feet.foot_parts(network.skeleton, legs), feet.rest_facing(network.skeleton)
+        legs = leg.leg_joints(network.skeleton)
+        parts, ahead = feet.foot_parts(network.skeleton, legs), leg.rest_facing(network.skeleton)
         self._legs = legs, parts, feet.sole_heights(network, legs), ahead, self.bounds.fastest
         self._hips, self._arms = network.skeleton.role("hips"), find_arms(network.skeleton)
         self._hips_range = (*self.bounds.hips, self.bounds.upright)

@@ -26,7 +26,7 @@ from hobble.figure.gltf import BodyMotion, write_glb
 from hobble.models.network import Network
 from hobble.runtime import Runtime
 from hobble.runtime.animation import ProceduralAnimation
-from hobble.runtime.feet import leg_joints
+from hobble.runtime.leg import leg_joints
 
 FPS = 60.0  # frames a second of the generated motion
 SETTLED = 6 * 60  # frames until the gait has settled; no loop begins earlier

@@ -11,7 +11,7 @@ from hobble.channels.shown import channel_display
 from hobble.core.compiled import njit
 from hobble.core.quat import Array
 from hobble.models.network import Network
-from hobble.runtime.feet import turn_toward
+from hobble.runtime.leg import turn_toward
 from hobble.runtime.trajectory import Trajectory, joint_place
 
 

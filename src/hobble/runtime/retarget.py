@@ -21,7 +21,7 @@ from hobble.motion.rest_pose import why_not_standing
 from hobble.motion.retarget import BENT, LIMB_BONES, MOST_DROP, NEARLY_STRAIGHT, SPARED, Retarget, plan
 from hobble.motion.rig import body_in_file, leg_length, likely_unit, match_rig
 from hobble.motion.skeleton_file import KnownSkeleton, find_skeleton, load_skeleton, skeleton_folder
-from hobble.runtime.feet import leg_joints, move_heel, rotation_between, turn_rotation, turn_vector
+from hobble.runtime.leg import leg_joints, move_heel, rotation_between, turn_rotation, turn_vector
 
 # Roles that a rig must have.
 NEEDED = ("hips", "head", *(f"{s}_{p}" for s in SIDES for p in ("shoulder", "hip", "knee", "heel", "toe")))
