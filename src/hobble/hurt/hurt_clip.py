@@ -37,10 +37,6 @@ MOST_VAULT = np.radians(14.0)  # a knee straightens by at most this, so a crouch
 # Radians of knee flexion. To spare a leg, its knee bends more, but less so if it is bent by more than the
 # first value already, and not at all if by more than the second. So a crouching figure does not sink.
 CROUCHED = np.radians([40.0, 90.0])
-# In a step to the side or backward the leg reaches out straight. A knee that bends to spare the leg in
-# between would move further than a healthy one. So it bends less, by this share, and straightens less to
-# vault.
-ASIDE = 0.9
 # A knee is bent by up to this more as its foot lands than later in the stance, radians, on flat ground.
 LANDING_BEND = np.radians(15.0)
 NEARER = 0.1  # a foot lands near the body if its step is shorter by this share of the healthy step
@@ -347,14 +343,15 @@ def _desired_reach(leg: Leg, changes: Effects, source: HealthyClip, timing: Timi
     """(N,) desired distance from hip to ankle of a standing leg, cm.
 
     The knee bends more if the leg is spared (`crouch`). It bends less while the other leg swings stiffly
-    (`vault`), which lifts the hips.
+    (`vault`), which lifts the hips. In a step to the side or backward it does neither: there the leg reaches
+    out straight, so a knee that bends in between would move further than a healthy one.
     """
     when, other_when = timing.leg_frames[:, side], timing.leg_frames[:, 1 - side]
     healthy_bend = knee_flexion(leg.reach, leg.thigh_length, leg.shank_length)
     healthy_bend = _stiffer_landing(healthy_bend, changes, source, side)
     crouch = np.radians(changes.changes["crouch"][:, side]) * (1 - source.swing_curve[:, side])
     crouch = crouch * smoothstep((CROUCHED[1] - healthy_bend) / (CROUCHED[1] - CROUCHED[0]))
-    ahead = 1 - ASIDE * source.aside
+    ahead = 1 - source.aside
     bend = interpolate_values(healthy_bend + ahead * crouch, when)
     source_vault = np.clip(changes.changes["vault"][:, side], 0.0, 1.0) * source.swing_curve[:, 1 - side]
     vault = interpolate_values(ahead * source_vault, other_when)
