@@ -89,28 +89,28 @@ ADDED_CHANGES: dict[str, dict[str, float]] = {
         "lift_sound": 0.3, "push_sound": 0.75, "list": 2.0,
     },
     "hip": {
-        "speed": 0.61, "stride": 1.19, "turn": 0.32, "push": 0.9, "vault": 0.38, "lift": 0.99,
-        "crouch": 11.8, "lift_sound": 0.22, "push_sound": 0.08, "off_sound": 0.04, "width": 0.02,
-        "vault_sound": 0.98, "arm": 0.85, "arm_sound": 0.85, "forward": -6.7, "list": -0.6,
-        "back": 0.42, "side": -0.25,
+        "speed": 0.606, "stride": 1.19, "turn": 0.6, "push": 0.83, "lift": 0.73,
+        "crouch": 13.7, "lift_sound": 0.16, "push_sound": 0.08, "off_sound": 0.044, "width": 0.036,
+        "vault_sound": 0.83, "arm": 0.85, "arm_sound": 0.85, "forward": -8.2, "list": -2.4,
+        "back": 0.48, "side": -1.3,
     },
     "thigh": {
         "speed": 0.642, "stride": 1.09, "turn": 0.03, "push": 0.11, "vault": 0.34, "crouch": 10.5,
         "lift": 0.05, "lift_sound": 0.15, "push_sound": 0.14, "strike": 0.87, "list": -0.4, "arm": 0.65,
-        "arm_sound": 0.85, "forward": -0.9, "width": -0.004, "side": 2.2, "back": 0.83, "off": -0.14,
+        "arm_sound": 0.85, "forward": -0.9, "width": -0.004, "side": 3.0, "back": 0.75, "off": -0.14,
         "off_sound": 0.056, "land_sound": -0.098,
     },
     "shank": {
-        "speed": 0.555, "stride": 1.0, "turn": 0.62, "push": 0.21, "lift": 0.27, "lift_sound": 0.21,
-        "push_sound": 0.27, "strike": 0.0, "crouch": 15.2, "off_sound": -0.02, "width": 0.091, "out": 0.045,
-        "arm": 0.65, "arm_sound": 0.85, "forward": -3.8, "side": 0.3, "list": -2.0, "back": 0.79,
-        "off": -0.105, "land_sound": -0.115,
+        "speed": 0.561, "stride": 1.0, "turn": 0.75, "push": 0.18, "lift": 0.2, "lift_sound": 0.36,
+        "push_sound": 0.31, "strike": 0.0, "crouch": 15.2, "off_sound": -0.02, "width": 0.091, "out": 0.034,
+        "arm": 0.65, "arm_sound": 0.85, "forward": -5.9, "side": 1.6, "list": -1.5, "back": 0.79,
+        "off": -0.093, "land_sound": -0.104,
     },
     "foot": {
-        "speed": 0.615, "stride": 1.03, "turn": 0.5, "push": 0.56, "lift": 0.68, "lift_sound": 0.18,
-        "push_sound": 0.26, "strike": 0.61, "side": 3.7, "list": -3.6, "toe_out": 14.0, "off": -0.12,
-        "off_sound": 0.046, "land_sound": -0.085,
-        "width": -0.024, "vault_sound": 1.0, "arm": 0.65, "arm_sound": 0.85, "forward": -6.0,
+        "speed": 0.625, "stride": 1.06, "turn": 0.47, "push": 0.56, "lift": 0.62, "lift_sound": 0.15,
+        "push_sound": 0.27, "strike": 0.57, "side": 3.4, "list": -3.9, "toe_out": 14.0, "off": -0.123,
+        "off_sound": 0.06, "land_sound": -0.082,
+        "width": -0.018, "vault_sound": 0.95, "arm": 0.65, "arm_sound": 0.85, "forward": -7.5,
     },
     "back": {
         "speed": 0.68, "push": 0.6, "push_sound": 0.6, "stride": 1.12, "forward": 17.0, "crouch": 9.0,
@@ -143,7 +143,7 @@ RATIOS = (
 TIMING_FACTOR = 1.85
 # Part -> length of the step onto the hurt foot, as a ratio to the healthy clip. It replaces the ratio of the
 # profiles.
-STEP_RATIO = {"hip": 0.8, "thigh": 0.18, "shank": 0.43, "foot": 0.41}
+STEP_RATIO = {"hip": 0.79, "thigh": 0.18, "shank": 0.44, "foot": 0.41}
 
 
 @functools.cache
