@@ -89,9 +89,9 @@ ADDED_CHANGES: dict[str, dict[str, float]] = {
         "lift_sound": 0.3, "push_sound": 0.75, "list": 2.0,
     },
     "hip": {
-        "speed": 0.606, "stride": 1.19, "turn": 0.6, "push": 0.83, "lift": 0.73,
-        "crouch": 13.7, "lift_sound": 0.16, "push_sound": 0.08, "off_sound": 0.044, "width": 0.036,
-        "vault_sound": 0.83, "arm": 0.85, "arm_sound": 0.85, "forward": -8.2, "list": -2.4,
+        "speed": 0.606, "stride": 1.19, "turn": 0.45, "push": 0.83, "vault": 0.1, "lift": 0.9,
+        "crouch": 12.8, "lift_sound": 0.16, "push_sound": 0.08, "off_sound": 0.044, "width": 0.028,
+        "vault_sound": 0.95, "arm": 0.85, "arm_sound": 0.85, "forward": -7.2, "list": -1.2,
         "back": 0.48, "side": -1.3,
     },
     "thigh": {
@@ -101,8 +101,8 @@ ADDED_CHANGES: dict[str, dict[str, float]] = {
         "off_sound": 0.056, "land_sound": -0.098,
     },
     "shank": {
-        "speed": 0.561, "stride": 1.0, "turn": 0.75, "push": 0.18, "lift": 0.2, "lift_sound": 0.36,
-        "push_sound": 0.31, "strike": 0.0, "crouch": 15.2, "off_sound": -0.02, "width": 0.091, "out": 0.034,
+        "speed": 0.561, "stride": 1.0, "turn": 0.75, "push": 0.18, "lift": 0.27, "lift_sound": 0.36,
+        "push_sound": 0.31, "strike": 0.0, "crouch": 15.2, "off_sound": -0.02, "width": 0.091, "out": 0.045,
         "arm": 0.65, "arm_sound": 0.85, "forward": -5.9, "side": 1.6, "list": -1.5, "back": 0.79,
         "off": -0.093, "land_sound": -0.104,
     },
