@@ -97,7 +97,7 @@ ADDED_CHANGES: dict[str, dict[str, float]] = {
     "thigh": {
         "speed": 0.642, "stride": 1.09, "turn": 0.03, "push": 0.11, "vault": 0.34, "crouch": 10.5,
         "lift": 0.05, "lift_sound": 0.15, "push_sound": 0.14, "strike": 0.87, "list": -0.4, "arm": 0.65,
-        "arm_sound": 0.85, "forward": -0.9, "width": -0.004, "side": 3.0, "back": 0.75, "off": -0.14,
+        "arm_sound": 0.85, "forward": -0.9, "width": -0.004, "side": 2.2, "back": 0.83, "off": -0.14,
         "off_sound": 0.056, "land_sound": -0.098,
     },
     "shank": {
@@ -107,10 +107,10 @@ ADDED_CHANGES: dict[str, dict[str, float]] = {
         "off": -0.093, "land_sound": -0.104,
     },
     "foot": {
-        "speed": 0.625, "stride": 1.06, "turn": 0.47, "push": 0.56, "lift": 0.62, "lift_sound": 0.15,
-        "push_sound": 0.27, "strike": 0.57, "side": 3.4, "list": -3.9, "toe_out": 14.0, "off": -0.123,
-        "off_sound": 0.06, "land_sound": -0.082,
-        "width": -0.018, "vault_sound": 0.95, "arm": 0.65, "arm_sound": 0.85, "forward": -7.5,
+        "speed": 0.62, "stride": 1.03, "turn": 0.5, "push": 0.56, "lift": 0.62, "lift_sound": 0.15,
+        "push_sound": 0.27, "strike": 0.57, "side": 3.7, "list": -3.9, "toe_out": 14.0, "off": -0.12,
+        "off_sound": 0.05, "land_sound": -0.082,
+        "width": -0.022, "vault_sound": 0.95, "arm": 0.65, "arm_sound": 0.85, "forward": -7.5,
     },
     "back": {
         "speed": 0.68, "push": 0.6, "push_sound": 0.6, "stride": 1.12, "forward": 17.0, "crouch": 9.0,
