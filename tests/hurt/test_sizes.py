@@ -151,3 +151,13 @@ def test_the_knee_is_stiff_in_steps_to_the_side_and_back(holden31, hurting, part
         starts = np.flatnonzero(np.diff(of_one.phase) < -0.5)[1:-1]
         ranges.append(np.median([np.ptp(knee[a:b]) for a, b in itertools.pairwise(starts)]))
     assert ranges[0] < (0.84 if part == "foot" else 0.79) * ranges[1]
+
+
+@pytest.mark.parametrize(("gait", "heading"), [("walk", 90), ("walk", 180), ("crouch", 0)])
+def test_a_hurt_foot_stands_as_briefly_in_other_steps_as_in_a_walk(holden31, hurting, gait, heading) -> None:
+    """In a straight walk the sound foot stands longer by .28 cycles."""
+    plan = [Segment(gait, 80, seconds=10, heading=heading)]
+    walk = walk_from_plan("other", holden31, plan, 600, "flat", 60, 1).clip
+    clip, labels, _ = labelled(walk, gait, True)
+    contacts = hurt_clip(clip, labels, hurting(len(clip), {LEG["foot"]: 10.0})).labels.contacts
+    assert contacts[:, :2].any(axis=1).mean() - contacts[:, 2:].any(axis=1).mean() > 0.265
