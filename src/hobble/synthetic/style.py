@@ -32,7 +32,7 @@ VALUES_BY_GAIT: dict[str, tuple[tuple[float, float], ...]] = {
     "circle": ((0, 0), (3.5, 0), (0, 0), (0, 0)),  # greatest distance outward from this line
     "clearance": ((1, 0), (2.5, 0), (3, 0), (2, 0)),  # least height of the sole above the ground in mid-swing
     "behind": ((4, 0), (13.6, 5.5), (7.5, 3), (10, 5)),  # distance of an ankle behind the body in mid-stance
-    "width": ((9.5, 0), (2.5, 0), (3.5, 0), (9.5, 0)),  # distance of an ankle from the path, sideways
+    "width": ((9.5, 0), (2.5, 0), (3.5, 0), (4.5, 0)),  # distance of an ankle from the path, sideways
     "toe_out": ((8, 0), (6, 0), (3, 0), (10, 0)),  # angle by which the foot points outward
     # part of a knee's direction outward, where the part forward is 1
     "knee_out": ((0.06, 0), (-0.05, 0), (0.06, 0), (0.06, 0)),
