@@ -101,14 +101,14 @@ ADDED_CHANGES: dict[str, dict[str, float]] = {
         "off_sound": 0.056, "land_sound": -0.098,
     },
     "shank": {
-        "speed": 0.561, "stride": 1.04, "turn": 0.75, "push": 0.18, "lift": 0.27, "lift_sound": 0.36,
-        "push_sound": 0.37, "strike": 0.0, "crouch": 15.2, "off_sound": -0.02, "width": 0.08, "out": 0.045,
+        "speed": 0.561, "stride": 1.04, "turn": 0.75, "push": 0.14, "lift": 0.27, "lift_sound": 0.36,
+        "push_sound": 0.34, "strike": 0.0, "crouch": 15.2, "off_sound": -0.02, "width": 0.08, "out": 0.045,
         "arm": 0.65, "arm_sound": 0.85, "forward": -5.9, "side": 1.6, "list": -1.5, "back": 0.79,
         "off": -0.093, "land_sound": -0.104,
     },
     "foot": {
-        "speed": 0.62, "stride": 1.05, "turn": 0.5, "push": 0.56, "lift": 0.62, "lift_sound": 0.15,
-        "push_sound": 0.33, "strike": 0.57, "side": 3.7, "list": -3.9, "toe_out": 14.0, "off": -0.12,
+        "speed": 0.62, "stride": 1.05, "turn": 0.5, "push": 0.62, "lift": 0.62, "lift_sound": 0.15,
+        "push_sound": 0.3, "strike": 0.57, "side": 3.7, "list": -3.9, "toe_out": 14.0, "off": -0.12,
         "off_sound": 0.05, "land_sound": -0.082,
         "width": -0.036, "vault_sound": 0.95, "arm": 0.65, "arm_sound": 0.85, "forward": -7.5,
     },
