@@ -80,7 +80,8 @@ def test_the_hips_keep_their_height_when_the_ground_is_switched(make_network, wi
     network = make_network(scale=0.2)
     if with_facts:  # in training the hips were as low as in a crouch, once
         facts, column = walked(network), network.layout.y_joint_position.start + 1
-        low = np.where(np.arange(len(facts.y_low)) == column, 0.3 * network.y_mean, facts.y_low)
+        low = facts.y_low.copy()
+        low[column] = 0.3 * network.y_mean[column]
         network = replace(network, training_facts=replace(facts, y_low=low))
     character, hips, heights = ProceduralAnimation(network), network.skeleton.role("hips"), []
     grounds = [lambda x, z, g=g: g[0] + g[1] * z for g in ((0, 0), (100, 0), (-100, 0), (0, 0.4), (30, 0))]

@@ -148,9 +148,9 @@ FOOT, TOES = 1, 2  # the part of a foot to which a joint belongs, see `foot_part
 
 # Groups of arrays for compiled functions, which unpack them into names.
 #
-# joints (2, 4), see `leg_joints`, and ahead (3,), see `rest_facing`, both in `hobble.runtime.leg`; parts
-# (2, J), see `foot_parts`; sole (2,), see `sole_heights`; fastest: a drawn joint of a leg may move at most
-# this many cm in a frame. The order is joints, parts, sole, ahead, fastest.
+# joints (2, 4), see `leg_joints`; parts (2, J), see `foot_parts`; sole (2,), see `sole_heights`; ahead (3,),
+# see `rest_facing`; fastest: a drawn joint of a leg may move at most this many cm in a frame. Both
+# `leg_joints` and `rest_facing` are in `hobble.runtime.leg`.
 Legs = tuple[Any, Any, Any, Any, float]
 # The state of the feet between frames: held, see `Hold`; lift (C, 2), the foot lift; added (C, 2, 2, 4),
 # rotations added to thigh and shank of each leg; shown (C, 2, 3, 3), knee, heel and toe of each leg as they
