@@ -33,6 +33,10 @@ UNEVEN_CM = 4.0
 # Two steps differ by at least this height if they are on different steps of stairs. FOOT_CM: ankle to ball.
 STAIR_CM, FOOT_CM = 5.0, 13.5
 LEAD_CM = 40.0  # least distance of the ankles in a step to another step of stairs: its edge is between them
+# Ground that rises or falls by these shares of the way is stairs, of which a healthy step takes one each. Bodies
+# that move by less than LEAST_WAY cm a frame stand.
+STAIRS, LEAST_WAY = (0.3, 0.4), 0.2
+BESIDE_CM = 16.0  # a foot that joins the other on a short tread comes beside it if it would be this far ahead
 # The lower height of a swing is blended in over this share of its frames, and out over as many at its end.
 BLEND_SHARE = 0.22
 
@@ -51,17 +55,31 @@ class HurtFoot:
     toe_rotation: Array = field(repr=False)
 
 
-def shorten(source: HealthyClip, effects: Effects, stride_ratio: Array, ground: Array | None) -> Array:
+def shorten(
+    source: HealthyClip, effects: Effects, stride_ratio: Array, ground: Array, step_by_step: Array
+) -> Array:
     """(F, 3) by how much the body moves, cm, if its path gets shorter so that its speed is that of `effects`.
 
     stride_ratio: (F,) new duration of a stride / old duration. ground: (F,) height of the ground below the
-    body; None if flat. Climbs and descents shrink like the path, so that slopes keep their angle.
+    body. Climbs and descents shrink like the path, so that slopes keep their angle. step_by_step: (F,) from
+    `one_tread_a_stride`.
     """
-    ground = np.zeros(len(source)) if ground is None else ground
     path = np.stack([source.path[:, 0], ground, source.path[:, 1]], axis=1)
-    share = (effects.ratio("speed") * stride_ratio)[:, None]  # length of a stride = speed * duration
+    share = effects.ratio("speed") * stride_ratio  # length of a stride = speed * duration
+    share = (share + step_by_step * (0.5 - share))[:, None]
     steps = np.diff(path, axis=0) * (share[1:] + share[:-1]) / 2
     return path[:1] + np.concatenate([np.zeros((1, 3)), np.cumsum(steps, axis=0)]) - path
+
+
+def one_tread_a_stride(source: HealthyClip, effects: Effects, ground: Array) -> Array:
+    """(F,) 0 to 1, how much a stride goes from one tread of steep stairs to the next, not over two.
+
+    So a body with a badly hurt leg makes half of the way. ground: (F,) height of the ground below the body.
+    """
+    way = np.linalg.norm(np.gradient(source.path, axis=0), axis=1)
+    slope = np.abs(np.gradient(ground)) / np.maximum(way, LEAST_WAY)
+    join = np.abs(np.subtract(*effects.changes["join"].T))
+    return np.asarray(smoothstep((slope - STAIRS[0]) / (STAIRS[1] - STAIRS[0])) * np.minimum(join, 1.0))
 
 
 def ground_below(source: HealthyClip, feet: Sequence[HurtFoot]) -> Array:
@@ -184,13 +202,18 @@ def place_footprints(
 
 
 def join_steps(
-    source: HealthyClip, effects: Effects, feet: Sequence[HurtFoot], footprints: list[list[Array]]
+    source: HealthyClip,
+    effects: Effects,
+    feet: Sequence[HurtFoot],
+    footprints: list[list[Array]],
+    step_by_step: Array,
 ) -> None:
     """Let a body with a badly hurt leg go step by step on stairs. Changes `footprints`.
 
     Up the stairs the good foot goes first, and the hurt foot joins it on the same step. Down the stairs the
     hurt foot goes first, and the good foot joins it. The first foot on a step is LEAD_CM ahead of the other,
-    so that the edge fits between them.
+    so that the edge fits between them. On short treads (step_by_step, from `one_tread_a_stride`) the feet
+    stand side by side instead.
     """
     old = [footprints_of(foot, stances) for foot, stances in zip(feet, source.stances, strict=True)]
     tilts = [_tilts(foot, stances) for foot, stances in zip(feet, source.stances, strict=True)]
@@ -205,11 +228,13 @@ def join_steps(
         here, there = footprints[side][i], footprints[next_side][k]
         stairs = next_side != side and abs(rise) >= STAIR_CM
         stairs &= tilt <= 0.5 * abs(rise) / max(forward, FOOT_CM)
+        ahead = quat.rotate(source.heading[frame], FORWARD)
+        before, beside = float((there - here) @ ahead), step_by_step[frame]
         if joins := stairs and (next_side == hurt) == (rise > 0):
-            there[1] += share * (here[1] - there[1])
+            there += share * np.array([0.0, here[1] - there[1], 0.0])
+            there -= beside * min(before, max(before / 2, BESIDE_CM)) * ahead
         elif stairs or joined:
-            ahead = quat.rotate(source.heading[frame], FORWARD)
-            there += share * max(LEAD_CM - float((there - here) @ ahead), 0.0) * ahead
+            there += share * (1 - beside) * max(LEAD_CM - before, 0.0) * ahead
         joined = joins
 
 

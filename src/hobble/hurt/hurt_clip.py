@@ -16,6 +16,7 @@ from hobble.hurt.feet import (
     ground_below,
     join_steps,
     move_foot,
+    one_tread_a_stride,
     place_footprints,
     reduce_pitch,
     shorten,
@@ -109,10 +110,12 @@ def hurt_clip(
     changes = effects_of_severities(clip.skeleton, severity, clip.fps, guarding)
     timing = retime(source, changes)
     feet = [reduce_pitch(source, changes, side) for side in (LEFT, RIGHT)]
-    shift = shorten(source, changes, timing.stride_ratio, None if flat else ground_below(source, feet))
+    ground = np.zeros(len(clip)) if flat else ground_below(source, feet)
+    step_by_step = one_tread_a_stride(source, changes, ground)
+    shift = shorten(source, changes, timing.stride_ratio, ground, step_by_step)
     footprints = place_footprints(source, changes, shift, feet)
     if not flat:
-        join_steps(source, changes, feet, footprints)
+        join_steps(source, changes, feet, footprints, step_by_step)
     feet = [move_foot(source, changes, feet[side], footprints[side], shift, side) for side in (LEFT, RIGHT)]
     out = _assemble(source, changes, timing, shift, feet, name)
     source_frame = np.clip(np.floor(timing.body_frames + 1e-6).astype(int), 0, len(clip) - 1)

@@ -4,7 +4,7 @@ The pitch of a foot is its angle about the X axis, positive if the toe is up.
 """
 
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import pairwise, product
 
 import numpy as np
 
@@ -27,6 +27,10 @@ STANDING_SPEED = 12.0  # cm/s: a slower figure counts as standing
 # Points along the foot, cm in front of the ankle, that should all be on the same step of stairs. The last
 # three are in front of the toes, so that the foot does not stand close to the next step.
 SOLE = np.array([-11.0, -5.0, 0.0, 6.0, 13.5, 20.5, 27.0, 32.0, 37.0])
+SHORT_SOLE = SOLE[1:6]  # on a tread that is too short for these
+EDGE = 4.0  # cm: at an edge of stairs the ground rises or falls by more from one of these points to the next
+MOST_TREAD = 50.0  # cm: on deeper treads, people set more than one foot
+EDGE_PHASE = 0.05  # phase, or half a cycle later, in which the body is over an edge between short treads
 # cm by which a foot may be moved forward or backward, away from an edge; the smallest are tried first.
 SHIFTS = sorted(np.arange(-20.0, 21.0, 2.0), key=abs)
 
@@ -103,6 +107,24 @@ def phase_curve(style: Style, fps: float, rng: np.random.Generator) -> Array:
     start = rng.random()
     slow = gaussian(rng.normal(size=len(style.frequency)), CADENCE_SECONDS * fps)
     return start + np.cumsum(style.frequency * (1 + CADENCE_SPREAD * slow / slow.std())) / fps
+
+
+def climb_stairs(phase: Array, path: PlannedPath, ground: Ground) -> Array:
+    """The phase (F,) in cycles, changed so that each step goes to the next tread of stairs, if it is short."""
+    heights = ground(path.position[:, 0], path.position[:, 1])
+    edges = np.flatnonzero(np.abs(np.diff(heights)) > EDGE)
+    way = np.cumsum(path.speed) / path.fps
+    change, short = np.gradient(phase), np.zeros(len(edges), bool)
+    for i, (edge, following) in enumerate(pairwise(edges.tolist())):
+        if (tread := way[following] - way[edge]) < MOST_TREAD:
+            short[i : i + 2] = True
+            frames = slice(max(0, 2 * edge - following), following)  # the first step goes to the first tread
+            change[frames] = path.speed[frames] / path.fps / (2 * tread)
+    if not short.any():
+        return phase
+    phase = phase[0] + np.cumsum(change)
+    apart = np.unwrap((phase[edges[short]] - EDGE_PHASE) % 0.5, period=0.5)
+    return np.asarray(phase - np.interp(np.arange(len(phase)), edges[short], apart))
 
 
 def landing_frames(phase: Array, side: int) -> Array:
@@ -212,11 +234,10 @@ def _plant_foot(ground: Ground, place: Array, yaw: float) -> tuple[Array, Array]
     def heights(along: Array) -> Array:
         return ground(place[0] + along * ahead[0], place[1] + along * ahead[1])
 
-    for shift in SHIFTS:
-        sole = heights(shift + SOLE)
-        # At an edge of stairs, two neighbouring points differ by 7 cm or more. On slopes and bumps the
-        # difference is less than 4 cm.
-        if np.max(np.abs(np.diff(sole))) < 4.0:
+    # At an edge of stairs, two neighbouring points differ by 7 cm or more. On slopes and bumps the
+    # difference is less than 4 cm.
+    for sole, shift in product((SOLE, SHORT_SOLE), SHIFTS):
+        if np.max(np.abs(np.diff(heights(shift + sole)))) < EDGE:
             break
     under_ankle, under_toe = heights(shift + np.array([0.0, ANKLE_TO_TOE[2]]))
     x, z = place + shift * ahead

@@ -19,7 +19,7 @@ from hobble.core.errors import HobbleError
 from hobble.core.files import write_text
 from hobble.core.section import Section
 from hobble.core.skeleton import Skeleton
-from hobble.synthetic.feet import landing_frames, move_foot, phase_curve, plan_stances
+from hobble.synthetic.feet import climb_stairs, landing_frames, move_foot, phase_curve, plan_stances
 from hobble.synthetic.plan import GROUND, Ground, Segment, gait_keys, make_ground, plan, plan_path, rng_of
 from hobble.synthetic.pose import pose_figure
 from hobble.synthetic.style import LEFT, RIGHT, healthy_style
@@ -76,15 +76,15 @@ def walk_from_plan(
 ) -> GeneratedWalk:
     """Generate a clip of `total` frames at `fps` from a plan, `segments`.
 
-    clip: name of the clip. ground: kind of ground: "flat", "slopes", "steps" or "uneven".
+    clip: name of the clip. ground: kind of ground, see `hobble.synthetic.plan.make_ground`.
     """
     path = plan_path(segments, total, fps)
     style = healthy_style(path)
-    phase = phase_curve(style, fps, rng_of(seed, clip, "phase"))
-    landings = (np.ceil(landing_frames(phase, side)).astype(int) - path.first for side in (RIGHT, LEFT))
-    right, left = (frames[(frames >= 0) & (frames < total)].tolist() for frames in landings)
     rng = rng_of(seed, clip, "walk")
     terrain = make_ground(ground, rng)
+    phase = climb_stairs(phase_curve(style, fps, rng_of(seed, clip, "phase")), path, terrain)
+    landings = (np.ceil(landing_frames(phase, side)).astype(int) - path.first for side in (RIGHT, LEFT))
+    right, left = (frames[(frames >= 0) & (frames < total)].tolist() for frames in landings)
     steps = plan_stances(path, style, phase, terrain, rng)
     left_foot, right_foot = (move_foot(steps[side], path, style, side, terrain) for side in (LEFT, RIGHT))
     rotations, root = pose_figure(skeleton, path, style, phase, (left_foot, right_foot), terrain, rng)

@@ -79,10 +79,11 @@ RECIPES: dict[str, tuple[Segment, ...]] = {
     ),
     "slopes": (_walk(125, 0, 4), _walk(110, 60, 3), _jog(240, 0, 2.5), _walk(125, -60, 3), _walk(90, 0, 2)),
     "steps": (_walk(85, 0, 4), _walk(70, 12, 3), _walk(100, -12, 3), _stand(1.8)),
+    "stairs": (_walk(52, 0, 6), _walk(44, 8, 5), _walk(60, -8, 5)),
     "uneven": (_walk(115, 0, 3), _walk(95, 70, 3), _walk(125, -70, 3), _walk(70, 0, 2.5)),
 }
 # recipe -> kind of ground, see `hobble.synthetic.plan`; all other recipes are on flat ground
-GROUND = {"slopes": "slopes", "steps": "steps", "uneven": "uneven"}
+GROUND = {kind: kind for kind in ("slopes", "steps", "stairs", "uneven")}
 
 
 def plan(recipe: str, frames: float, fps: float, seed: int, clip: str) -> list[Segment]:
@@ -226,13 +227,13 @@ Ground = Callable[[Array, Array], Array]  # a function from x and z to the heigh
 
 
 def make_ground(kind: str, rng: np.random.Generator) -> Ground:
-    """The ground of one clip. kind: "flat", "slopes", "steps" or "uneven".
+    """The ground of one clip. kind: "flat", or a key of WAVES or STEPS.
 
-    Slopes and steps go up and down along Z, which the figure faces at the start of the clip.
+    Slopes, steps and stairs go up and down along Z, which the figure faces at the start of the clip.
     """
     if kind in WAVES:
         return _make_waves(rng, *WAVES[kind])
-    return _make_steps(rng) if kind == "steps" else flat
+    return _make_steps(rng, *STEPS[kind]) if kind in STEPS else flat
 
 
 def flat(x: Array, z: Array) -> Array:
@@ -270,18 +271,37 @@ def _make_waves(
     return ground
 
 
-def _make_steps(rng: np.random.Generator) -> Ground:
-    """Stairs along Z. Flights of one to four steps go up and down in turn.
+# Kind of ground -> arguments of `_make_steps`. steps: wide ones, of which each takes some strides. stairs: as
+# in houses, with landings between the flights.
+STEPS: dict[str, tuple[tuple[float, float], ...]] = {
+    "steps": ((62, 130), (7, 16), (1, 5), (0, 0)),
+    "stairs": ((28, 35), (13, 18), (3, 8), (130, 230)),
+}
 
-    Each step is 7 to 16 cm high and 62 to 130 cm deep.
+
+def _make_steps(
+    rng: np.random.Generator,
+    depths: tuple[float, float],
+    rises: tuple[float, float],
+    flights: tuple[float, float],
+    landings: tuple[float, float],
+) -> Ground:
+    """Steps along Z, in flights that go up and down in turn.
+
+    The ranges are random, in cm: depth and rise of a step, and by how much deeper the ground is between two
+    flights. flights: least number of steps of a flight, and the number that it stays below.
     """
-    count = 400  # steps; they reach more than 100 m in front of the start and behind it
-    edges = np.cumsum(rng.uniform(62, 130, count))
-    edges -= edges[count // 2]
+    count = 400  # steps; they reach more than 60 m in front of the start and behind it
+    widths = rng.uniform(*depths, count)
     # 1 for a step up, -1 for a step down.
-    directions = np.repeat(np.where(np.arange(count) % 2 == 0, 1.0, -1.0), rng.integers(1, 5, count))[:count]
-    levels = np.concatenate([[0.0], np.cumsum(directions * rng.uniform(7, 16, count))])
+    directions = np.repeat(np.where(np.arange(count) % 2 == 0, 1.0, -1.0), rng.integers(*flights, count))[
+        :count
+    ]
+    levels = np.concatenate([[0.0], np.cumsum(directions * rng.uniform(*rises, count))])
     levels -= levels[count // 2]  # height 0 at the start
+    turns = np.diff(directions, prepend=directions[0]) != 0
+    edges = np.cumsum(widths + turns * rng.uniform(*landings, count))
+    edges -= edges[count // 2]
 
     def ground(x: Array, z: Array) -> Array:
         z = np.asarray(z) + 0 * np.asarray(x)  # in the common shape of x and z
