@@ -76,7 +76,7 @@ def test_hips_are_highest_in_mid_stance_and_head_stays_level(walking):
 
 
 ALL = ["walk-straight", "walk", "jog", "crouch", "sidesteps", "stop-and-go", "walk-jog-walk"]
-ALL += ["slopes", "steps", "uneven"]
+ALL += ["slopes", "steps", "stairs", "uneven"]
 
 
 @pytest.mark.parametrize("recipe", ALL)
@@ -123,8 +123,9 @@ def test_each_gait_has_its_height_and_direction(written, recipe):
         assert np.percentile(ahead, 10) < -0.7
 
 
-def test_no_foot_goes_through_the_edge_of_a_step(holden31):
-    made = generate_walk("steps-1", holden31, 673, "steps", 120, 1)
+@pytest.mark.parametrize("recipe", ["steps", "stairs"])
+def test_no_foot_goes_through_the_edge_of_a_step(holden31, recipe):
+    made = generate_walk("steps-1", holden31, 673, recipe, 120, 1)
     places = dict(zip(holden31.joints, np.moveaxis(made.clip.positions, 1, 0), strict=True))
     for side in SIDES:
         toe = places[f"{side}ToeBase"]

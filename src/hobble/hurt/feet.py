@@ -32,11 +32,12 @@ CLEARANCE_CM = 1.3
 UNEVEN_CM = 4.0
 # Two steps differ by at least this height if they are on different steps of stairs. FOOT_CM: ankle to ball.
 STAIR_CM, FOOT_CM = 5.0, 13.5
-LEAD_CM = 40.0  # least distance of the ankles in a step to another step of stairs: its edge is between them
-# Ground that rises or falls by these shares of the way is stairs, of which a healthy step takes one each. Bodies
-# that move by less than LEAST_WAY cm a frame stand.
+# Least distance of the ankles in a step to another step of stairs: its edge is between them. On short treads
+# it is SHORT_LEAD_CM, and the other foot comes beside the first one, if it would be BESIDE_CM ahead of it.
+LEAD_CM, SHORT_LEAD_CM, BESIDE_CM = 40.0, 25.0, 16.0
+# Ground that rises or falls by these shares of the way is stairs, of which a healthy step takes one each.
+# Bodies that move by less than LEAST_WAY cm a frame stand.
 STAIRS, LEAST_WAY = (0.3, 0.4), 0.2
-BESIDE_CM = 16.0  # a foot that joins the other on a short tread comes beside it if it would be this far ahead
 # The lower height of a swing is blended in over this share of its frames, and out over as many at its end.
 BLEND_SHARE = 0.22
 
@@ -211,9 +212,7 @@ def join_steps(
     """Let a body with a badly hurt leg go step by step on stairs. Changes `footprints`.
 
     Up the stairs the good foot goes first, and the hurt foot joins it on the same step. Down the stairs the
-    hurt foot goes first, and the good foot joins it. The first foot on a step is LEAD_CM ahead of the other,
-    so that the edge fits between them. On short treads (step_by_step, from `one_tread_a_stride`) the feet
-    stand side by side instead.
+    hurt foot goes first, and the good foot joins it. step_by_step: (F,) from `one_tread_a_stride`.
     """
     old = [footprints_of(foot, stances) for foot, stances in zip(feet, source.stances, strict=True)]
     tilts = [_tilts(foot, stances) for foot, stances in zip(feet, source.stances, strict=True)]
@@ -234,7 +233,8 @@ def join_steps(
             there += share * np.array([0.0, here[1] - there[1], 0.0])
             there -= beside * min(before, max(before / 2, BESIDE_CM)) * ahead
         elif stairs or joined:
-            there += share * (1 - beside) * max(LEAD_CM - before, 0.0) * ahead
+            least = LEAD_CM + beside * (SHORT_LEAD_CM - LEAD_CM)
+            there += share * max(least - before, 0.0) * ahead
         joined = joins
 
 

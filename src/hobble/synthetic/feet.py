@@ -4,7 +4,7 @@ The pitch of a foot is its angle about the X axis, positive if the toe is up.
 """
 
 from dataclasses import dataclass
-from itertools import pairwise, product
+from itertools import pairwise
 
 import numpy as np
 
@@ -27,7 +27,8 @@ STANDING_SPEED = 12.0  # cm/s: a slower figure counts as standing
 # Points along the foot, cm in front of the ankle, that should all be on the same step of stairs. The last
 # three are in front of the toes, so that the foot does not stand close to the next step.
 SOLE = np.array([-11.0, -5.0, 0.0, 6.0, 13.5, 20.5, 27.0, 32.0, 37.0])
-SHORT_SOLE = SOLE[1:6]  # on a tread that is too short for these
+# On a tread that is too short for them, the first three of these should be level, and the others not higher.
+SHORT_SOLE = np.array([0.0, 6.0, 13.5, 20.0, 25.0, -7.0])
 EDGE = 4.0  # cm: at an edge of stairs the ground rises or falls by more from one of these points to the next
 MOST_TREAD = 50.0  # cm: on deeper treads, people set more than one foot
 EDGE_PHASE = 0.05  # phase, or half a cycle later, in which the body is over an edge between short treads
@@ -110,7 +111,7 @@ def phase_curve(style: Style, fps: float, rng: np.random.Generator) -> Array:
 
 
 def climb_stairs(phase: Array, path: PlannedPath, ground: Ground) -> Array:
-    """The phase (F,) in cycles, changed so that each step goes to the next tread of stairs, if it is short."""
+    """(F,) the phase in cycles, changed so that each step goes to the next tread of stairs if it is short."""
     heights = ground(path.position[:, 0], path.position[:, 1])
     edges = np.flatnonzero(np.abs(np.diff(heights)) > EDGE)
     way = np.cumsum(path.speed) / path.fps
@@ -234,11 +235,14 @@ def _plant_foot(ground: Ground, place: Array, yaw: float) -> tuple[Array, Array]
     def heights(along: Array) -> Array:
         return ground(place[0] + along * ahead[0], place[1] + along * ahead[1])
 
-    # At an edge of stairs, two neighbouring points differ by 7 cm or more. On slopes and bumps the
-    # difference is less than 4 cm.
-    for sole, shift in product((SOLE, SHORT_SOLE), SHIFTS):
-        if np.max(np.abs(np.diff(heights(shift + sole)))) < EDGE:
-            break
+    def fits(shift: float, short: bool) -> bool:
+        # At an edge of stairs, two neighbouring points differ by 7 cm or more. On slopes and bumps the
+        # difference is less than 4 cm.
+        sole = heights(shift + (SHORT_SOLE if short else SOLE))
+        level = np.max(np.abs(np.diff(sole[:3] if short else sole))) < EDGE
+        return bool(level and (not short or sole.max() - sole[0] < EDGE))
+
+    shift = next((s for short in (False, True) for s in SHIFTS if fits(s, short)), SHIFTS[-1])
     under_ankle, under_toe = heights(shift + np.array([0.0, ANKLE_TO_TOE[2]]))
     x, z = place + shift * ahead
     pitch = np.arctan2(under_toe - under_ankle, ANKLE_TO_TOE[2])
@@ -266,7 +270,7 @@ FOLLOW = 0.35  # the pitch begins the swing with this share of its rate of chang
 LANDING_SPEED = 0.36  # speed of the foot as it lands, as a share of its mean speed in the swing
 # Where the ground is in the way, the foot is raised more. The raise grows in the first RISE of the swing, and
 # shrinks in the last SETTLE of it (shares of the swing).
-RISE, SETTLE = 0.36, 0.3
+RISE, SETTLE = 0.2, 0.3
 MOST_ARC = 0.25  # a swing leaves the straight way by at most this share of its length
 SOLE_HEIGHT = 2.0  # cm: heel, toe joint and toe tip count as this high above the sole
 
