@@ -34,6 +34,7 @@ KNEE, ARM = CURVES.index("knee_flexion_R"), CURVES.index("arm_forward_R")
 STANDING = 0.35  # an ankle that is slower than this share of the body stands, as in `hobble.gait.cycles`
 Bodies = list[tuple[str, float]]  # part and severity of each figure
 TEN: Bodies = [("thigh", 0.0), *((part, 10.0) for part in PARTS)]
+Ground = Callable[[Array, Array], Array]  # x, z -> height
 Target = Callable[[int], dict[str, Any]]  # frame -> arguments of `next_pose`
 
 
@@ -87,11 +88,16 @@ def aside(x: float, z: float) -> Target:
     return lambda i: {"target_velocity": (x, z), "facing": (0, 1), "gait": "walk"}
 
 
-def flights(x: Array, z: Array) -> Array:
-    """Flights of four steps up and down in turn, each 15 cm high and 85 cm deep, with 2.4 m between them."""
-    at = np.maximum(z - 300.0, 0.0) % 1160.0  # up: 340 cm, flat 240, down 340, flat 240
-    up, down = np.clip(np.ceil(at / 85), 0, 4), np.clip(np.ceil((at - 580) / 85), 0, 4)
-    return 15.0 * (up - down)
+def flights(deep: float, high: float) -> Ground:
+    """Flights of four steps up and down in turn, so deep and high (cm), with 2.4 m between them."""
+    turn = 4 * deep + 240.0
+
+    def heights(x: Array, z: Array) -> Array:
+        at = np.maximum(z - 300.0, 0.0) % (2 * turn)
+        up, down = np.clip(np.ceil(at / deep), 0, 4), np.clip(np.ceil((at - turn) / deep), 0, 4)
+        return np.asarray(high * (up - down))
+
+    return heights
 
 
 GAITS: dict[str, Target] = {
@@ -104,8 +110,9 @@ GAITS: dict[str, Target] = {
     "backward": aside(0.0, -1.2),
     "up a slope": ahead(2.0, terrain=lambda x, z: 0.15 * z),
     "down a slope": ahead(2.0, terrain=lambda x, z: -0.15 * z),
-    "on stairs": ahead(1.6, terrain=flights),
+    "on stairs": ahead(1.6, terrain=flights(85, 15)),
 }
+STAIRS = ((85, 15), (45, 17), (29, 17))  # depth and height of the steps, cm
 
 
 def in_every_gait(network: Network) -> None:
@@ -141,32 +148,37 @@ def running(network: Network) -> None:
 
 
 def on_stairs(network: Network) -> None:
+    print("stairs: toe or heel over 1 cm inside, share of frames; deepest; good leg first up, bad one down")
     bodies = [("thigh", 0.0), *((part, severity) for part in PARTS for severity in (5.0, 7.0, 10.0))]
     soles = dict(zip(("heel", "toe"), sole_heights(network, leg_joints(network.skeleton)), strict=True))
-    inside: list[Array] = []
-    led = np.zeros((len(bodies), 2, 2))  # up or down, led as people do or not
-    for start in (0.0, -30.0, -60.0):
-        walks = Walks(network, bodies, ahead(1.6, terrain=flights), 1800, position=(0.0, start))
-        joints = [(walks.at(f"{side}_{joint}"), sole) for side in SIDES for joint, sole in soles.items()]
-        inside.append(np.max([flights(*at[..., ::2].T).T + sole - at[..., 1] for at, sole in joints], axis=0))
-        for i in range(len(bodies)):
-            for rise, leads_left in first_on_a_step(walks, i):
-                led[i, int(rise < 0), int(leads_left == (rise > 0))] += 1
-    print("stairs: toe or heel over 1 cm inside, share of frames; deepest; good leg first up, bad one down")
-    for body, depth, counts in zip(bodies, np.concatenate(inside).T, led, strict=True):
-        (wrong_up, up), (wrong_down, down) = counts.astype(int).tolist()
-        print(f"  {body[0]:6} {body[1]:3.0f}: {np.mean(depth > 1):.4f} {depth.max():5.1f} cm;", end=" ")
-        print(f"up {up} of {up + wrong_up}, down {down} of {down + wrong_down}")
+    for deep, high in STAIRS:
+        ground = flights(deep, high)
+        inside: list[Array] = []
+        led = np.zeros((len(bodies), 2, 2))  # up or down, led as people do or not
+        for start in (0.0, -30.0, -60.0):
+            walks = Walks(network, bodies, ahead(1.6, terrain=ground), 1800, position=(0.0, start))
+            joints = [(walks.at(f"{side}_{joint}"), sole) for side in SIDES for joint, sole in soles.items()]
+            inside.append(
+                np.max([ground(*at[..., ::2].T).T + sole - at[..., 1] for at, sole in joints], axis=0)
+            )
+            for i in range(len(bodies)):
+                for rise, leads_left in first_on_a_step(walks, i, ground):
+                    led[i, int(rise < 0), int(leads_left == (rise > 0))] += 1
+        print(f"{high} by {deep} cm")
+        for body, depth, counts in zip(bodies, np.concatenate(inside).T, led, strict=True):
+            (wrong_up, up), (wrong_down, down) = counts.astype(int).tolist()
+            print(f"  {body[0]:6} {body[1]:3.0f}: {np.mean(depth > 1):.4f} {depth.max():5.1f} cm;", end=" ")
+            print(f"up {up} of {up + wrong_up}, down {down} of {down + wrong_down}")
 
 
-def first_on_a_step(walks: Walks, figure: int) -> Iterator[tuple[float, bool]]:
+def first_on_a_step(walks: Walks, figure: int, ground: Ground) -> Iterator[tuple[float, bool]]:
     """(rise, whether the left foot is first) of each step of the stairs on which a figure stands."""
     standing, stances = feet_in_stance(walks.contacts[:, figure]), []
     for side, role in enumerate(("left_toe", "right_toe")):
         for start, end in true_runs(standing[:, side]):
             if end - start >= SHORTEST_STANCE:
                 x, _, z = walks.at(role)[(start + end) // 2, figure]
-                stances.append((start, z, float(flights(x, z)), side))
+                stances.append((start, z, float(ground(x, z)), side))
     furthest, level = -np.inf, None
     for _, z, height, side in sorted(stances):
         if level is not None and z > furthest and height != level:

@@ -6,7 +6,7 @@ import pytest
 from hobble.core.smooth import true_runs
 from hobble.measures.walks import bend
 from hobble.synthetic.generate_clip import generate_walk, walk_from_plan
-from hobble.synthetic.plan import Segment
+from hobble.synthetic.plan import RECIPES, Segment
 
 SIDES = ("Left", "Right")
 FEET = [(side, joint) for side in SIDES for joint in ("Foot", "ToeBase")]
@@ -75,11 +75,7 @@ def test_hips_are_highest_in_mid_stance_and_head_stays_level(walking):
     assert np.degrees(np.arccos(neck[:, 1] / np.linalg.norm(neck, axis=1))).max() < 15
 
 
-ALL = ["walk-straight", "walk", "jog", "crouch", "sidesteps", "stop-and-go", "walk-jog-walk"]
-ALL += ["slopes", "steps", "stairs", "uneven"]
-
-
-@pytest.mark.parametrize("recipe", ALL)
+@pytest.mark.parametrize("recipe", RECIPES)
 def test_no_leg_is_fully_stretched_and_no_joint_jerks(written, recipe):
     clip = written("any", recipe=recipe)
     for side in SIDES:
@@ -92,7 +88,7 @@ def test_no_leg_is_fully_stretched_and_no_joint_jerks(written, recipe):
     assert np.linalg.norm(acceleration, axis=2).max() < (320 if recipe == "jog" else 200)
 
 
-@pytest.mark.parametrize("recipe", ALL)
+@pytest.mark.parametrize("recipe", RECIPES)
 def test_a_foot_that_is_down_does_not_slide(written, recipe):
     clip = written("any", recipe=recipe)
     for joint in ("LeftFoot", "LeftToeBase", "RightFoot", "RightToeBase"):
