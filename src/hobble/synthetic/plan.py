@@ -45,7 +45,8 @@ def _stand(seconds: float = 2.0) -> Segment:
 # segments on one line.
 RECIPES: dict[str, tuple[Segment, ...]] = {
     "walk-straight": (
-        *(_walk(130, 0, 4), _walk(150, 8, 2.5), _walk(55, 0, 2.5), _walk(105, -8, 2.5), _walk(80, 0, 2.5)),
+        *(_walk(130, 0, 4), _walk(150, 8, 2.5), _walk(55, 0, 2.5), _walk(105, -8, 2), _walk(32, 0, 2.5)),
+        _walk(80, 0, 2.5),
     ),
     "walk": (
         *(_walk(130, 0, 3), _walk(150, 90, 3), _walk(105, -100, 3), _walk(70, 20, 2.6), _walk(180, 0, 2.6)),
@@ -79,7 +80,7 @@ RECIPES: dict[str, tuple[Segment, ...]] = {
     ),
     "slopes": (_walk(125, 0, 4), _walk(110, 60, 3), _jog(240, 0, 2.5), _walk(125, -60, 3), _walk(90, 0, 2)),
     "steps": (_walk(85, 0, 4), _walk(70, 12, 3), _walk(100, -12, 3), _stand(1.8)),
-    "stairs": (_walk(52, 0, 6), _walk(44, 8, 5), _walk(60, -8, 5)),
+    "stairs": (_walk(52, 0, 6), _walk(40, 8, 5), _walk(60, -8, 4), _walk(34, 0, 4)),
     "uneven": (_walk(115, 0, 3), _walk(95, 70, 3), _walk(125, -70, 3), _walk(70, 0, 2.5)),
 }
 # recipe -> kind of ground, see `hobble.synthetic.plan`; all other recipes are on flat ground
