@@ -1,12 +1,13 @@
 """How a network's character limps in every gait: running, turning, crouched, sideways, backward, on stairs.
 
-    python benchmarks/every_gait.py WEIGHTS.npz [--only run gaits stairs variation]
+    python benchmarks/every_gait.py WEIGHTS.npz [--only run slow gaits stairs variation]
 
-The right thigh, shank or foot hurts. `run`: asked for 4.2 m/s, speed and the two steps by severity. `gaits`:
-stance and range of the hurt knee at 10, and what share they are of the straight walk's effect. `stairs`: how
-often a toe or heel is more than 1 cm inside a step, and whether the good leg leads up and the bad one down.
-`variation`: with variation 1, standard deviations of stride time (s) and knee ranges (degrees), and how far
-apart the ranges of left and right knee and arm are, mean of eight seeds.
+The right thigh, shank or foot hurts. `run`: asked for 4.2 m/s, speed and the two steps by severity. `slow`:
+speed if asked for .2 to .6 m/s. `gaits`: stance and range of the hurt knee at 10, and what share they are of
+the straight walk's effect. `stairs`: how often a toe or heel is more than 1 cm inside a step, and whether the
+good leg leads up and the bad one down. `variation`: with variation 1, standard deviations of stride time (s)
+and knee ranges (degrees), and how far apart the ranges of left and right knee and arm are, mean of eight
+seeds.
 """
 
 import argparse
@@ -147,6 +148,13 @@ def running(network: Network) -> None:
         print(f"    step onto the hurt foot / the sound one {' '.join(f'{step:.2f}' for step in steps)}")
 
 
+def slowly(network: Network) -> None:
+    for asked in (0.2, 0.3, 0.4, 0.5, 0.6):
+        hips = Walks(network, TEN, ahead(asked / 0.6)).at("hips")[..., 2]
+        reached = " ".join(f"{speed:.2f}" for speed in (hips[-1] - hips[0]) / len(hips) * 0.6)
+        print(f"asked for {asked} m/s: healthy, then at 10 {', '.join(PARTS)}: {reached}")
+
+
 def on_stairs(network: Network) -> None:
     print("stairs: toe or heel over 1 cm inside, share of frames; deepest; good leg first up, bad one down")
     bodies = [("thigh", 0.0), *((part, severity) for part in PARTS for severity in (5.0, 7.0, 10.0))]
@@ -213,7 +221,13 @@ def main() -> None:
         MEASURES[name](network)
 
 
-MEASURES = {"run": running, "gaits": in_every_gait, "stairs": on_stairs, "variation": variation}
+MEASURES = {
+    "run": running,
+    "slow": slowly,
+    "gaits": in_every_gait,
+    "stairs": on_stairs,
+    "variation": variation,
+}
 
 if __name__ == "__main__":
     main()
