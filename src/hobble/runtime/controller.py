@@ -32,6 +32,9 @@ PULL_AHEAD = 0.5
 # With other networks, if the predicted movement goes against the target, this share of its backward part is
 # removed. If all of it were removed, the feet would slide.
 BACKWARD_LOSS = 0.5
+# And if the body fell behind the target, it is pushed by PUSH times the lack of speed, at most MOST_PUSH cm a
+# frame. Without a push, characters that were asked for a slow walk went backward, and did not come out of it.
+PUSH, MOST_PUSH = 1.0, 0.3
 
 
 @njit
@@ -72,6 +75,23 @@ def _remove_backward(
 
 
 @njit
+def _push_ahead(target_x: float, target_z: float, past: Any) -> tuple[float, float]:
+    """What to add to the root's movement (x, z) in a frame if the body fell behind its target.
+
+    past: (N, 2) places of the last frames. The lack of speed is that of their mean, since the speed of a
+    walk varies in each step.
+    """
+    speed = np.sqrt(target_x * target_x + target_z * target_z)
+    if speed < STILL:
+        return 0.0, 0.0
+    span = len(past) - 1
+    way_x, way_z = past[span, 0] - past[0, 0], past[span, 1] - past[0, 1]
+    lack = speed - (way_x * target_x + way_z * target_z) / (span * speed)
+    push = min(max(PUSH * lack, 0.0), MOST_PUSH) / speed
+    return push * target_x, push * target_z
+
+
+@njit
 def advance(
     y: Any,
     columns: Any,
@@ -89,7 +109,7 @@ def advance(
     so the root turns by the negative.
     y: (C, Y) prediction. columns: see `advance_columns`. target: (C, 2) target velocity, cm a frame.
     loss: the share of the movement against the target that is removed; 0 in the runtime of Holden et al.
-    (2017). recorded_poses: whether the predicted poses are recorded frames. If not, movement and turn are
+    (2017), where no body is pushed ahead, either. recorded_poses: whether the predicted poses are recorded frames. If not, movement and turn are
     scaled by (1 - stand)^.25, where stand is the present share of the gait "stand", and the phase changes
     more slowly. pull: largest change of the movement at right angles to the target, as a share of the
     movement's length; 0 for no change. Recorded frames need it, because clips have only some directions and
@@ -115,6 +135,8 @@ def advance(
         x, z = moving * (vx * cos + vz * sin), moving * (vz * cos - vx * sin)
         x, z = _remove_backward(loss, target[c, 0], target[c, 1], x, z)
         more_x, more_z = _pull_to_target(pull, target[c, 0], target[c, 1], x, z)
+        if loss > 0.0:
+            more_x, more_z = _push_ahead(target[c, 0], target[c, 1], position[c, :middle])
         position[c, middle, 0] += x + more_x
         position[c, middle, 1] += z + more_z
         yaw -= moving * y[c, turn_column]

@@ -58,6 +58,8 @@ enum {
 #define PULL 0.2
 #define PULL_AHEAD 0.5
 #define BACKWARD_LOSS 0.5
+#define PUSH 1.0
+#define MOST_PUSH 0.3
 #define CARRIED_SHARE 0.5
 #define STANDING_SHARE 0.1
 /* Feet. */
@@ -1660,6 +1662,17 @@ static void pull_to_target(double share, const double *target, double *move) {
     for (int k = 0; k < 2; k++) move[k] += along * ahead[k] + across * lack[k];
 }
 
+/* Pushes a body that fell behind its target ahead. Its past places are the first `middle` positions. */
+static void push_ahead(const character *c, int middle, const double *target, double *move) {
+    double speed = length2(target[0], target[1]);
+    if (speed < STILL) return;
+    int span = middle - 1;
+    const double *now = c->position[span], *then = c->position[0];
+    double lack = speed - ((now[0] - then[0]) * target[0] + (now[1] - then[1]) * target[1]) / (span * speed),
+           push = clamp(PUSH * lack, 0, MOST_PUSH) / speed;
+    for (int a = 0; a < 2; a++) move[a] += push * target[a];
+}
+
 /* Advances trajectory and phase by a frame, as the prediction y says. */
 static void advance(const model *m, character *c, const float *y, const double *target) {
     int middle = m->length / 2, future = m->future, recorded = m->size[FORM] >= RECORDED,
@@ -1673,6 +1686,7 @@ static void advance(const model *m, character *c, const float *y, const double *
     double move[2] = {moving * (y[0] * cosine + y[1] * sine), moving * (y[1] * cosine - y[0] * sine)};
     remove_backward(steered && !recorded ? BACKWARD_LOSS : 0, target, move);
     pull_to_target(steered && recorded ? PULL : 0, target, move);
+    if (steered && !recorded) push_ahead(c, middle, target, move);
     double *root = c->position[middle];
     root[0] += move[0];
     root[1] += move[1];
