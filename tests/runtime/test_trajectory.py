@@ -64,7 +64,7 @@ AGAINST, RECORDED = {"loss": 0.25}, {"recorded_poses": True, "pull": 0.2}
     [
         # Movement against the target is reduced, here by a quarter.
         (0.5, (0.0, 0.0), (0.375, 1.5), AGAINST),  # the target is to stand
-        (0.5, (0.0, -3.0), (0.5, 1.5), AGAINST),  # against the target, but not across it
+        (0.5, (0.0, -3.0), (0.5, 1.2), AGAINST),  # against the target, with a push, but not across it
         # Recorded poses move nearer to the target: half of the share along it, all of it across.
         (0.0, (0.0, 2.1), (0.0, 2.1), RECORDED),  # reached with less than the whole share
         (0.0, (3.0, 4.0), (0.12 + 0.32, 2.0 + 0.16 - 0.24), RECORDED),  # faster, and more to the left

@@ -60,35 +60,24 @@ def _pull_to_target(
 
 
 @njit
-def _remove_backward(
-    loss: float, target_x: float, target_z: float, x: float, z: float
+def _keep_up(
+    loss: float, target_x: float, target_z: float, x: float, z: float, past: Any
 ) -> tuple[float, float]:
-    """The root's movement (x, z) after the share `loss` of its part against the target is removed.
+    """The root's movement (x, z) in a frame, so that the body follows its target; unchanged if `loss` is 0.
 
-    If the target is slower than STILL, the share `loss` of the whole movement is removed.
+    The share `loss` of its part against the target is removed. If the target is slower than STILL, that is
+    the share `loss` of the whole movement. Besides, a body that fell behind is pushed ahead. past: (N, 2)
+    places of the last frames. Their mean speed counts, since the speed of a walk varies in each step.
     """
     squared_speed = target_x * target_x + target_z * target_z
-    if squared_speed < STILL * STILL:
+    if loss == 0.0 or squared_speed < STILL * STILL:
         return (1.0 - loss) * x, (1.0 - loss) * z
-    against = loss * min(0.0, x * target_x + z * target_z) / squared_speed
-    return x - against * target_x, z - against * target_z
-
-
-@njit
-def _push_ahead(target_x: float, target_z: float, past: Any) -> tuple[float, float]:
-    """What to add to the root's movement (x, z) in a frame if the body fell behind its target.
-
-    past: (N, 2) places of the last frames. The lack of speed is that of their mean, since the speed of a
-    walk varies in each step.
-    """
-    speed = np.sqrt(target_x * target_x + target_z * target_z)
-    if speed < STILL:
-        return 0.0, 0.0
-    span = len(past) - 1
-    way_x, way_z = past[span, 0] - past[0, 0], past[span, 1] - past[0, 1]
-    lack = speed - (way_x * target_x + way_z * target_z) / (span * speed)
-    push = min(max(PUSH * lack, 0.0), MOST_PUSH) / speed
-    return push * target_x, push * target_z
+    more = -loss * min(0.0, x * target_x + z * target_z) / squared_speed
+    last = len(past) - 1
+    way_x, way_z = past[last, 0] - past[0, 0], past[last, 1] - past[0, 1]
+    lack = 1.0 - (way_x * target_x + way_z * target_z) / (last * squared_speed)  # as a share of the target
+    more += min(max(PUSH * lack, 0.0), MOST_PUSH / np.sqrt(squared_speed))
+    return x + more * target_x, z + more * target_z
 
 
 @njit
@@ -108,12 +97,12 @@ def advance(
     phase changes, all as the network predicts. The network predicts the turn of the world seen from the root,
     so the root turns by the negative.
     y: (C, Y) prediction. columns: see `advance_columns`. target: (C, 2) target velocity, cm a frame.
-    loss: the share of the movement against the target that is removed; 0 in the runtime of Holden et al.
-    (2017), where no body is pushed ahead, either. recorded_poses: whether the predicted poses are recorded frames. If not, movement and turn are
-    scaled by (1 - stand)^.25, where stand is the present share of the gait "stand", and the phase changes
-    more slowly. pull: largest change of the movement at right angles to the target, as a share of the
-    movement's length; 0 for no change. Recorded frames need it, because clips have only some directions and
-    speeds. The idea is the adjustment of Holden et al. (2020).
+    loss: see `_keep_up`; 0 in the runtime of Holden et al. (2017). recorded_poses: whether the predicted
+    poses are recorded frames. If not, movement and turn are scaled by (1 - stand)^.25, where stand is the
+    present share of the gait "stand", and the phase changes more slowly. pull: largest change of the movement
+    at right angles to the target, as a share of the movement's length; 0 for no change. Recorded frames need
+    it, because clips have only some directions and speeds. The idea is the adjustment of Holden et al.
+    (2020).
     path: the trajectories, see `hobble.runtime.trajectory.Trajectory`. phase: (C,). Both change in place.
     """
     position, direction, gait = path
@@ -133,10 +122,8 @@ def advance(
         vx, vz = y[c, velocity_column], y[c, velocity_column + 1]
         # From root coordinates to the world.
         x, z = moving * (vx * cos + vz * sin), moving * (vz * cos - vx * sin)
-        x, z = _remove_backward(loss, target[c, 0], target[c, 1], x, z)
+        x, z = _keep_up(loss, target[c, 0], target[c, 1], x, z, position[c, :middle])
         more_x, more_z = _pull_to_target(pull, target[c, 0], target[c, 1], x, z)
-        if loss > 0.0:
-            more_x, more_z = _push_ahead(target[c, 0], target[c, 1], position[c, :middle])
         position[c, middle, 0] += x + more_x
         position[c, middle, 1] += z + more_z
         yaw -= moving * y[c, turn_column]

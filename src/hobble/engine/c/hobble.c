@@ -1637,17 +1637,20 @@ static void write_pose(const model *m, character *c, const float *y) {
     memcpy(c->pose_rotation, c->joint_rotation, (size_t)joints * sizeof *c->pose_rotation);
 }
 
-/* The root's movement after a share of its part against the target is removed: see controller.py. */
-static void remove_backward(double loss, const double *target, double *move) {
+/* The root's movement, so that the body follows its target: see controller.py. past: `last` + 1 places. */
+static void keep_up(double loss, const double *target, const double (*past)[2], int last, double *move) {
     double squared = target[0] * target[0] + target[1] * target[1];
-    if (squared < STILL * STILL) {
+    if (loss == 0 || squared < STILL * STILL) {
         move[0] *= 1 - loss;
         move[1] *= 1 - loss;
         return;
     }
-    double against = loss * smaller(0, move[0] * target[0] + move[1] * target[1]) / squared;
-    move[0] -= against * target[0];
-    move[1] -= against * target[1];
+    double more = -loss * smaller(0, move[0] * target[0] + move[1] * target[1]) / squared,
+           way[2] = {past[last][0] - past[0][0], past[last][1] - past[0][1]},
+           lack = 1 - (way[0] * target[0] + way[1] * target[1]) / (last * squared);
+    more += clamp(PUSH * lack, 0, MOST_PUSH / sqrt(squared));
+    move[0] += more * target[0];
+    move[1] += more * target[1];
 }
 
 /* The root's movement brought nearer to the target's, by a limited share of its length: see controller.py. */
@@ -1662,17 +1665,6 @@ static void pull_to_target(double share, const double *target, double *move) {
     for (int k = 0; k < 2; k++) move[k] += along * ahead[k] + across * lack[k];
 }
 
-/* Pushes a body that fell behind its target ahead. Its past places are the first `middle` positions. */
-static void push_ahead(const character *c, int middle, const double *target, double *move) {
-    double speed = length2(target[0], target[1]);
-    if (speed < STILL) return;
-    int span = middle - 1;
-    const double *now = c->position[span], *then = c->position[0];
-    double lack = speed - ((now[0] - then[0]) * target[0] + (now[1] - then[1]) * target[1]) / (span * speed),
-           push = clamp(PUSH * lack, 0, MOST_PUSH) / speed;
-    for (int a = 0; a < 2; a++) move[a] += push * target[a];
-}
-
 /* Advances trajectory and phase by a frame, as the prediction y says. */
 static void advance(const model *m, character *c, const float *y, const double *target) {
     int middle = m->length / 2, future = m->future, recorded = m->size[FORM] >= RECORDED,
@@ -1684,9 +1676,9 @@ static void advance(const model *m, character *c, const float *y, const double *
            yaw = yaw_of(c->direction[middle]);
     double sine = sin(yaw), cosine = cos(yaw);
     double move[2] = {moving * (y[0] * cosine + y[1] * sine), moving * (y[1] * cosine - y[0] * sine)};
-    remove_backward(steered && !recorded ? BACKWARD_LOSS : 0, target, move);
+    keep_up(steered && !recorded ? BACKWARD_LOSS : 0, target, (const double (*)[2])c->position, middle - 1,
+            move);
     pull_to_target(steered && recorded ? PULL : 0, target, move);
-    if (steered && !recorded) push_ahead(c, middle, target, move);
     double *root = c->position[middle];
     root[0] += move[0];
     root[1] += move[1];
