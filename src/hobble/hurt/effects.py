@@ -107,8 +107,8 @@ ADDED_CHANGES: dict[str, dict[str, float]] = {
         "off": -0.093, "land_sound": -0.104,
     },
     "foot": {
-        "speed": 0.62, "stride": 1.05, "turn": 0.47, "push": 0.63, "lift": 0.61, "lift_sound": 0.22,
-        "push_sound": 0.3, "strike": 0.58, "side": 4.8, "list": -3.6, "toe_out": 14.0, "off": -0.12,
+        "speed": 0.62, "stride": 1.05, "turn": 0.47, "push": 0.63, "lift": 0.61, "lift_sound": 0.16,
+        "push_sound": 0.27, "strike": 0.58, "side": 4.8, "list": -3.6, "toe_out": 14.0, "off": -0.12,
         "off_sound": 0.05, "land_sound": -0.082,
         "width": -0.022, "vault_sound": 0.96, "arm": 0.65, "arm_sound": 0.85, "forward": -7.1,
     },
