@@ -89,15 +89,15 @@ ADDED_CHANGES: dict[str, dict[str, float]] = {
         "lift_sound": 0.3, "push_sound": 0.75, "list": 2.0,
     },
     "hip": {
-        "speed": 0.594, "stride": 1.25, "turn": 0.42, "push": 0.86, "vault": 0.05, "lift": 0.87,
-        "crouch": 11.8, "lift_sound": 0.16, "push_sound": 0.08, "off_sound": 0.048, "width": 0.03,
-        "vault_sound": 0.86, "arm": 0.85, "arm_sound": 0.85, "forward": -4.7, "list": -0.6,
+        "speed": 0.594, "stride": 1.27, "turn": 0.42, "push": 0.86, "vault": 0.05, "lift": 0.87,
+        "crouch": 11.8, "lift_sound": 0.16, "push_sound": 0.08, "off_sound": 0.048, "width": 0.038,
+        "vault_sound": 0.86, "arm": 0.85, "arm_sound": 0.85, "forward": -3.6, "list": -0.6,
         "back": 0.48, "side": -1.6,
     },
     "thigh": {
         "speed": 0.645, "stride": 1.09, "turn": 0.03, "push": 0.12, "vault": 0.24, "crouch": 9.8,
-        "lift": 0.05, "lift_sound": 0.15, "push_sound": 0.16, "strike": 0.92, "list": -0.8, "arm": 0.65,
-        "arm_sound": 0.85, "forward": -0.9, "width": -0.02, "side": 2.1, "back": 0.89, "off": -0.14,
+        "lift": 0.05, "lift_sound": 0.15, "push_sound": 0.16, "strike": 0.92, "list": -1.1, "arm": 0.65,
+        "arm_sound": 0.85, "forward": -0.9, "width": -0.02, "side": 2.1, "back": 0.93, "off": -0.14,
         "off_sound": 0.056, "land_sound": -0.098,
     },
     "shank": {
@@ -110,7 +110,7 @@ ADDED_CHANGES: dict[str, dict[str, float]] = {
         "speed": 0.62, "stride": 1.05, "turn": 0.47, "push": 0.63, "lift": 0.61, "lift_sound": 0.16,
         "push_sound": 0.27, "strike": 0.58, "side": 4.8, "list": -3.6, "toe_out": 14.0, "off": -0.12,
         "off_sound": 0.05, "land_sound": -0.082,
-        "width": -0.022, "vault_sound": 0.96, "arm": 0.65, "arm_sound": 0.85, "forward": -7.1,
+        "width": -0.015, "vault_sound": 0.96, "arm": 0.65, "arm_sound": 0.85, "forward": -7.1,
     },
     "back": {
         "speed": 0.68, "push": 0.6, "push_sound": 0.6, "stride": 1.12, "forward": 17.0, "crouch": 9.0,
