@@ -122,7 +122,8 @@ def advance(
         vx, vz = y[c, velocity_column], y[c, velocity_column + 1]
         # From root coordinates to the world.
         x, z = moving * (vx * cos + vz * sin), moving * (vz * cos - vx * sin)
-        x, z = _keep_up(loss, target[c, 0], target[c, 1], x, z, position[c, :middle])
+        asked_x, asked_z = moving * target[c, 0], moving * target[c, 1]
+        x, z = _keep_up(loss, asked_x, asked_z, x, z, position[c, :middle])
         more_x, more_z = _pull_to_target(pull, target[c, 0], target[c, 1], x, z)
         position[c, middle, 0] += x + more_x
         position[c, middle, 1] += z + more_z

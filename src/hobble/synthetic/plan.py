@@ -53,7 +53,7 @@ RECIPES: dict[str, tuple[Segment, ...]] = {
         *(_walk(130, 170, 3.4), _walk(170, -140, 3.4), _walk(90, 175, 1.7), _walk(135, 0, 2)),
         *(_walk(115, -90, 1.4), _walk(100, 0, 1.4)),
     ),
-    "slow": (*(_walk(32, 0, 4), _walk(50, 40, 3), _walk(20, 0, 3), _walk(42, -40, 3), _walk(26, 0, 3)),),
+    "slow": (_walk(32, 0, 4), _walk(50, 40, 3), _walk(20, 0, 3), _walk(42, -40, 3), _walk(26, 0, 3)),
     "jog": (
         *(_jog(250, 0, 2), _jog(330, 20, 2), _jog(420, -20, 2.2), _jog(280, 90, 1.3), _jog(300, 0, 1.2)),
         *(_jog(260, -170, 2), _jog(215, 0, 1.6), _jog(300, 140, 2.4), _jog(370, 0, 1.6), _jog(400, -60, 2.4)),
@@ -295,9 +295,8 @@ def _make_steps(
     count = 400  # steps; they reach more than 60 m in front of the start and behind it
     widths = rng.uniform(*depths, count)
     # 1 for a step up, -1 for a step down.
-    directions = np.repeat(np.where(np.arange(count) % 2 == 0, 1.0, -1.0), rng.integers(*flights, count))[
-        :count
-    ]
+    ups = np.where(np.arange(count) % 2 == 0, 1.0, -1.0)
+    directions = np.repeat(ups, rng.integers(*flights, count))[:count]
     levels = np.concatenate([[0.0], np.cumsum(directions * rng.uniform(*rises, count))])
     levels -= levels[count // 2]  # height 0 at the start
     turns = np.diff(directions, prepend=directions[0]) != 0

@@ -1676,7 +1676,8 @@ static void advance(const model *m, character *c, const float *y, const double *
            yaw = yaw_of(c->direction[middle]);
     double sine = sin(yaw), cosine = cos(yaw);
     double move[2] = {moving * (y[0] * cosine + y[1] * sine), moving * (y[1] * cosine - y[0] * sine)};
-    keep_up(steered && !recorded ? BACKWARD_LOSS : 0, target, (const double (*)[2])c->position, middle - 1,
+    double asked[2] = {moving * target[0], moving * target[1]};
+    keep_up(steered && !recorded ? BACKWARD_LOSS : 0, asked, (const double (*)[2])c->position, middle - 1,
             move);
     pull_to_target(steered && recorded ? PULL : 0, target, move);
     double *root = c->position[middle];
