@@ -12,7 +12,7 @@ from hobble.measures.injury_run import SEVERITIES, second_sweep
 from hobble.measures.walks import CrowdTarget, generate_walks
 from hobble.runtime import Runtime
 
-RUNTIME = Runtime(steering=1.0)
+RUNTIME = Runtime(steering=0.0)
 KNEE = "LeftUpLeg-LeftLeg"
 
 
