@@ -296,7 +296,7 @@ def _make_steps(
     widths = rng.uniform(*depths, count)
     # 1 for a step up, -1 for a step down.
     ups = np.where(np.arange(count) % 2 == 0, 1.0, -1.0)
-    directions = np.repeat(ups, rng.integers(*flights, count))[:count]
+    directions = np.repeat(ups, rng.integers(int(flights[0]), int(flights[1]), count))[:count]
     levels = np.concatenate([[0.0], np.cumsum(directions * rng.uniform(*rises, count))])
     levels -= levels[count // 2]  # height 0 at the start
     turns = np.diff(directions, prepend=directions[0]) != 0
