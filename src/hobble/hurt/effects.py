@@ -143,7 +143,7 @@ RATIOS = (
 TIMING_FACTOR = 1.85
 # Part -> length of the step onto the hurt foot, as a ratio to the healthy clip. It replaces the ratio of the
 # profiles.
-STEP_RATIO = {"hip": 0.79, "thigh": 0.18, "shank": 0.44, "foot": 0.41}
+STEP_RATIO = {"hip": 0.79, "thigh": 0.18, "shank": 0.4, "foot": 0.41}
 
 
 @functools.cache
