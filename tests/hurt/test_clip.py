@@ -117,8 +117,7 @@ def test_hurting_the_mirrored_clip_on_the_other_side_is_the_mirror_of_the_hurt_c
     one = mirror_clip(hurt_clip(clip, labels, hurting(len(clip), links)).clip, "image")
     two = hurt_clip(image, image_labels, hurting(len(clip), across)).clip
     assert len(one) == len(two)
-    # A half cycle is no whole number of frames, so that the phase of the mirrored labels is a frame's share
-    # off.
+    # A half cycle is no whole number of frames: the phase of the mirrored labels is off by a frame's share.
     np.testing.assert_allclose(two.root, one.root, atol=0.05)
     assert np.degrees(quat.angle(one.rotations, two.rotations)).max() < 0.5
 
@@ -143,5 +142,4 @@ def test_on_stairs_a_badly_hurt_leg_goes_last_up_and_first_down(holden31, hurtin
         ahead = min(forward for _, rise, forward in steps if abs(rise) > 5)
         assert ahead > {"steps": 33, "stairs": 20}[recipe], "the edge of a step is between the two feet"
     else:
-        assert first_up == {0, 1}
-        assert 1 in first_down
+        assert first_up == {0, 1} and 1 in first_down

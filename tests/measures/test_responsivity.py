@@ -11,7 +11,7 @@ from hobble.measures.responsivity_run import lap_starts, measure_responsivity
 from hobble.runtime import Runtime
 from hobble.runtime.waypoints import Waypoint
 
-RUNTIME = Runtime(steering=0.0)
+RUNTIME = Runtime(steering=0.0, mode="cubic")
 
 
 def track(*places: tuple[float, float]) -> tuple[Waypoint, ...]:
@@ -20,8 +20,7 @@ def track(*places: tuple[float, float]) -> tuple[Waypoint, ...]:
 
 def run(network, track, seconds: float) -> dict[str, Any]:
     options = Options(laps=2, lap_seconds=seconds, modes=("constant", "linear"))
-    runtime = Runtime(steering=0.0, mode="cubic")
-    return measure_responsivity(network, options, configuration="x", runtime=runtime, track=track)
+    return measure_responsivity(network, options, configuration="x", runtime=RUNTIME, track=track)
 
 
 def test_finished_laps_are_counted_and_timed(steady) -> None:

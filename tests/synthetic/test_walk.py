@@ -129,3 +129,8 @@ def test_no_foot_goes_through_the_edge_of_a_step(holden31, recipe):
         tip = toe + 6 * ahead / np.linalg.norm(ahead, axis=1, keepdims=True)
         for point in (toe, tip):
             assert (point[:, 1] - made.ground(point[:, 0], point[:, 2])).min() > -0.5
+    landings = sorted(
+        (f + 20, s) for s, at in zip(SIDES, (made.left, made.right), strict=True) for f in at[:-1]
+    )
+    rises = np.abs(np.diff([made.ground(*places[f"{side}Foot"][frame, [0, 2]]) for frame, side in landings]))
+    assert 6 < rises.max() < 18.5, "a step goes to the next tread"
