@@ -17,7 +17,7 @@ from hobble.hurt.effects import JOIN_AT, JOIN_FROM, LEFT, LEG_PARTS, RIGHT, part
 # An edge is looked for at this many points ahead, so many cm apart: the ground rises or falls by EDGE_CM or
 # more from one point to the next.
 POINTS, APART_CM, EDGE_CM = 32, 5.0, 4.0
-OVER_CM = 25.0  # as the first foot lands beyond an edge, the edge is this far ahead of the body
+OVER_CM = 20.0  # as the first foot lands beyond an edge, the edge is this far ahead of the body
 CYCLE_FRAMES = 72.0  # length of a hurt body's gait cycle, about
 SLOWEST = 0.3  # cm a frame: slower bodies count as this fast
 # If the body should make f times as many cycles up to the edge, f is at most MOST or its inverse. Then the

@@ -2331,7 +2331,7 @@ static int place(hobble *h, const hobble_ground *ground) {
 
 /* Lets the right leg go first on stairs: see stairs.py, which has the same numbers. */
 static int time_steps(hobble *h, const hobble_ground *ground) {
-    static const double apart = 5, edge = 4, over = 25, cycle_frames = 72, slowest = 0.3, most = 2.5,
+    static const double apart = 5, edge = 4, over = 20, cycle_frames = 72, slowest = 0.3, most = 2.5,
                         pace = 0.25, join_from = 5, join_at = 7, lands[2] = {0.5, 0.0};
     const model *m = &h->model;
     int now = m->size[WINDOW], span = now / 2;
