@@ -158,25 +158,29 @@ def slowly(network: Network) -> None:
 def on_stairs(network: Network) -> None:
     print("stairs: toe or heel over 1 cm inside, share of frames; deepest; good leg first up, bad one down")
     bodies = [("thigh", 0.0), *((part, severity) for part in PARTS for severity in (5.0, 7.0, 10.0))]
-    soles = dict(zip(("heel", "toe"), sole_heights(network, leg_joints(network.skeleton)), strict=True))
     for deep, high in STAIRS:
-        ground = flights(deep, high)
-        inside: list[Array] = []
-        led = np.zeros((len(bodies), 2, 2))  # up or down, led as people do or not
-        for start in (0.0, -30.0, -60.0):
-            walks = Walks(network, bodies, ahead(1.6, terrain=ground), 1800, position=(0.0, start))
-            joints = [(walks.at(f"{side}_{joint}"), sole) for side in SIDES for joint, sole in soles.items()]
-            inside.append(
-                np.max([ground(*at[..., ::2].T).T + sole - at[..., 1] for at, sole in joints], axis=0)
-            )
-            for i in range(len(bodies)):
-                for rise, leads_left in first_on_a_step(walks, i, ground):
-                    led[i, int(rise < 0), int(leads_left == (rise > 0))] += 1
         print(f"{high} by {deep} cm")
-        for body, depth, counts in zip(bodies, np.concatenate(inside).T, led, strict=True):
-            (wrong_up, up), (wrong_down, down) = counts.astype(int).tolist()
+        for body, depth, counts in zip(bodies, *climb(network, bodies, flights(deep, high)), strict=True):
+            (wrong_up, up), (wrong_down, down) = counts.tolist()
             print(f"  {body[0]:6} {body[1]:3.0f}: {np.mean(depth > 1):.4f} {depth.max():5.1f} cm;", end=" ")
             print(f"up {up} of {up + wrong_up}, down {down} of {down + wrong_down}")
+
+
+def climb(network: Network, bodies: Bodies, ground: Ground) -> tuple[Array, np.ndarray]:
+    """Of each of C bodies: cm by which a toe or heel is inside the ground in each frame (C, N), and how many
+    steps (C, 2, 2) up and down it takes otherwise than people do, and as they do.
+    """
+    soles = dict(zip(("heel", "toe"), sole_heights(network, leg_joints(network.skeleton)), strict=True))
+    inside: list[Array] = []
+    led = np.zeros((len(bodies), 2, 2), int)
+    for start in (0.0, -30.0, -60.0):
+        walks = Walks(network, bodies, ahead(1.6, terrain=ground), 1800, position=(0.0, start))
+        joints = [(walks.at(f"{side}_{joint}"), sole) for side in SIDES for joint, sole in soles.items()]
+        inside.append(np.max([ground(*at[..., ::2].T).T + sole - at[..., 1] for at, sole in joints], axis=0))
+        for i in range(len(bodies)):
+            for rise, leads_left in first_on_a_step(walks, i, ground):
+                led[i, int(rise < 0), int(leads_left == (rise > 0))] += 1
+    return np.concatenate(inside).T, led
 
 
 def first_on_a_step(walks: Walks, figure: int, ground: Ground) -> Iterator[tuple[float, bool]]:

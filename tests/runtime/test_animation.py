@@ -64,7 +64,7 @@ def test_the_input_row_follows_its_definition(hurtable) -> None:
 
 def test_the_pose_follows_from_the_prediction(network) -> None:
     character = ProceduralAnimation(network, foot_locking=False)
-    walk(character, 50, terrain=hills)
+    walk(character, 45, terrain=hills)
     old = character.state.joint_position[0].copy()
     pose = character.next_pose((0.5, 2.0), terrain=hills)
     y, layout = character._controller.y[0].astype(float), network.layout
@@ -80,7 +80,7 @@ def test_the_pose_follows_from_the_prediction(network) -> None:
     np.testing.assert_allclose(character.state.joint_rotation[0], rotations, atol=1e-6)
     legs, *_ = character._controller._legs
     others = np.setdiff1d(np.arange(layout.joints), [*legs.ravel(), 4, 5, 9, 10])
-    np.testing.assert_allclose(pose.positions[others], character.state.joint_position[0][others], atol=1e-9)
+    np.testing.assert_array_equal(pose.positions[others], character.state.joint_position[0][others])
     assert (pose.positions.shape, pose.rotations.shape) == ((31, 3), (31, 4))
 
 

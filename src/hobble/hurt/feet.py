@@ -79,8 +79,12 @@ def one_tread_a_stride(source: HealthyClip, effects: Effects, ground: Array) -> 
     """
     way = np.linalg.norm(np.gradient(source.path, axis=0), axis=1)
     slope = np.abs(np.gradient(ground)) / np.maximum(way, LEAST_WAY)
-    join = np.abs(np.subtract(*effects.changes["join"].T))
-    return np.asarray(smoothstep((slope - STAIRS[0]) / (STAIRS[1] - STAIRS[0])) * np.minimum(join, 1.0))
+    return smoothstep((slope - STAIRS[0]) / (STAIRS[1] - STAIRS[0])) * np.abs(_right_joins(effects))
+
+
+def _right_joins(effects: Effects) -> Array:
+    """(F,) how much a body goes step by step: up to 1 with a hurt right leg, down to -1 with a left one."""
+    return np.clip(effects.changes["join"][:, 1] - effects.changes["join"][:, 0], -1.0, 1.0)
 
 
 def ground_below(source: HealthyClip, feet: Sequence[HurtFoot]) -> Array:
@@ -217,20 +221,20 @@ def join_steps(
     old = [footprints_of(foot, stances) for foot, stances in zip(feet, source.stances, strict=True)]
     tilts = [_tilts(foot, stances) for foot, stances in zip(feet, source.stances, strict=True)]
     events = sorted((s.middle, side, i) for side in (0, 1) for i, s in enumerate(source.stances[side]))
+    join = _right_joins(effects)
     joined = False  # whether the last step was joined: then the next one goes to another step of the stairs
     for (_, side, i), (when, next_side, k) in itertools.pairwise(events):
         step, frame = old[next_side][k] - old[side][i], min(round(when), len(source) - 1)
         forward, rise = float(np.hypot(step[0], step[2])), float(step[1])
         tilt = abs(tilts[next_side][k])
-        join = effects.changes["join"][frame]
-        share, hurt = min(float(abs(join[1] - join[0])), 1.0), int(join[1] > join[0])
+        share, hurt = abs(float(join[frame])), int(join[frame] > 0)
         here, there = footprints[side][i], footprints[next_side][k]
         stairs = next_side != side and abs(rise) >= STAIR_CM
         stairs &= tilt <= 0.5 * abs(rise) / max(forward, FOOT_CM)
         ahead = quat.rotate(source.heading[frame], FORWARD)
         before, beside = float((there - here) @ ahead), step_by_step[frame]
         if joins := stairs and (next_side == hurt) == (rise > 0):
-            there += share * np.array([0.0, here[1] - there[1], 0.0])
+            there[1] += share * (here[1] - there[1])
             there -= beside * min(before, max(before / 2, BESIDE_CM)) * ahead
         elif stairs or joined:
             least = LEAD_CM + beside * (SHORT_LEAD_CM - LEAD_CM)

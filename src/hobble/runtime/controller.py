@@ -32,9 +32,9 @@ PULL_AHEAD = 0.5
 # With other networks, if the predicted movement goes against the target, this share of its backward part is
 # removed. If all of it were removed, the feet would slide.
 BACKWARD_LOSS = 0.5
-# And if the body fell behind the target, it is pushed by PUSH times the lack of speed, at most MOST_PUSH cm a
-# frame. Without a push, characters that were asked for a slow walk went backward, and did not come out of it.
-PUSH, MOST_PUSH = 1.0, 0.3
+# And if the body fell behind the target, it is pushed by what its speed lacks, at most MOST_PUSH cm a frame.
+# Without a push, characters that were asked for a slow walk went backward, and did not come out of it.
+MOST_PUSH = 0.3
 
 
 @njit
@@ -76,7 +76,7 @@ def _keep_up(
     last = len(past) - 1
     way_x, way_z = past[last, 0] - past[0, 0], past[last, 1] - past[0, 1]
     lack = 1.0 - (way_x * target_x + way_z * target_z) / (last * squared_speed)  # as a share of the target
-    more += min(max(PUSH * lack, 0.0), MOST_PUSH / np.sqrt(squared_speed))
+    more += min(max(lack, 0.0), MOST_PUSH / np.sqrt(squared_speed))
     return x + more * target_x, z + more * target_z
 
 

@@ -272,8 +272,8 @@ def _make_waves(
     return ground
 
 
-# Kind of ground -> arguments of `_make_steps`. steps: wide ones, of which each takes some strides. stairs: as
-# in houses, with landings between the flights.
+# Kind of ground -> arguments of `_make_steps`. steps: wide ones, with room for both feet. stairs: as in
+# houses, with landings between the flights.
 STEPS: dict[str, tuple[tuple[float, float], ...]] = {
     "steps": ((62, 130), (7, 16), (1, 5), (0, 0)),
     "stairs": ((28, 35), (13, 18), (3, 8), (130, 230)),

@@ -58,7 +58,6 @@ enum {
 #define PULL 0.2
 #define PULL_AHEAD 0.5
 #define BACKWARD_LOSS 0.5
-#define PUSH 1.0
 #define MOST_PUSH 0.3
 #define CARRIED_SHARE 0.5
 #define STANDING_SHARE 0.1
@@ -1648,7 +1647,7 @@ static void keep_up(double loss, const double *target, const double (*past)[2], 
     double more = -loss * smaller(0, move[0] * target[0] + move[1] * target[1]) / squared,
            way[2] = {past[last][0] - past[0][0], past[last][1] - past[0][1]},
            lack = 1 - (way[0] * target[0] + way[1] * target[1]) / (last * squared);
-    more += clamp(PUSH * lack, 0, MOST_PUSH / sqrt(squared));
+    more += clamp(lack, 0, MOST_PUSH / sqrt(squared));
     move[0] += more * target[0];
     move[1] += more * target[1];
 }
