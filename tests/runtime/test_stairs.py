@@ -6,7 +6,7 @@ import pytest
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 from hobble.runtime.animation import ProceduralAnimation
-from hobble.runtime.stairs import LANDS, OVER_CM, PACE, joins, leg_of_columns, more_cycles
+from hobble.runtime.stairs import LANDS, OVER_CM, joins, leg_of_columns, time_steps
 from tests.runtime.conftest import MakeNetwork
 
 EDGE = 200.0  # cm ahead of the start
@@ -18,9 +18,9 @@ def landing_phases(join: float, rise: float) -> Array:
     for _ in range(600):
         velocity = np.tile([0.0, 1.0], (16, 1))
         speed, each = np.ones(16), np.full(16, join)
-        more = more_cycles(lambda x, z: rise * (z > EDGE), place, velocity, speed, phase % 1, each)
-        before, phase = place[:, 1], phase + more**PACE / 80
-        place = place + velocity * (more ** (PACE - 1))[:, None]
+        pace, slower = time_steps(lambda x, z: rise * (z > EDGE), place, velocity, speed, phase % 1, each)
+        before, phase = place[:, 1], phase + pace / 80
+        place = place + velocity * slower[:, None]
         passed = (before < EDGE - OVER_CM) & (place[:, 1] >= EDGE - OVER_CM)
         at_edge = np.where(passed, phase % 1, at_edge)
     return at_edge
@@ -38,6 +38,19 @@ def test_the_good_leg_goes_first_up_and_the_bad_one_down(join: float, rise: floa
 def test_a_mild_injury_or_a_low_edge_changes_nothing(join: float, rise: float) -> None:
     reached = np.sort(landing_phases(join, rise))
     assert np.ptp(np.diff(reached)) < 0.02, "bodies reach the edge at all phases"
+
+
+@pytest.mark.parametrize(("join", "cycles"), [(1, 1.0), (0, 0.4)])
+def test_on_stairs_a_body_takes_a_tread_with_each_cycle(join: float, cycles: float) -> None:
+    place, phase, speed = np.zeros((8, 2)), np.arange(8) / 8, np.ones(8)
+    for frame in range(800):
+        velocity, stairs = np.tile([0.0, 1.0], (8, 1)), lambda x, z: 17.0 * np.floor(np.maximum(z, 100) / 29)
+        pace, slower = time_steps(stairs, place, velocity, speed, phase % 1, np.full(8, join))
+        place, phase, speed = place + velocity * slower[:, None], phase + pace / 72, slower
+        if frame == 300:
+            start = place[:, 1] / 29 - phase / cycles
+    # Neither a fixed speed nor a fixed pace stays in step for 500 frames.
+    assert np.abs(place[:, 1] / 29 - phase / cycles - start).max() < 0.5
 
 
 def test_only_legs_count_and_the_worse_one_goes_last_up(holden31: Skeleton) -> None:

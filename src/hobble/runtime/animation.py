@@ -24,7 +24,7 @@ from hobble.runtime.error_calculator import Compared, compare
 from hobble.runtime.ground import as_ground
 from hobble.runtime.layers import Layers
 from hobble.runtime.network_rows import ChannelValues
-from hobble.runtime.stairs import PACE, joins, leg_of_columns, more_cycles
+from hobble.runtime.stairs import joins, leg_of_columns, time_steps
 from hobble.runtime.trajectory import target_facing
 from hobble.runtime.variation import count_steps, mix_swing, vary_step
 from hobble.runtime.waypoints import Follower, Waypoint
@@ -306,9 +306,9 @@ class ProceduralAnimation:
             place, before = state.position[:, now], state.position[:, now - now // 2]
             speed = np.linalg.norm(place - before, axis=1) / (now // 2)
             heights = partial(heights_at, ground)
-            more = more_cycles(heights, place, velocity, speed, state.phase, join)
-            self._controller.pace *= more**PACE
-            velocity *= (more ** (PACE - 1))[:, None]
+            pace, slower = time_steps(heights, place, velocity, speed, state.phase, join)
+            self._controller.pace *= pace
+            velocity *= slower[:, None]
 
     def _choose_target(self, velocity: Any, facing: Any, gait: Any) -> tuple[Array, Array, Any]:
         """Target velocity (C, 2), facing (C, 2) and gait, from the caller or the waypoints.

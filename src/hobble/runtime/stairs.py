@@ -1,8 +1,9 @@
 """Stairs with a badly hurt leg: the good leg goes first up, the bad one down, as people do it.
 
 People slow down or hurry before a step, so that it comes as the right leg swings. So does the character:
-before an edge of the ground its target speed and its pace change. Nothing else is needed: the network steps
-over the edge with the leg that swings.
+before an edge of the ground its target speed and its pace change. On stairs it goes about one tread a cycle,
+so that both feet stand on each. Nothing else is needed: the network steps over the edge with the leg that
+swings.
 """
 
 from collections.abc import Callable, Sequence
@@ -14,15 +15,17 @@ from hobble.core.skeleton import Skeleton
 from hobble.core.smooth import smoothstep
 from hobble.hurt.effects import JOIN_AT, JOIN_FROM, LEFT, LEG_PARTS, RIGHT, part_of_link
 
-# An edge is looked for at this many points ahead, so many cm apart: the ground rises or falls by EDGE_CM or
-# more from one point to the next.
-POINTS, APART_CM, EDGE_CM = 32, 5.0, 4.0
+# Edges are looked for at POINTS points so many cm apart, EARLIER of them behind the body: the ground rises or
+# falls by EDGE_CM or more from one point to the next. Edges at most NEAR_CM away tell how deep treads are.
+POINTS, EARLIER, APART_CM, EDGE_CM, NEAR_CM = 44, 12, 5.0, 4.0, 80.0
 OVER_CM = 20.0  # as the first foot lands beyond an edge, the edge is this far ahead of the body
 CYCLE_FRAMES = 72.0  # length of a hurt body's gait cycle, about
 SLOWEST = 0.3  # cm a frame: slower bodies count as this fast
-# If the body should make f times as many cycles up to the edge, f is at most MOST or its inverse. Then the
-# change of phase has the factor f ** PACE, and the target speed f ** (PACE - 1).
-MOST, PACE = 2.5, 0.25
+TREADS = 1.2  # a cycle, at most
+# If the body should make f times as many cycles up to the edge (f is from 1 / MOST to MOST), the change of
+# phase has the factor f ** PACE, and the target speed f ** -SPEED, at most FASTEST. That is more than f asks
+# for, since a body follows its target speed slowly.
+MOST, PACE, SPEED, FASTEST = 3.0, 0.5, 3.0, 3.0
 LANDS = {LEFT: 0.5, RIGHT: 0.0}  # the phase in which a foot lands
 
 
@@ -49,30 +52,44 @@ def joins(severity: Array, leg: np.ndarray) -> Array:
     return np.asarray(right - left)
 
 
-def more_cycles(
+def time_steps(
     ground: Callable[[Array, Array], Array],
     place: Array,
     velocity: Array,
     speed: Array,
     phase: Array,
     join: Array,
-) -> Array:
-    """(C,) the factor by which bodies should make more gait cycles up to the next edge; 1 without an edge.
+) -> tuple[Array, Array]:
+    """Factors of the pace (C,) and the target velocity (C,) with which the right leg goes over edges first.
 
     ground: function from x, z (N,) to heights (N,). place: (C, 2) of the bodies. velocity: (C, 2) targets.
     speed: (C,) present speeds, cm a frame. phase: (C,). join: (C,) from `joins`.
     """
-    ahead = velocity / np.maximum(np.hypot(velocity[:, 0], velocity[:, 1]), 1e-6)[:, None]
-    far = APART_CM * np.arange(POINTS)
-    points = (place[:, None] + far[:, None] * ahead[:, None]).reshape(-1, 2)
+    target = np.maximum(np.hypot(velocity[:, 0], velocity[:, 1]), 1e-6)
+    far = APART_CM * np.arange(-EARLIER, POINTS - EARLIER)
+    points = (place[:, None] + far[:, None] * (velocity / target[:, None])[:, None]).reshape(-1, 2)
     rise = np.diff(ground(points[:, 0], points[:, 1]).reshape(-1, POINTS), axis=1)
-    edges = (np.abs(rise) >= EDGE_CM) & (far[1:] > OVER_CM)
-    each, first = np.arange(len(place)), edges.argmax(axis=1)
+    far, edges, each = far[1:], np.abs(rise) >= EDGE_CM, np.arange(len(place))
+    most = TREADS * _tread(far, edges & (far <= NEAR_CM)) / CYCLE_FRAMES
+    ahead = edges & (far > OVER_CM)
+    first = ahead.argmax(axis=1)
     # The right leg leads down if it is the bad one, and up if the left leg is.
     right_leads = (rise[each, first] > 0) == (join < 0)
     lands = np.where(right_leads, LANDS[RIGHT], LANDS[LEFT])
-    cycles = np.maximum((far[1 + first] - OVER_CM) / (np.maximum(speed, SLOWEST) * CYCLE_FRAMES), 0.05)
+    cycles = np.maximum((far[first] - OVER_CM) / (np.maximum(speed, SLOWEST) * CYCLE_FRAMES), 0.05)
     # The foot should land after one of these numbers of cycles: the one that needs the smallest change.
     factors = np.maximum((lands - phase)[:, None] % 1.0 + np.arange(3.0), 1e-3) / cycles[:, None]
     best = factors[each, np.abs(np.log(factors)).argmin(axis=1)]
-    return np.where(edges.any(axis=1), np.clip(best, 1 / MOST, MOST) ** np.abs(join), 1.0)
+    more = np.where(ahead.any(axis=1), np.clip(best, 1 / MOST, MOST) ** np.abs(join), 1.0)
+    slower = np.minimum(most / target, 1.0) ** np.abs(join)
+    return more**PACE, slower * np.minimum(more**-SPEED, FASTEST)
+
+
+def _tread(far: Array, edges: Array) -> Array:
+    """(C,) mean distance between edges, cm; infinite where there are fewer than two.
+
+    far: (N,) places. edges: (C, N) whether an edge is at each.
+    """
+    between = np.maximum(edges.sum(axis=1) - 1, 0)
+    deep = far[::-1][edges[:, ::-1].argmax(axis=1)] - far[edges.argmax(axis=1)]
+    return np.where(between > 0, deep / np.maximum(between, 1), np.inf)

@@ -90,7 +90,7 @@ enum {
 /* Networks and motion matching. */
 #define NEGLIGIBLE_SHARE 1e-7f
 #define FASTEST_PULL 0.002
-enum { POINTS = 32 }; /* where an edge of stairs is looked for */
+enum { POINTS = 44, EARLIER = 12 }; /* where edges of stairs are looked for */
 enum { SURROUNDING = 20, ROW = 0, SINCE = 1, OFFSETS = 2, OFFSETS_PER_JOINT = 12, BLOCK = 16 };
 
 static double smaller(double a, double b) { return a < b ? a : b; }
@@ -2328,10 +2328,23 @@ static int place(hobble *h, const hobble_ground *ground) {
     return error;
 }
 
+/* The mean distance between edges of stairs at most 80 cm ahead, cm; infinite if there are fewer than two.
+   edges: whether an edge is at each point. */
+static double tread(const int *edges, double apart) {
+    int first = -1, last = -1, count = 0;
+    for (int k = 1; k < POINTS; k++)
+        if (edges[k] && apart * (k - EARLIER) <= 80) {
+            if (count++ == 0) first = k;
+            last = k;
+        }
+    return count > 1 ? apart * (last - first) / (count - 1) : INFINITY;
+}
+
 /* Lets the right leg go first on stairs: see stairs.py, which has the same numbers. */
 static int time_steps(hobble *h, const hobble_ground *ground) {
-    static const double apart = 5, edge = 4, over = 20, cycle_frames = 72, slowest = 0.3, most = 2.5,
-                        pace = 0.25, join_from = 5, join_at = 7, lands[2] = {0.5, 0.0};
+    static const double apart = 5, edge = 4, over = 20, cycle_frames = 72, slowest = 0.3, treads = 1.2,
+                        most = 3, pace = 0.5, speed = 3, fastest = 3, join_from = 5, join_at = 7,
+                        lands[2] = {0.5, 0.0};
     const model *m = &h->model;
     int now = m->size[WINDOW], span = now / 2;
     for (int i = 0; i < h->characters; i++) {
@@ -2347,16 +2360,17 @@ static int time_steps(hobble *h, const hobble_ground *ground) {
         if (join == 0) continue;
         for (int k = 0; k < POINTS; k++)
             for (int a = 0; a < 2; a++)
-                h->points[2 * k + a] = c->position[now][a] + apart * k * (v[a] / size);
-        int first = 1, error = look_up(h, ground, POINTS);
+                h->points[2 * k + a] = c->position[now][a] + apart * (k - EARLIER) * (v[a] / size);
+        int edges[POINTS] = {0}, first = 1, error = look_up(h, ground, POINTS);
         if (error) return error;
-        while (first < POINTS
-               && !(fabs(h->heights[first] - h->heights[first - 1]) >= edge && apart * first > over))
-            first++;
+        for (int k = 1; k < POINTS; k++) edges[k] = fabs(h->heights[k] - h->heights[k - 1]) >= edge;
+        double slower = pow(smaller(treads * tread(edges, apart) / cycle_frames / size, 1), fabs(join));
+        for (int a = 0; a < 2; a++) v[a] *= slower;
+        while (first < POINTS && !(edges[first] && apart * (first - EARLIER) > over)) first++;
         if (first == POINTS) continue;
         double x = c->position[now][0] - c->position[now - span][0],
                z = c->position[now][1] - c->position[now - span][1];
-        double cycles = (apart * first - over) / (larger(hypot(x, z) / span, slowest) * cycle_frames);
+        double cycles = (apart * (first - EARLIER) - over) / (larger(hypot(x, z) / span, slowest) * cycle_frames);
         int right_leads = (h->heights[first] > h->heights[first - 1]) == (join < 0);
         double wait = lands[right_leads] - c->phase;
         wait -= floor(wait);
@@ -2366,7 +2380,7 @@ static int time_steps(hobble *h, const hobble_ground *ground) {
         }
         best = pow(clamp(best, 1 / most, most), fabs(join));
         c->pace *= pow(best, pace);
-        for (int a = 0; a < 2; a++) v[a] *= pow(best, pace - 1);
+        for (int a = 0; a < 2; a++) v[a] *= smaller(pow(best, -speed), fastest);
     }
     return HOBBLE_OK;
 }
