@@ -17,8 +17,9 @@ import numpy as np
 
 from hobble.core.errors import HobbleError
 from hobble.core.quat import Array
+from hobble.core.smooth import true_runs
 from hobble.measures.motion_quality import skating
-from hobble.measures.walks import feet_in_stance, foot_slide, largest_turn
+from hobble.measures.walks import SHORTEST_STANCE, STANCE, feet_in_stance, largest_turn
 from hobble.models.load import load_network
 from hobble.models.network import Network
 from hobble.models.pfnn import OPTIONS
@@ -44,6 +45,21 @@ LIMITS = {
     "largest_turn_degrees": 60.0,
     "foot_slide_cm": 2.0,
 }
+
+
+def foot_slide(toes: Array, contacts: Array) -> Array:
+    """(N,) how far the toe slides over the ground in each of N stances, cm.
+
+    The stances of the left foot come first. A stance is a run of at least SHORTEST_STANCE frames in which the
+    toe has contact. toes: (F, 2, 3) positions of the left and right toe, cm. contacts: (F, 4).
+    """
+    out = []
+    for side in range(2):
+        moved = np.linalg.norm(np.diff(toes[:, side, ::2], axis=0), axis=1)
+        for start, end in true_runs(contacts[:, 2 * side + 1] >= STANCE):
+            if end - start >= SHORTEST_STANCE:
+                out.append(moved[start : end - 1].sum())
+    return np.array(out)
 
 
 @dataclass(frozen=True)

@@ -5,24 +5,7 @@ import pytest
 
 from hobble.core import quat
 from hobble.core.skeleton import Skeleton, forward_kinematics
-from hobble.measures.walks import (
-    feet_in_stance,
-    foot_slide,
-    gait_measures,
-)
-
-
-def test_foot_slide_is_the_distance_that_the_toe_moves_in_stance() -> None:
-    frames = 40
-    contacts = np.zeros((frames, 4))
-    contacts[5:15, 1] = 1.0
-    contacts[20:22, 1] = 1.0  # too short to be a step
-    contacts[10:30, 3] = 0.6
-    toes = np.zeros((frames, 2, 3))
-    toes[:, 0, 0] = 0.3 * np.arange(frames)
-    toes[:, 1, 1] = np.arange(frames)  # rising is not sliding
-    np.testing.assert_allclose(foot_slide(toes, contacts), [0.3 * 9, 0.0], atol=1e-9)
-    assert feet_in_stance(contacts)[:, 0].sum() == 12
+from hobble.measures.walks import gait_measures
 
 
 def test_cadence_stance_and_step_length_of_a_known_walk_are_exact(holden31: Skeleton) -> None:

@@ -29,21 +29,6 @@ def feet_in_stance(contacts: Array) -> np.ndarray:
     return np.maximum(contacts[:, ::2], contacts[:, 1::2]) >= STANCE
 
 
-def foot_slide(toes: Array, contacts: Array) -> Array:
-    """(N,) how far the toe slides over the ground in each of N stances, cm.
-
-    The stances of the left foot come first. A stance is a run of at least SHORTEST_STANCE frames in which the
-    toe has contact. toes: (F, 2, 3) positions of the left and right toe, cm. contacts: (F, 4).
-    """
-    out = []
-    for side in range(2):
-        moved = np.linalg.norm(np.diff(toes[:, side, ::2], axis=0), axis=1)
-        for start, end in true_runs(contacts[:, 2 * side + 1] >= STANCE):
-            if end - start >= SHORTEST_STANCE:
-                out.append(moved[start : end - 1].sum())
-    return np.array(out)
-
-
 def largest_turn(rotations: Array) -> float:
     """Largest rotation of any joint from one frame to the next, degrees.
 
