@@ -6,13 +6,7 @@ import numpy as np
 import pytest
 
 from hobble.core.errors import InputError
-from hobble.labels.label_files import (
-    SourceTime,
-    read_footsteps,
-    read_gait,
-    read_gait_keys,
-    read_phase,
-)
+from hobble.labels.label_files import SourceTime, read_footsteps, read_gait, read_gait_keys, read_phase
 
 AT_120 = SourceTime(240, 120.0)
 

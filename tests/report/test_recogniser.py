@@ -15,11 +15,7 @@ from hobble.engine import SOURCES, compile_c
 from hobble.gait.cycles import measure_cycles
 from hobble.gait.profile import features, healthy_profile, profile_of_walk, read_people
 from hobble.gait.recognise import grade_walk, grader_of_all_people
-from hobble.report.character import (
-    PROFILE_IN_C,
-    measured_joints,
-    packed_statistics,
-)
+from hobble.report.character import PROFILE_IN_C, measured_joints, packed_statistics
 from tests.report.browser import Browser
 
 

@@ -17,10 +17,7 @@ from hobble.report import sections
 from hobble.report.character import opening_slider
 from hobble.report.gather import ReportMaterial
 from hobble.report.page import hints
-from hobble.report.parts import (
-    Chart,
-    embedded,
-)
+from hobble.report.parts import Chart, embedded
 from hobble.report.sections import TURN_EDGES
 from hobble.rows.clip_rows import load_clip_rows, save_clip_rows
 

@@ -15,10 +15,7 @@ from hobble.motion.make import make_clip
 from hobble.motion.root import RootFrames
 from hobble.terrain import Terrain
 from hobble.terrain.clip_fits import clip_fits, heights_under, sample_points
-from hobble.terrain.cycle_ground import (
-    distances,
-    fit_surfaces,
-)
+from hobble.terrain.cycle_ground import distances, fit_surfaces
 from hobble.terrain.patches import Patches
 
 from .conftest import database, figure, options, some_patches, walk

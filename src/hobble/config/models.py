@@ -143,8 +143,7 @@ class Configuration(Section):
     extends: Name | None = None
     dataset: Name = "synthetic"
     channels: tuple[ChannelName, ...] = Field(
-        (),
-        description="input channels of the network; clips with values of other channels are left out",
+        (), description="input channels of the network; clips with values of other channels are left out"
     )
     network_of: Name | None = Field(
         None, description="use the network of this other configuration instead of training one"
@@ -180,6 +179,5 @@ class SkeletonFile(SkeletonData):
     """A skeleton file. `hobble.core.skeleton.Skeleton` explains all keys but `maps`."""
 
     maps: dict[Name, dict[str, str]] = Field(
-        {},
-        description="for retargeting: name of another skeleton -> {joint of this one: joint of the other}",
+        {}, description="for retargeting: name of another skeleton -> {joint of this one: joint of the other}"
     )

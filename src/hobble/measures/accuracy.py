@@ -31,8 +31,7 @@ class Options(measure.SampleOptions):
     """The keys of this measurement in a configuration's section `evaluation`."""
 
     joints: Literal["all", "equivalent"] = Field(
-        "all",
-        description="`equivalent`: only the joints that have a counterpart on the skeleton holden31",
+        "all", description="`equivalent`: only the joints that have a counterpart on the skeleton holden31"
     )
     rollouts: tuple[Positive, ...] = Field(
         (1, 10, 60, 300), min_length=1, description="lengths of roll-outs, in frames"

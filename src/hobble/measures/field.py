@@ -51,10 +51,7 @@ OF_PATHS = {
     for path in ("circle", "square", "star")
     for unit, label in (("cm", "distance from a {}, cm"), ("degrees", "angle to a {}, degrees"))
 }
-OF_RESPONSE = {
-    "response_walk": "from standing to 1.2 m/s, s",
-    "response_jog": "from standing to 4.2 m/s, s",
-}
+OF_RESPONSE = {"response_walk": "from standing to 1.2 m/s, s", "response_jog": "from standing to 4.2 m/s, s"}
 HEADS = {
     "measure": "measure",
     "straight": "straight walk",

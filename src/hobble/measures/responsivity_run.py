@@ -164,11 +164,7 @@ def measure_responsivity(
 
 
 def laps_of_mode(
-    network: Network,
-    runtime: Runtime,
-    laps: int,
-    lap_seconds: float,
-    track: Sequence[Waypoint] = TRACK,
+    network: Network, runtime: Runtime, laps: int, lap_seconds: float, track: Sequence[Waypoint] = TRACK
 ) -> dict[str, Any]:
     """All laps in the mode of `runtime`. lap_seconds: simulated time after which a lap is stopped."""
     walked = walk_laps(network, runtime, laps, int(lap_seconds * FPS), track)
@@ -208,10 +204,7 @@ def parameter_counts(sizes: Sequence[int]) -> dict[str, int]:
 def run(inputs: MeasureInputs, options: Options) -> Outcome:
     """responsivity.json, and its laps as a table."""
     result = measure_responsivity(
-        load_network(inputs.weights),
-        options,
-        configuration=inputs.configuration,
-        runtime=inputs.runtime,
+        load_network(inputs.weights), options, configuration=inputs.configuration, runtime=inputs.runtime
     )
     reached = [
         f"{m['mode']}: {m['waypoints_reached']} of {m['waypoints']} waypoints" for m in result["modes"]

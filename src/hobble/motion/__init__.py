@@ -60,8 +60,7 @@ class MotionOptions(Section):
         "skeleton", description="retarget onto the skeleton's bone lengths, or keep each clip's own"
     )
     defects: Literal["repair", "leave"] = Field(
-        "repair",
-        description="mend and report broken frames and a floor off height 0, or leave both",
+        "repair", description="mend and report broken frames and a floor off height 0, or leave both"
     )
     accept_doubt: bool = Field(
         False, description="use clips that would be refused for a doubt (tilt, knees, sliding feet, height)"

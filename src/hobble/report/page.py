@@ -41,11 +41,7 @@ def render_report(
         material.name,
         [parts.SectionPart(0, parts.KeyFigures(key_figures(material)))],
         parts.join_sections([*measured_by(material, "section"), *own.own_sections(material, counted)]),
-        {
-            "hero": opening,
-            "playable": on_page,
-            "compare": compared,
-        },
+        {"hero": opening, "playable": on_page, "compare": compared},
         bundle,
         dataset=material.dataset,
         title=material.title or material.name,

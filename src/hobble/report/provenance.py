@@ -62,8 +62,7 @@ def git_commit(folder: Path) -> dict[str, Any] | None:
 
 
 def summarise_pipeline(
-    configuration: str,
-    stages: Mapping[str, Mapping[str, Iterable[str]]],
+    configuration: str, stages: Mapping[str, Mapping[str, Iterable[str]]]
 ) -> dict[str, Any]:
     """The content of `pipeline.json`.
 

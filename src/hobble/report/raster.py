@@ -138,11 +138,7 @@ class BodyRenderer:
         self._regions = [list(columns) for columns in regions] or [[] for _ in self._body.bones]
 
     def film(
-        self,
-        positions: Array,
-        rotations: Array,
-        camera: Callable[[int], Camera],
-        values: Array | None = None,
+        self, positions: Array, rotations: Array, camera: Callable[[int], Camera], values: Array | None = None
     ) -> list[Picture]:
         """A picture of every FRAME_STEP-th frame of a motion, as many as fit a whole number of times.
 

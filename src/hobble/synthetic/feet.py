@@ -315,13 +315,7 @@ def _frames(start: float, end: float) -> np.ndarray:
 
 
 def _swing(
-    foot: FootPoses,
-    here: Stance,
-    there: Stance,
-    path: PlannedPath,
-    style: Style,
-    side: int,
-    ground: Ground,
+    foot: FootPoses, here: Stance, there: Stance, path: PlannedPath, style: Style, side: int, ground: Ground
 ) -> None:
     """Set the frames of the swing from the stance `here` to the stance `there`."""
     start, end = here.leave, there.land

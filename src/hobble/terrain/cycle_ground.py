@@ -229,12 +229,7 @@ class CycleGround:
 
 
 def fit_cycle(
-    patches: Patches,
-    soles: Array,
-    contacts: Mask,
-    samples: Array,
-    kind: str,
-    options: FitOptions,
+    patches: Patches, soles: Array, contacts: Mask, samples: Array, kind: str, options: FitOptions
 ) -> CycleGround:
     """Fit the ground under one cycle and the frames around it, T frames together.
 

@@ -45,12 +45,7 @@ def test_a_later_line_counts_and_odd_ranges_are_reported_with_their_lines():
 
 @pytest.mark.parametrize(
     ("fps", "start", "expected"),
-    [
-        (120.0, 0, [0, 2, 4, 6]),
-        (120.0048, 3, [3, 5, 7, 9]),
-        (30.0, 0, [0, 0, 1, 1]),
-        (24.0, 0, [0, 0, 0, 1]),
-    ],
+    [(120.0, 0, [0, 2, 4, 6]), (120.0048, 3, [3, 5, 7, 9]), (30.0, 0, [0, 0, 1, 1]), (24.0, 0, [0, 0, 0, 1])],
 )
 def test_each_frame_maps_to_the_source_frame_of_the_same_time(fps, start, expected):
     assert source_rows(4, 100, motion(100, fps, start)).tolist() == expected
