@@ -19,6 +19,7 @@ from hobble.hurt.effects import JOIN_AT, JOIN_FROM, LEFT, LEG_PARTS, RIGHT, part
 # falls by EDGE_CM or more from one point to the next. Edges at most NEAR_CM away tell how deep treads are.
 POINTS, EARLIER, APART_CM, EDGE_CM, NEAR_CM = 44, 12, 5.0, 4.0, 80.0
 OVER_CM = 20.0  # as the first foot lands beyond an edge, the edge is this far ahead of the body
+FIRST_DOWN_CM = 17.0  # the same for the edge where stairs down begin, which the bad leg did not quite reach
 CYCLE_FRAMES = 72.0  # length of a hurt body's gait cycle, about
 SLOWEST = 0.3  # cm a frame: slower bodies count as this fast
 TREADS = 1.2  # a cycle, at most
@@ -71,12 +72,14 @@ def time_steps(
     rise = np.diff(ground(points[:, 0], points[:, 1]).reshape(-1, POINTS), axis=1)
     far, edges, each = far[1:], np.abs(rise) >= EDGE_CM, np.arange(len(place))
     most = TREADS * _tread(far, edges & (far <= NEAR_CM)) / CYCLE_FRAMES
-    ahead = edges & (far > OVER_CM)
+    begins = (rise < 0) & ~(edges & (far <= FIRST_DOWN_CM)).any(axis=1, keepdims=True)
+    over = np.where(begins, FIRST_DOWN_CM, OVER_CM)
+    ahead = edges & (far > over)
     first = ahead.argmax(axis=1)
     # The right leg leads down if it is the bad one, and up if the left leg is.
     right_leads = (rise[each, first] > 0) == (join < 0)
     lands = np.where(right_leads, LANDS[RIGHT], LANDS[LEFT])
-    cycles = np.maximum((far[first] - OVER_CM) / (np.maximum(speed, SLOWEST) * CYCLE_FRAMES), 0.05)
+    cycles = np.maximum((far[first] - over[each, first]) / (np.maximum(speed, SLOWEST) * CYCLE_FRAMES), 0.05)
     # The foot should land after one of these numbers of cycles: the one that needs the smallest change.
     factors = np.maximum((lands - phase)[:, None] % 1.0 + np.arange(3.0), 1e-3) / cycles[:, None]
     best = factors[each, np.abs(np.log(factors)).argmin(axis=1)]
