@@ -88,7 +88,7 @@ def time_steps(
     return more**PACE, slower * np.minimum(more**-SPEED, FASTEST)
 
 
-def _tread(far: Array, edges: Array) -> Array:
+def _tread(far: Array, edges: np.ndarray) -> Array:
     """(C,) mean distance between edges, cm; infinite where there are fewer than two.
 
     far: (N,) places. edges: (C, N) whether an edge is at each.
