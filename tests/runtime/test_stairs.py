@@ -13,7 +13,7 @@ EDGE = 200.0  # cm ahead of the start
 
 
 def landing_phases(join: float, rise: float) -> Array:
-    """(16,) phases of bodies that begin at 16 phases, as the edge of the ground is as near as it should be."""
+    """(16,) phases of bodies that begin at 16 phases, as the edge of the ground is as near as it should."""
     over = FIRST_DOWN_CM if rise < 0 else OVER_CM
     place, phase, at_edge = np.zeros((16, 2)), np.arange(16) / 16, np.full(16, np.nan)
     for _ in range(600):
