@@ -5,7 +5,7 @@ import pytest
 
 from hobble.channels.channel import ClipSource
 from hobble.channels.guarding import CHANNEL
-from hobble.hurt import Hurt
+from hobble.hurt import Hurt, version
 from hobble.hurt.effects import part_of_link
 from hobble.hurt.hurt_clip import hurt_clip
 from hobble.hurt.version import ARMS, SEVERITY_TOLERANCE, UNCUT_SECONDS, hurt_version, schedule_severities
@@ -31,6 +31,13 @@ def test_hurt_versions_of_the_synthetic_clips_hurt_all_thirty_links(root, holden
     assert seconds.min() > 2
     parts = [part_of_link(holden31, link).name for link in holden31.links]
     assert min(s for s, part in zip(seconds, parts, strict=True) if part in ("thigh", "shank")) > 14
+
+
+def test_the_versions_of_a_clip_use_each_card_once(holden31) -> None:
+    cards = [version.CARDS_OF_PART.get(part_of_link(holden31, link).name, 1) for link in holden31.links]
+    options = Hurt(at_once=1, severities=(10.0,))
+    made = [schedule_severities(holden31, 1080, 60.0, options, "a", i) for i in range(sum(cards))]
+    assert (np.sum(made, axis=(0, 1)) / 10_800).tolist() == cards
 
 
 def test_a_version_has_the_options_links_and_never_too_many_at_once(holden31) -> None:

@@ -24,8 +24,7 @@ from hobble.labels.label_files import whole_frame
 from hobble.labels.phase import find_cycles
 
 # Part of the body -> number of cards of each of its links. Links of other parts have one card.
-CARDS_OF_PART = {"hip": 3, "thigh": 3, "shank": 3, "foot": 3, "back": 2, "upper arm": 2, "forearm": 2}
-GOLDEN = (math.sqrt(5) - 1) / 2  # its multiples, modulo 1, spread evenly over 0..1
+CARDS_OF_PART = {"hip": 3, "thigh": 5, "shank": 5, "foot": 5, "back": 2}
 FURTHER_LINKS = 0.25  # share of the stretches in which further links hurt as well, if `at_once` allows it
 # Share of the stretches in which an arm hurts as well, if `at_once` allows it. People swing their arms in
 # very different ways. If few people in the data have a hurt arm, a network takes the way in which these few
@@ -51,10 +50,10 @@ def schedule_severities(
 
     The version is divided into stretches. In each stretch the link of the next card hurts. For half of the
     stretch it has the highest severity, because a network learns most from it, for the other half another
-    one. In a short stretch it has only one of the two. All versions of a data set use the same deck.
-    `version_number` decides with which card a version begins, so that all cards are used about equally
-    often. `clip` and the option `seed` decide which links hurt besides, and at which severities. Raises
-    HobbleError for an unknown link.
+    one. In a short stretch it has only one of the two. All versions of a data set use the same deck, and a
+    version of a clip goes on where the one before it stopped. So all cards are used about equally often in
+    the versions of one clip, too. `clip` and the option `seed` decide which links hurt besides, and at which
+    severities. Raises HobbleError for an unknown link.
     """
     rng = np.random.default_rng([options.seed, zlib.crc32(clip.encode())])
     deck = _make_deck(skeleton, options)
@@ -62,10 +61,10 @@ def schedule_severities(
     out = np.zeros((frames, len(skeleton.links)), np.float32)
     highest = max(options.severities)
     lower_severities = sorted(set(options.severities) - {highest}) or [highest]
-    first = int(math.modf((version_number + 1) * GOLDEN)[0] * len(deck))
-    edges = np.round(np.linspace(0, frames, 1 + _stretch_count(frames, options.seconds * fps))).astype(int)
+    stretches = _stretch_count(frames, options.seconds * fps)
+    edges = np.round(np.linspace(0, frames, 1 + stretches)).astype(int)
     for i, (begin, end) in enumerate(itertools.pairwise(edges.tolist())):
-        hurt = [deck[(first + i) % len(deck)]]
+        hurt = [deck[(version_number * stretches + i) % len(deck)]]
         if options.at_once > 1 and rng.random() < FURTHER_LINKS:
             hurt += rng.permutation(deck)[: rng.integers(1, options.at_once)].tolist()
         if arms and len(hurt) < options.at_once and rng.random() < ARM_TOO:
