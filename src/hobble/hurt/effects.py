@@ -96,13 +96,13 @@ ADDED_CHANGES: dict[str, dict[str, float]] = {
     },
     "thigh": {
         "speed": 0.645, "stride": 1.09, "turn": 0.03, "push": 0.12, "vault": 0.24, "crouch": 9.8,
-        "lift": 0.05, "lift_sound": 0.15, "push_sound": 0.16, "strike": 0.92, "list": -1.1, "arm": 0.65,
+        "lift": 0.05, "lift_sound": 0.15, "push_sound": 0.12, "strike": 0.92, "list": -1.1, "arm": 0.65,
         "arm_sound": 0.85, "forward": -1.0, "width": -0.02, "side": 2.1, "back": 0.93, "off": -0.14,
         "off_sound": 0.056, "land_sound": -0.098,
     },
     "shank": {
         "speed": 0.556, "stride": 1.04, "turn": 0.6, "push": 0.14, "lift": 0.29, "lift_sound": 0.38,
-        "push_sound": 0.39, "strike": 0.09, "crouch": 13.6, "off_sound": -0.02, "width": 0.085, "out": 0.051,
+        "push_sound": 0.32, "strike": 0.09, "crouch": 13.6, "off_sound": -0.02, "width": 0.085, "out": 0.051,
         "arm": 0.65, "arm_sound": 0.85, "forward": -6.1, "side": -0.2, "list": -1.3, "back": 0.71,
         "off": -0.093, "land_sound": -0.104,
     },
