@@ -152,16 +152,15 @@ class NamedDataset:
     def hurt_versions(self) -> dict[str, int]:
         """Name of each hurt version -> its number among all hurt versions of the data set, from 0.
 
-        The versions of a clip have successive numbers, so that the links that hurt in them are spread evenly
+        Only clips in which the values of the channel HURT_CHANNEL are 0 get hurt versions. Those of a clip
+        have successive numbers, so that the links that hurt in them are spread evenly
         (`hobble.hurt.version.schedule_severities`).
-        Only clips in which the values of the channel HURT_CHANNEL are 0 get hurt versions.
         """
         if self.settings.hurt is None:
             return {}
         healthy = [clip for clip in self.listed if self.is_neutral(clip, HURT_CHANNEL)]
-        counts = {clip: self.hurt_options(clip).versions for clip in healthy}
-        names = (f"{clip}_hurt{turn}" for clip in healthy for turn in range(1, counts[clip] + 1))
-        return {name: number for number, name in enumerate(names)}
+        versions = ((clip, 1 + k) for clip in healthy for k in range(self.hurt_options(clip).versions))
+        return {f"{clip}_hurt{turn}": number for number, (clip, turn) in enumerate(versions)}
 
     def hurt_options(self, clip: str) -> Hurt:
         """Options of a clip's hurt versions: the section `hurt`, changed by the clip's entry."""

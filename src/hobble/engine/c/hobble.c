@@ -2342,9 +2342,9 @@ static double tread(const int *edges, double apart) {
 
 /* Lets the right leg go first on stairs: see stairs.py, which has the same numbers. */
 static int time_steps(hobble *h, const hobble_ground *ground) {
-    static const double apart = 5, edge = 4, cycle_frames = 72, slowest = 0.3, treads = 1.2,
-                        most = 3, pace = 0.5, speed = 3, fastest = 3, join_from = 5, join_at = 7,
-                        lands[2] = {0.5, 0.0};
+    static const double apart = 5, edge = 4, over_edge = 20, first_down = 17,
+                        cycle_frames = 72, slowest = 0.3, treads = 1.2, most = 3, pace = 0.5, speed = 3,
+                        fastest = 3, join_from = 5, join_at = 7, lands[2] = {0.5, 0.0};
     const model *m = &h->model;
     int now = m->size[WINDOW], span = now / 2;
     for (int i = 0; i < h->characters; i++) {
@@ -2366,11 +2366,11 @@ static int time_steps(hobble *h, const hobble_ground *ground) {
         for (int k = 1; k < POINTS; k++) edges[k] = fabs(h->heights[k] - h->heights[k - 1]) >= edge;
         double slower = pow(smaller(treads * tread(edges, apart) / cycle_frames / size, 1), fabs(join));
         for (int a = 0; a < 2; a++) v[a] *= slower;
-        double over = 20, first_down = 17;
+        double over = over_edge;
         int on_stairs = 0;
         for (int k = 1; k < POINTS && apart * (k - EARLIER) <= first_down; k++) on_stairs |= edges[k];
         for (; first < POINTS; first++) {
-            over = !on_stairs && h->heights[first] < h->heights[first - 1] ? first_down : 20;
+            over = !on_stairs && h->heights[first] < h->heights[first - 1] ? first_down : over_edge;
             if (edges[first] && apart * (first - EARLIER) > over) break;
         }
         if (first == POINTS) continue;
