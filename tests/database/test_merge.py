@@ -93,8 +93,9 @@ def test_training_may_use_every_fourth_frame(rows_of, tmp_path):
     rows = {name: rows_of(name, 40, None, seed=i) for i, name in enumerate("abcd")}
     splits = {"a": "train", "b": "held_out", "c": "train", "d": "train"}
     hurt = {"c": "a", "d": "a"}
-    write_database(tmp_path / "db", rows, splits, sources=hurt, hurt_every=2, every=4, **OPTIONS)
-    kept = [range(60, 100, 4), range(60, 100), range(60, 100, 8), range(64, 100, 8)]
+    steps = {"c": 2, "d": 3}
+    write_database(tmp_path / "db", rows, splits, sources=hurt, hurt_every=steps, every=4, **OPTIONS)
+    kept = [range(60, 100, 4), range(60, 100), range(60, 100, 8), range(64, 100, 12)]
     expected = [(clip, frame) for clip, frames in enumerate(kept) for frame in frames]
     np.testing.assert_array_equal(read_all(tmp_path / "db"), expected)
 

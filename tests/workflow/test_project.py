@@ -33,7 +33,7 @@ def test_a_hurt_version_has_the_mood_of_its_clip(base: Path) -> None:
     (base / "config/both.yaml").write_text("extends: one\nchannels: [mood, injury]\n")
     project = Project(base, {})
     values = project.dataset("mine")
-    assert [values.is_neutral(clip, "mood") for clip in ("a_hurt1", "b_hurt1")] == [True, False]
+    assert [values.is_neutral(clip, "mood") for clip in ("a_hurt1", "b_hurt12")] == [True, False]
     source = channel("mood").make_source(values.channel_source("b_hurt1", "mood"))
     assert not channel("mood").is_neutral(source)
     plain, moods = ("a", "a_mirror"), ("a", "a_mirror", "b", "b_mirror")

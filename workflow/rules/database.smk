@@ -72,8 +72,8 @@ rule database_merge:
         local_phases=lambda w: has_local_phases(w.channels),
         # Hurt version -> the healthy clip from which it is made.
         sources=lambda w: healthy_originals(splits_of(w)),
-        # Training uses every n-th row of hurt versions; this is n.
-        hurt_every=lambda w: dataset(w).hurt_row_step,
+        # Hurt version -> n: training uses every n-th of its rows.
+        hurt_every=lambda w: {clip: dataset(w).row_step(clip) for clip in healthy_originals(splits_of(w))},
         options=lambda w: plain(dataset(w).settings, "database", Merging.model_fields),
         code=lambda w: package.code(
             "database_merge",

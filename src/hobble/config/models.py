@@ -69,10 +69,13 @@ class ClipEntry(Section):
     )
     share: PositiveFloat = Field(1.0, description="of a generated clip: length relative to the other ones")
     source_fps: PositiveFloat | None = Field(None, description="overrides the file's Frame Time")
-    hurt: Annotated[float, Field(ge=0, le=9, allow_inf_nan=False)] | None = Field(
+    hurt: Annotated[float, Field(ge=0, le=60, allow_inf_nan=False)] | None = Field(
         None,
         description="total length of the clip's hurt versions, as a multiple of the clip's length; overrides "
         "`hurt.versions` and `hurt.longest` of the data set",
+    )
+    hurt_every: Annotated[int, Field(ge=1, le=60)] | None = Field(
+        None, description="training uses every n-th frame of the clip's hurt versions; overrides `hurt.every`"
     )
     loops: Positive | None = Field(None, description="overrides motion.loops")
 

@@ -27,7 +27,7 @@ LONGEST_CLIP_NAME = 200
 # The mirror image of a clip, and a hurt version of it, in which some links of the body are injured, have its
 # name with an ending. It is their original.
 MIRROR_SUFFIX = "_mirror"
-HURT_SUFFIX = re.compile(r"_hurt([1-9])$")
+HURT_SUFFIX = re.compile(r"_hurt([1-9]\d?)$")
 
 
 def original(clip: str) -> str:

@@ -64,7 +64,7 @@ def plan_clips(
     clips: Mapping[str, RowSource],
     splits: Mapping[str, str],
     sources: Mapping[str, str],
-    hurt_every: int,
+    hurt_every: Mapping[str, int],
     every: int,
 ) -> tuple[list[dict[str, Any]], Outline, int]:
     """The entries of the clips for the manifest, the outline of the first clip, and the visits to each row.
@@ -89,7 +89,8 @@ def plan_clips(
         if name in sources:
             entry["source"] = sources[name]
             if splits[name] == "train":
-                step, start = every * hurt_every, every * (versions[sources[name]] % hurt_every)
+                steps = hurt_every.get(name, 1)
+                step, start = every * steps, every * (versions[sources[name]] % steps)
                 versions[sources[name]] += 1
         if step > 1:
             entry |= {"every": step, "first_row": start}
@@ -291,7 +292,7 @@ def write_database(
     channels: Sequence[str],
     local_phases: bool = False,
     sources: Mapping[str, str] | None = None,
-    hurt_every: int = 1,
+    hurt_every: Mapping[str, int] | None = None,
     every: int = 1,
     joint_weight: float,
     dtype: Precision = "float32",
@@ -303,14 +304,14 @@ def write_database(
     clips: clip name -> its rows, or the file with them. splits: clip name -> "train" or "held_out". channels:
     the network's input channels, in the order of their columns. local_phases: whether the network uses those
     that the rows have. sources: name of a hurt version -> name of the healthy clip from which it was
-    computed. every: training uses only each `every`-th row of a clip, and of these only each `hurt_every`-th
-    of a hurt version. joint_weight: factor of the standardised joints in the network's input. dtype: type of
-    the numbers on disk. seed: seed of the order of the rows. chunk_bytes: rough size of a chunk. The
-    statistics are those of the training clips. The same rows and options give the same bytes.
-    Raises HobbleError if no training clip has rows, InputError if the rows of the clips differ in columns or
-    joints.
+    computed. every: training uses only each `every`-th row of a clip. hurt_every: name of a hurt version ->
+    n: of these rows, training uses only each n-th. joint_weight: factor of the standardised joints in the
+    network's input. dtype: type of the numbers on disk. seed: seed of the order of the rows. chunk_bytes:
+    rough size of a chunk. The statistics are those of the training clips. The same rows and options give the
+    same bytes. Raises HobbleError if no training clip has rows, InputError if the rows of the clips differ in
+    columns or joints.
     """
-    entries, first, visits = plan_clips(clips, splits, sources or {}, hurt_every, every)
+    entries, first, visits = plan_clips(clips, splits, sources or {}, hurt_every or {}, every)
     layout, rows = first.layout.with_channels(channels, local_phases), sum(entry["rows"] for entry in entries)
     manifest = Manifest(
         folder="",

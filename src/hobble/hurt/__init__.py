@@ -26,7 +26,7 @@ class Hurt(Section):
         description="for half of its time an injury has the highest of these, for the other half another "
         "one; a short injury has only one of the two",
     )
-    versions: Annotated[int, Field(ge=0, le=9)] = Field(1, description="hurt versions of each healthy clip")
+    versions: Annotated[int, Field(ge=0, le=60)] = Field(1, description="hurt versions of each healthy clip")
     every: Annotated[int, Field(ge=1, le=60)] = Field(
         1,
         description="training uses every n-th frame of the hurt versions. If `versions` is n, too, training "

@@ -164,8 +164,9 @@ class NamedDataset:
 
     def hurt_options(self, clip: str) -> Hurt:
         """Options of a clip's hurt versions: the section `hurt`, changed by the clip's entry."""
-        options, amount = self.settings.hurt, self.entry(clip).hurt
+        options, amount, every = self.settings.hurt, self.entry(clip).hurt, self.entry(clip).hurt_every
         assert options is not None
+        options = options.model_copy(update={"every": every or options.every})
         if amount is None:
             return options
         # The entry gives the total length of all versions, as a multiple of the clip's length. `longest` is
@@ -517,10 +518,9 @@ class NamedDataset:
         """The clips from which the autoencoder learns: without mirrors, hurt versions and held-out clips."""
         return [clip for clip in self.listed if clip not in self.settings.held_out]
 
-    @property
-    def hurt_row_step(self) -> int:
-        """The number n such that training uses every n-th row of the hurt versions."""
-        return self.settings.hurt.every if self.settings.hurt else 1
+    def row_step(self, clip: str) -> int:
+        """The number n such that training uses every n-th row of the clip: 1, except for a hurt version."""
+        return self.hurt_options(clip).every if is_hurt_version(clip) else 1
 
 
 def healthy_originals(clips: Iterable[str]) -> dict[str, str]:

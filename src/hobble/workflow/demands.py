@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from hobble.channels import channel
-from hobble.core.clip_files import is_hurt_version, original
+from hobble.core.clip_files import original
 from hobble.labels.local_phase import PARTS
 from hobble.measures.measure import Cost, measure_named
 from hobble.models.blend import BlendedOptions
@@ -251,7 +251,7 @@ def expected_seconds(configuration: NamedConfiguration, training: Recipe) -> flo
     """Seconds of a training with this recipe on the machine of STEP_SECONDS."""
     dataset = configuration.dataset
     frames = sum(
-        _frames(dataset, original(clip)) / (dataset.hurt_row_step if is_hurt_version(clip) else 1)
+        _frames(dataset, original(clip)) / dataset.row_step(clip)
         for clip, split in configuration.splits.items()
         if split == "train"
     )
