@@ -102,7 +102,7 @@ ADDED_CHANGES: dict[str, dict[str, float]] = {
     },
     "shank": {
         "speed": 0.556, "stride": 1.04, "turn": 0.6, "push": 0.14, "lift": 0.29, "lift_sound": 0.38,
-        "push_sound": 0.32, "strike": 0.09, "crouch": 13.6, "off_sound": -0.02, "width": 0.085, "out": 0.051,
+        "push_sound": 0.32, "strike": 0.09, "crouch": 13.6, "off_sound": -0.02, "width": 0.105, "out": 0.051,
         "arm": 0.65, "arm_sound": 0.85, "forward": -6.1, "side": -0.2, "list": -1.3, "back": 0.71,
         "off": -0.093, "land_sound": -0.104,
     },
@@ -110,7 +110,7 @@ ADDED_CHANGES: dict[str, dict[str, float]] = {
         "speed": 0.62, "stride": 1.05, "turn": 0.42, "push": 0.63, "lift": 0.61, "lift_sound": 0.16,
         "push_sound": 0.27, "strike": 0.58, "side": 4.8, "list": -3.6, "toe_out": 14.0, "off": -0.12,
         "off_sound": 0.05, "land_sound": -0.082,
-        "width": -0.015, "vault_sound": 0.96, "arm": 0.65, "arm_sound": 0.85, "forward": -7.1,
+        "width": -0.02, "vault_sound": 0.96, "arm": 0.65, "arm_sound": 0.85, "forward": -7.1,
     },
     "back": {
         "speed": 0.68, "push": 0.6, "push_sound": 0.6, "stride": 1.12, "forward": 17.0, "crouch": 9.0,
@@ -143,7 +143,7 @@ RATIOS = (
 TIMING_FACTOR = 1.85
 # Part -> length of the step onto the hurt foot, as a ratio to the healthy clip. It replaces the ratio of the
 # profiles.
-STEP_RATIO = {"hip": 0.79, "thigh": 0.18, "shank": 0.4, "foot": 0.41}
+STEP_RATIO = {"hip": 0.79, "thigh": 0.18, "shank": 0.37, "foot": 0.41}
 
 
 @functools.cache

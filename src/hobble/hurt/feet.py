@@ -72,13 +72,11 @@ def shorten(
     return path[:1] + np.concatenate([np.zeros((1, 3)), np.cumsum(steps, axis=0)]) - path
 
 
-def one_tread_a_stride(source: HealthyClip, effects: Effects, ground: Array) -> Array:
+def one_tread_a_stride(effects: Effects, slope: Array) -> Array:
     """(F,) 0 to 1, how much a stride goes from one tread of steep stairs to the next, not over two.
 
-    So a body with a badly hurt leg makes half of the way. ground: (F,) height of the ground below the body.
+    So a body with a badly hurt leg makes half of the way. slope: (F,) from `slope_below`.
     """
-    way = np.linalg.norm(np.gradient(source.path, axis=0), axis=1)
-    slope = np.abs(np.gradient(ground)) / np.maximum(way, LEAST_WAY)
     return smoothstep((slope - STAIRS[0]) / (STAIRS[1] - STAIRS[0])) * np.abs(_right_joins(effects))
 
 
@@ -99,6 +97,12 @@ def ground_below(source: HealthyClip, feet: Sequence[HurtFoot]) -> Array:
         points += zip((stance.middle for stance in stances), heights - np.median(heights), strict=True)
     when, height = np.array(sorted(points)).T
     return gaussian(np.interp(np.arange(len(source)), when, height), SLOPE_SECONDS * source.clip.fps)
+
+
+def slope_below(source: HealthyClip, ground: Array) -> Array:
+    """(F,) rise or fall of the ground (F,) below the body, as a share of the way; 0 if the body stands."""
+    way = np.linalg.norm(np.gradient(source.path, axis=0), axis=1)
+    return np.abs(np.gradient(ground)) / np.maximum(way, LEAST_WAY)
 
 
 def reduce_pitch(source: HealthyClip, effects: Effects, side: int) -> HurtFoot:
@@ -269,7 +273,8 @@ def move_foot(
         least_ball[frames] = sole + rise + np.minimum(ball[frames] - sole, 0.0)
         ankle[frames] = new + quat.rotate(yaw[frames], foot.ankle[frames] - old)
     along = quat.rotate(yaw, foot.ball - foot.ankle)
-    lift, tilts = effects.ratio("lift")[:, side], _tilts(foot, stances)
+    # To the side and backward a healthy knee bends little. So a limp shows there only if it is lifted less.
+    lift, tilts = effects.ratio("lift")[:, side] ** (1 + source.aside), _tilts(foot, stances)
     out = effects.changes["out"][:, side] * source.leg_length * OUTWARD_SIGN[side]
     outward = quat.rotate(source.heading, np.array([1.0, 0.0, 0.0])) * out[:, None]
     for i, (here, there) in enumerate(itertools.pairwise(stances)):

@@ -20,6 +20,7 @@ from hobble.hurt.feet import (
     place_footprints,
     reduce_pitch,
     shorten,
+    slope_below,
 )
 from hobble.hurt.healthy_clip import (
     HealthyClip,
@@ -108,10 +109,11 @@ def hurt_clip(
         raise HobbleError(f"clip {clip.name} has bones that change their length, so it cannot be hurt")
     source = measure_healthy_clip(clip, labels)
     changes = effects_of_severities(clip.skeleton, severity, clip.fps, guarding)
-    timing = retime(source, changes)
     feet = [reduce_pitch(source, changes, side) for side in (LEFT, RIGHT)]
     ground = np.zeros(len(clip)) if flat else ground_below(source, feet)
-    step_by_step = one_tread_a_stride(source, changes, ground)
+    slope = slope_below(source, ground)
+    timing = retime(source, changes, slope)
+    step_by_step = one_tread_a_stride(changes, slope)
     shift = shorten(source, changes, timing.stride_ratio, ground, step_by_step)
     footprints = place_footprints(source, changes, shift, feet)
     if not flat:
@@ -372,10 +374,10 @@ def _stiffer_landing(bend: Array, changes: Effects, source: HealthyClip, side: i
 
     Uphill, and in steps backward, a knee is bent far as its foot lands away from the body, and straightens
     as the body follows. A hurt foot lands near the body, and its leg stays as stiff as on the level: of the
-    bend beyond LANDING_BEND, it keeps only the share by which it still lifts the foot.
+    bend beyond LANDING_BEND, it keeps only the square of the share by which it still lifts the foot.
     """
     lift, step = np.minimum(changes.ratio("lift")[:, side], 1.0), changes.changes["step"][:, side]
-    stiff = (1 - lift) * np.clip(-step / NEARER, 0.0, 1.0)
+    stiff = (1 - lift**2) * np.clip(-step / NEARER, 0.0, 1.0)
     less = np.zeros(len(bend))
     for stance in source.stances[side]:
         frames = slice(stance.land, round(stance.middle) + 1)

@@ -11,6 +11,7 @@ import numpy as np
 from scipy.interpolate import PchipInterpolator
 
 from hobble.core.quat import Array
+from hobble.core.smooth import smoothstep
 from hobble.hurt.effects import LEFT, RIGHT, Effects
 from hobble.hurt.healthy_clip import HealthyClip, interpolate_values
 from hobble.labels.clip_labels import Labels
@@ -21,8 +22,10 @@ LEAST_SHARE = 0.57
 # A jog gets only this share of a change of stride time, because gravity sets how long its flight lasts.
 JOG_STRIDE = 0.15
 JOG_SHIFT = 0.6  # a jog gets only this share of the shifts of landing and leaving, as its stances are short
-# Crouched steps and those to a side or backward get this share: a foot that hardly rolls off hides a limp.
-OTHER_SHIFT = 1.2
+# Steps to a side or backward, and in turns of TURN radians a second or more, get ASIDE_SHIFT: a foot that
+# hardly rolls off hides a limp. Crouched steps and those on a slope of STEEP or more get LOW_SHIFT, since a
+# network sees few of them, and learns less of their limp.
+ASIDE_SHIFT, TURN, LOW_SHIFT, STEEP = 1.2, 1.0, 1.5, 0.12
 # While the hurt foot stands, the body hurries less than the sound foot, which so lands further ahead of the
 # hips. The path gets this share of an early landing.
 PATH_SHARE = 0.5
@@ -44,8 +47,11 @@ class Timing:
     stride_ratio: Array = field(repr=False)
 
 
-def retime(source: HealthyClip, effects: Effects) -> Timing:
-    """Slow the cadence, and shift each foot's landing and leaving within the cycle, as `effects` says."""
+def retime(source: HealthyClip, effects: Effects, slope: Array) -> Timing:
+    """Slow the cadence, and shift each foot's landing and leaving within the cycle, as `effects` says.
+
+    slope: (F,) of the ground, as a share of the way.
+    """
     stride_ratio = 1 + effects.changes["stride"] * (1 - (1 - JOG_STRIDE) * source.jog_share)
     # The new frame that would show each source frame if no landing or leaving was shifted.
     cadence_times = np.concatenate([[0.0], np.cumsum((stride_ratio[1:] + stride_ratio[:-1]) / 2)])
@@ -53,7 +59,10 @@ def retime(source: HealthyClip, effects: Effects) -> Timing:
     new = np.arange(int(cadence_times[-1] + 1e-6) + 1, dtype=float)
     legs, landings = [], []
     shares = 1 - (1 - JOG_SHIFT) * source.jog_share
-    shares += (OTHER_SHIFT - 1) * np.maximum(source.aside, source.low)
+    turning = np.abs(np.gradient(np.unwrap(2 * np.arctan2(source.heading[:, 2], source.heading[:, 0]))))
+    aside = np.maximum(source.aside, smoothstep(turning * source.clip.fps / TURN))
+    low = np.maximum(source.low, smoothstep(slope / STEEP))
+    shares *= 1 + np.maximum((ASIDE_SHIFT - 1) * aside, (LOW_SHIFT - 1) * low)
     for side in (LEFT, RIGHT):
         # Delays in new frames, for each source frame. Shifts stay below MOST_SHIFT.
         land, off = (
