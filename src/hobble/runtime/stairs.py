@@ -26,7 +26,7 @@ TREADS = 1.2  # a cycle, at most
 # If the body should make f times as many cycles up to the edge (f is from 1 / MOST to MOST), the change of
 # phase has the factor f ** PACE, and the target speed f ** -SPEED, at most FASTEST. That is more than f asks
 # for, since a body follows its target speed slowly.
-MOST, PACE, SPEED, FASTEST = 3.0, 0.5, 3.0, 3.0
+MOST, PACE, SPEED, FASTEST = 3.0, 0.5, 4.0, 3.0
 LANDS = {LEFT: 0.5, RIGHT: 0.0}  # the phase in which a foot lands
 
 
