@@ -126,9 +126,8 @@ def test_the_sound_side_does_less_and_the_body_guards(made, hurting, part) -> No
     healthy = profile_of_walk(measure_clip(clip))
     severity, lean = hurting(len(clip), {LEG[part]: 10.0}), {}
     for guarding in (0.0, 0.6, 1.0):
-        limp = profile_of_walk(
-            measure_clip(hurt_clip(clip, labels, severity, None, flat, guarding=guarding).clip)
-        )
+        hurt = hurt_clip(clip, labels, severity, flat=flat, guarding=guarding).clip
+        limp = profile_of_walk(measure_clip(hurt))
         assert limp["range knee_flexion_L"] <= 1.0 * healthy["range knee_flexion_L"]
         assert limp["range ankle_height_L"] <= 0.9 * healthy["range ankle_height_L"]
         assert limp["range pelvis_turn_left"] <= healthy["range pelvis_turn_left"] + 1.0

@@ -164,15 +164,15 @@ class NamedDataset:
 
     def hurt_options(self, clip: str) -> Hurt:
         """Options of a clip's hurt versions: the section `hurt`, changed by the clip's entry."""
-        options, amount, every = self.settings.hurt, self.entry(clip).hurt, self.entry(clip).hurt_every
+        options, entry = self.settings.hurt, self.entry(clip)
         assert options is not None
-        options = options.model_copy(update={"every": every or options.every})
-        if amount is None:
-            return options
-        # The entry gives the total length of all versions, as a multiple of the clip's length. `longest` is
-        # the length of one version.
-        versions = math.ceil(amount)
-        return options.model_copy(update={"versions": versions, "longest": amount / max(versions, 1)})
+        changes: dict[str, float] = {"every": entry.hurt_every or options.every}
+        if entry.hurt is not None:
+            # The entry gives the total length of all versions, as a multiple of the clip's length. `longest`
+            # is the length of one version.
+            versions = math.ceil(entry.hurt)
+            changes |= {"versions": versions, "longest": entry.hurt / max(versions, 1)}
+        return options.model_copy(update=changes)
 
     def entry(self, clip: str) -> ClipEntry:
         """The entry of a clip. For a mirror or a hurt version it is the entry of its original."""
