@@ -189,13 +189,21 @@ export const createView = (canvas, home, draw, { marks = 4000 } = {}) => {
   view.land = createLand(scene, view.simple);
   view.marks = createMarks(scene, marks);
 
+  const drawSky = () => {
+    const { width, height } = canvas, sky = context.createLinearGradient(0, 0, 0, height);
+    sky.addColorStop(0, `rgb(${view.paint.zenith})`);
+    sky.addColorStop(.7, `rgb(${view.paint.sky})`);
+    context.fillStyle = sky;
+    context.fillRect(0, 0, width, height);
+  };
   const paint = (now) => {
     if (drawnFor < 0) return; // the browser has not laid out the canvas yet
     if (view.W < 4 || view.H < 4) return; // the window is opening or closing
     const gl = getRenderer();
     if (!gl) {
-      context.fillStyle = "gray";
-      context.fillText("This browser draws no 3D pictures (WebGL is off).", 16 * scale, 24 * scale);
+      drawSky();
+      [context.fillStyle, context.font] = [`rgb(${view.paint.ink})`, `${15 * scale}px sans-serif`];
+      context.fillText("This browser draws no 3D pictures (WebGL is off).", 16 * scale, 28 * scale);
       return;
     }
     if (drawnFor !== level) setSize();
@@ -212,12 +220,7 @@ export const createView = (canvas, home, draw, { marks = 4000 } = {}) => {
     gl.setScissor(0, 0, w, h);
     view.marks.upload();
     gl.render(scene, camera);
-    // Draw the sky first, so that saved pictures and films have one.
-    const sky = context.createLinearGradient(0, 0, 0, h);
-    sky.addColorStop(0, `rgb(${view.paint.zenith})`);
-    sky.addColorStop(.7, `rgb(${view.paint.sky})`);
-    context.fillStyle = sky;
-    context.fillRect(0, 0, w, h);
+    drawSky(); // first, so that saved pictures and films have one
     context.drawImage(glCanvas, 0, glCanvas.height - h, w, h, 0, 0, w, h);
     view.milliseconds += .1 * (performance.now() - before - view.milliseconds);
   };
