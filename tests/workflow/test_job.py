@@ -6,7 +6,6 @@ import subprocess
 import sys
 from pathlib import Path
 
-import psutil
 import pytest
 
 from hobble.workflow import lifetime
@@ -26,9 +25,7 @@ with job(SimpleNamespace(log=[{log!r}], rule="stage")) as log:
 
 def started(log: str | Path, work: str, run: int | None = None) -> subprocess.Popen[str]:
     """A job of the run with that process id, after its work has begun."""
-    environment = dict(os.environ)
-    if run is not None:
-        environment[lifetime.RUN_VARIABLE] = f"{run} {psutil.Process(run).create_time()}"
+    environment = os.environ | ({lifetime.RUN_VARIABLE: str(run)} if run else {})
     command = [sys.executable, "-c", SCRIPT.format(log=str(log), work=work)]
     pipe = subprocess.PIPE
     process = subprocess.Popen(command, env=environment, stdout=pipe, stderr=subprocess.STDOUT, text=True)
@@ -38,8 +35,7 @@ def started(log: str | Path, work: str, run: int | None = None) -> subprocess.Po
 
 def ended(log: str | Path, work: str) -> tuple[int, str]:
     """Status and output of a job."""
-    process = started(log, work)
-    said = process.communicate()[0]
+    said = (process := started(log, work)).communicate()[0]
     return process.returncode, said.strip()
 
 
@@ -74,6 +70,11 @@ def test_a_job_that_ignores_signals_ends_soon_after_its_run(tmp_path: Path) -> N
     assert process.wait(timeout=5) == -signal.SIGKILL
     assert process.stdout.read() == ""
     run.wait()
+
+
+def test_a_job_goes_on_while_the_clock_is_set(tmp_path: Path) -> None:
+    clock = "import psutil; psutil._psplatform.boot_time = time.time; time.sleep(2); print('done')"
+    assert started(tmp_path / "job.log", clock, os.getpid()).communicate()[0] == "done\n"
 
 
 def test_a_stopped_job_cleans_up_silently_even_if_it_is_told_twice(tmp_path: Path) -> None:

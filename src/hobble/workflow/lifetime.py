@@ -20,19 +20,14 @@ import psutil
 from hobble.core.errors import HobbleError, InputError
 
 LOCK = Path(".snakemake/run.lock")
-RUN_VARIABLE = "HOBBLE_RUN"  # environment variable of a job: "<process id> <start time>" of its run
+RUN_VARIABLE = "HOBBLE_RUN_PID"  # environment variable of a job: the process id of its run
 CHECK_SECONDS = 0.5  # time between two checks of a job that its run exists
 GRACE_SECONDS = 2.0  # time for a job to clean up after SIGTERM
 
 
 def set_run_variable() -> None:
-    """Put the id and start time of this run's process into the environment, which jobs inherit."""
-    os.environ[RUN_VARIABLE] = this_process()
-
-
-def this_process() -> str:
-    """Id and start time of this process, in the form that RUN_VARIABLE has."""
-    return f"{os.getpid()} {psutil.Process().create_time()}"
+    """Put the id of this run's process into the environment, which jobs inherit."""
+    os.environ[RUN_VARIABLE] = str(os.getpid())
 
 
 def ensure_user_name() -> None:
@@ -114,7 +109,7 @@ def ends_with_run() -> Iterator[None]:
             earlier_handlers[number] = signal.signal(number, _exit)
     done = threading.Event()
     if run := os.environ.get(RUN_VARIABLE):
-        threading.Thread(target=_exit_with_run, args=(run, done), daemon=True).start()
+        threading.Thread(target=_exit_with_run, args=(int(run), done), daemon=True).start()
     try:
         yield
     finally:
@@ -134,27 +129,18 @@ def _exit(number: int, frame: FrameType | None) -> None:
     raise SystemExit(128 + number)  # not caught by `except Exception`, and runs every `finally`
 
 
-def _exit_with_run(run: str, done: threading.Event) -> None:
+def _exit_with_run(run: int, done: threading.Event) -> None:
     """End this process with SIGTERM when its run has ended.
 
     Python cannot handle SIGTERM while compiled code runs. So SIGKILL ends the process if it still runs after
-    GRACE_SECONDS. run: value of RUN_VARIABLE. done: set when the job has ended.
+    GRACE_SECONDS. run: process id of the run. done: set when the job has ended.
     """
-    pid, _, began = run.partition(" ")
-    while not done.wait(CHECK_SECONDS):
-        if not _is_alive(int(pid), began):
-            os.kill(os.getpid(), signal.SIGTERM)
-            if not done.wait(GRACE_SECONDS):
-                os.kill(os.getpid(), signal.SIGKILL)
-
-
-def _is_alive(pid: int, began: str) -> bool:
-    """Whether process `pid` runs and started at `began`.
-
-    The start time is compared because a new process may have got the id of one that has ended.
-    """
-    try:
-        process = psutil.Process(pid)
-        return str(process.create_time()) == began and process.status() != psutil.STATUS_ZOMBIE
-    except psutil.NoSuchProcess:
-        return False
+    with contextlib.suppress(psutil.NoSuchProcess):
+        process = psutil.Process(run)
+        # `is_running` tells a new process with the same id by its start, and stays true if the clock is set.
+        while process.is_running() and process.status() != psutil.STATUS_ZOMBIE:
+            if done.wait(CHECK_SECONDS):
+                return
+    os.kill(os.getpid(), signal.SIGTERM)
+    if not done.wait(GRACE_SECONDS):
+        os.kill(os.getpid(), signal.SIGKILL)

@@ -111,7 +111,7 @@ def _environment(machines: Machines, threads: int) -> dict[str, str]:
     variables = {**os.environ, "OMP_NUM_THREADS": str(threads)}
     variables["PYTHONPATH"] = os.pathsep.join(path for path in sys.path if path)
     if machines.nodes == 1:
-        variables[lifetime.RUN_VARIABLE] = lifetime.this_process()
+        variables[lifetime.RUN_VARIABLE] = str(os.getpid())
     else:  # other machines cannot see whether this process runs
         variables.pop(lifetime.RUN_VARIABLE, None)
     return variables
