@@ -210,17 +210,6 @@ class ProceduralAnimation:
         """(6,) seconds of each step of the last frame: prepare, input, insert, predict, output, update."""
         return self._controller.seconds
 
-    @property
-    def predicted_turns(self) -> tuple[Array, Array]:
-        """Joint rotations (C, J, 3) predicted in the last frame, relative to the root, and root yaw (C,).
-
-        Both are copies, in the form that `hobble.runtime.caller_targets.world_rotations` takes. Unlike in
-        the pose, there is no limit on how far a joint turns in a frame.
-        """
-        controller = self._controller
-        turns = controller.y[:, self.network.layout.y_joint_rotation].reshape(self.characters, -1, 3)
-        return turns.copy(), controller.yaw.copy()
-
     def next_pose(
         self,
         target_velocity: Any = None,
