@@ -301,7 +301,7 @@ CANDIDATES = 8  # the pose comes from one of this many rows with the nearest pha
 NEAR_PHASE = 1 / 32  # largest difference in phase between two poses that are mixed, in cycles
 # A healthy row is moved less often than a hurt one, by this factor. The injury is learnt from the hurt rows;
 # in the healthy ones moved poses only make the healthy walk less accurate.
-HEALTHY_SHARE = 1 / 7
+HEALTHY_SHARE = 1 / 20
 
 
 class VersionPoses(Augmentation):
