@@ -59,7 +59,7 @@ class Recipe(Section):
     version_poses: Annotated[float, Field(ge=0, le=1)] = Field(
         0.0,
         description="share of the samples of hurt versions whose input pose is moved towards or away from "
-        "that of the healthy clip; a seventh of this share of healthy samples moves towards a hurt version",
+        "that of the healthy clip; a twentieth of this share of healthy samples moves towards a hurt version",
     )
     other_paces: Annotated[float, Field(ge=1, le=2)] = Field(
         1.0,
