@@ -273,8 +273,8 @@ def test_only_the_pose_moves_and_only_in_a_share_of_the_rows(healthy_and_hurt: D
     columns = np.r_[x_pose(healthy_and_hurt.layout.blocks("x"))]
     assert np.array_equal(np.delete(x, columns, axis=1), np.delete(block.x, columns, axis=1))
     names, changed = np.array(healthy_and_hurt.clips)[block.clip], (x != block.x).any(axis=1)
-    for name, share in (("walk_hurt1", 0.7), ("walk", 0.1)):
-        assert changed[names == name].mean() == pytest.approx(share, abs=0.03)
+    for name, share in (("walk_hurt1", 0.7), ("walk", 0.035)):
+        assert changed[names == name].mean() == pytest.approx(share, abs=0.01)
 
 
 def test_a_row_gets_the_pose_of_its_own_phase(tmp_path: Path) -> None:
