@@ -33,10 +33,10 @@ def started(log: str | Path, work: str, run: int | None = None) -> subprocess.Po
     return process
 
 
-def ended(log: str | Path, work: str) -> tuple[int, str]:
+def ended(log: str | Path, work: str, run: int | None = None) -> tuple[int, str]:
     """Status and output of a job."""
-    said = (process := started(log, work)).communicate()[0]
-    return process.returncode, said.strip()
+    process = started(log, work, run)
+    return process.wait(), process.stdout.read().strip()
 
 
 @pytest.mark.parametrize("log", ["/dev/full", "/proc/nowhere/job.log"])
@@ -74,7 +74,7 @@ def test_a_job_that_ignores_signals_ends_soon_after_its_run(tmp_path: Path) -> N
 
 def test_a_job_goes_on_while_the_clock_is_set(tmp_path: Path) -> None:
     clock = "import psutil; psutil._psplatform.boot_time = time.time; time.sleep(2); print('done')"
-    assert started(tmp_path / "job.log", clock, os.getpid()).communicate()[0] == "done\n"
+    assert ended(tmp_path / "job.log", clock, os.getpid()) == (0, "done")
 
 
 def test_a_stopped_job_cleans_up_silently_even_if_it_is_told_twice(tmp_path: Path) -> None:

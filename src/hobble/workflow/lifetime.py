@@ -137,7 +137,7 @@ def _exit_with_run(run: int, done: threading.Event) -> None:
     """
     with contextlib.suppress(psutil.NoSuchProcess):
         process = psutil.Process(run)
-        # `is_running` tells a new process with the same id by its start, and stays true if the clock is set.
+        # `is_running` is false if another process has got the id. It stays true if the clock is set.
         while process.is_running() and process.status() != psutil.STATUS_ZOMBIE:
             if done.wait(CHECK_SECONDS):
                 return
