@@ -97,19 +97,19 @@ ADDED_CHANGES: dict[str, dict[str, float]] = {
     "thigh": {
         "speed": 0.645, "stride": 1.09, "turn": 0.03, "push": 0.12, "vault": 0.24, "crouch": 9.8,
         "lift": 0.05, "lift_sound": 0.15, "push_sound": 0.12, "strike": 0.92, "list": -1.1, "arm": 0.65,
-        "arm_sound": 0.85, "forward": -1.0, "width": -0.02, "side": 2.1, "back": 0.93, "off": -0.14,
-        "off_sound": 0.056, "land_sound": -0.098,
+        "arm_sound": 0.85, "forward": -1.0, "width": -0.02, "side": 2.1, "back": 0.93, "off": -0.122,
+        "off_sound": 0.049, "land_sound": -0.075,
     },
     "shank": {
         "speed": 0.556, "stride": 1.04, "turn": 0.6, "push": 0.14, "lift": 0.29, "lift_sound": 0.38,
-        "push_sound": 0.32, "strike": 0.09, "crouch": 13.6, "off_sound": -0.02, "width": 0.105, "out": 0.051,
+        "push_sound": 0.32, "strike": 0.09, "crouch": 13.6, "off_sound": -0.017, "width": 0.105, "out": 0.051,
         "arm": 0.65, "arm_sound": 0.85, "forward": -6.1, "side": -0.2, "list": -1.3, "back": 0.71,
-        "off": -0.093, "land_sound": -0.104,
+        "off": -0.081, "land_sound": -0.09,
     },
     "foot": {
         "speed": 0.62, "stride": 1.05, "turn": 0.42, "push": 0.63, "lift": 0.61, "lift_sound": 0.16,
-        "push_sound": 0.27, "strike": 0.58, "side": 4.8, "list": -3.6, "toe_out": 14.0, "off": -0.12,
-        "off_sound": 0.05, "land_sound": -0.082,
+        "push_sound": 0.27, "strike": 0.58, "crouch": 2.5, "side": 4.8, "list": -3.6, "toe_out": 14.0, "off": -0.104,
+        "off_sound": 0.044, "land_sound": -0.071,
         "width": -0.02, "vault_sound": 0.96, "arm": 0.65, "arm_sound": 0.85, "forward": -7.1,
     },
     "back": {

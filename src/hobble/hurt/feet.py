@@ -274,7 +274,7 @@ def move_foot(
         ankle[frames] = new + quat.rotate(yaw[frames], foot.ankle[frames] - old)
     along = quat.rotate(yaw, foot.ball - foot.ankle)
     # To the side and backward a healthy knee bends little, so a limp shows only if the foot is lifted less.
-    lift, tilts = effects.ratio("lift")[:, side] ** (1 + source.aside), _tilts(foot, stances)
+    lift, tilts = effects.ratio("lift")[:, side] ** (1 + 2 * source.aside), _tilts(foot, stances)
     out = effects.changes["out"][:, side] * source.leg_length * OUTWARD_SIGN[side]
     outward = quat.rotate(source.heading, np.array([1.0, 0.0, 0.0])) * out[:, None]
     for i, (here, there) in enumerate(itertools.pairwise(stances)):

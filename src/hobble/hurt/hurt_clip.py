@@ -40,7 +40,7 @@ MOST_VAULT = np.radians(14.0)  # a knee straightens by at most this, so a crouch
 # first value already, and not at all if by more than the second. So a crouching figure does not sink.
 CROUCHED = np.radians([40.0, 90.0])
 # A knee is bent by up to this more as its foot lands than later in the stance, radians, on flat ground.
-LANDING_BEND = np.radians(15.0)
+LANDING_BEND = np.radians(10.0)
 NEARER = 0.1  # a foot lands near the body if its step is shorter by this share of the healthy step
 # Radians of knee flexion. Below the first value, the bend is too small to tell in which direction the knee
 # points. Above the second value, the bend is large enough. Between them, it counts partly.

@@ -21,11 +21,11 @@ from hobble.labels.phase import dropped_frames, find_cycles, phase_of_footsteps
 LEAST_SHARE = 0.57
 # A jog gets only this share of a change of stride time, because gravity sets how long its flight lasts.
 JOG_STRIDE = 0.15
-JOG_SHIFT = 0.6  # a jog gets only this share of the shifts of landing and leaving, as its stances are short
+JOG_SHIFT = 0.7  # a jog gets only this share of the shifts of landing and leaving, as its stances are short
 # Steps to a side or backward, and in turns of TURN radians a second or more, get ASIDE_SHIFT: a foot that
 # hardly rolls off hides a limp. Crouched steps and those on a slope of STEEP or more get LOW_SHIFT, since a
 # network sees few of them, and learns less of their limp.
-ASIDE_SHIFT, TURN, LOW_SHIFT, STEEP = 1.2, 1.0, 1.5, 0.12
+ASIDE_SHIFT, TURN, LOW_SHIFT, STEEP = 1.4, 1.0, 1.7, 0.12
 # While the hurt foot stands, the body hurries less than the sound foot, which so lands further ahead of the
 # hips. The path gets this share of an early landing.
 PATH_SHARE = 0.5
