@@ -20,7 +20,7 @@ from hobble.hurt.effects import JOIN_AT, JOIN_FROM, LEFT, LEG_PARTS, RIGHT, part
 POINTS, EARLIER, APART_CM, EDGE_CM, NEAR_CM = 44, 12, 5.0, 4.0, 80.0
 OVER_CM = 20.0  # as the first foot lands beyond an edge, the edge is this far ahead of the body
 FIRST_DOWN_CM = 14.0  # the same where stairs down begin: with 17 or 20 the leg landed before that edge
-CYCLE_FRAMES = 72.0  # length of a hurt body's gait cycle, about
+CYCLE_FRAMES = 80.0  # length of a hurt body's gait cycle on stairs, about
 SLOWEST = 0.3  # cm a frame: slower bodies count as this fast
 TREADS = 1.2  # a cycle, at most
 # If the body should make f times as many cycles up to the edge (f is from 1 / MOST to MOST), the change of

@@ -2343,7 +2343,7 @@ static double tread(const int *edges, double apart) {
 /* Lets the right leg go first on stairs: see stairs.py, which has the same numbers. */
 static int time_steps(hobble *h, const hobble_ground *ground) {
     static const double apart = 5, edge = 4, over_edge = 20, first_down = 14,
-                        cycle_frames = 72, slowest = 0.3, treads = 1.2, most = 3, pace = 0.5, speed = 4,
+                        cycle_frames = 80, slowest = 0.3, treads = 1.2, most = 3, pace = 0.5, speed = 4,
                         fastest = 3, join_from = 5, join_at = 7, lands[2] = {0.5, 0.0};
     const model *m = &h->model;
     int now = m->size[WINDOW], span = now / 2;
