@@ -5,7 +5,7 @@
 A linear classifier has the 52 numbers of a profile (`hobble.gait.profile`) of windows of 4 s, all on the
 skeleton holden31. Each person and each figure is left out of its training in turn. Prints the area under the
 curve (.5: cannot tell), and the numbers in which the two differ most. For comparison, the same of each person
-beside the others.
+beside the others. And how people, walker and character move (`MANNER`).
 """
 
 import argparse
@@ -16,10 +16,15 @@ import numpy as np
 from derive_gait import OTHERS, REFERENCE, parts
 from limps import read
 
+from hobble.core import quat
+from hobble.core.clip import Clip
 from hobble.core.quat import Array
+from hobble.core.skeleton import Skeleton
 from hobble.gait.cycles import WalkCycles, measure_cycles
 from hobble.gait.profile import PROFILE_NAMES, mirror_profile, profile_of_walk
 from hobble.gait.recognise import SHRINKAGE, learn, windows_with_cycles
+from hobble.measures.motion_quality import FOOT_POINTS, joints_with, skating, standing_heights
+from hobble.measures.walks import bend
 from hobble.models.load import load_network
 from hobble.motion.skeleton_file import load_skeleton
 from hobble.runtime.animation import ProceduralAnimation
@@ -29,6 +34,9 @@ from hobble.synthetic.plan import Segment
 SPEEDS = (1.5, 1.75, 2.0, 2.25, 2.5)  # cm a frame, of the figures
 SECONDS = 30
 SKELETON = Path("config/skeletons/holden31.yaml")
+# In a cycle: largest minus smallest forward speed of the hips over their mean, range of the head's pitch and
+# of the elbow, rise of a toe. In a frame: turn of a joint in the world, and how far a standing toe skates.
+MANNER = ("speed", "nod", "elbow", "toe, cm", "turn", "skates, cm")
 
 
 def profiles(walks: list[list[WalkCycles]]) -> Array:
@@ -38,30 +46,49 @@ def profiles(walks: list[list[WalkCycles]]) -> Array:
     return np.array([[profile[name] for name in PROFILE_NAMES] for profile in both])
 
 
-def captured(folder: Path) -> list[list[Array]]:
-    """The profiles of each clip of each person."""
-    names = [REFERENCE[person] + OTHERS[person] for person in REFERENCE]
-    return [[profiles([parts(read(folder, name)[0])]) for name in of_person] for of_person in names]
+def captured(folder: Path) -> list[list[Clip]]:
+    """The clips of each person."""
+    return [[read(folder, name)[0] for name in REFERENCE[who] + OTHERS[who]] for who in REFERENCE]
 
 
-def generated() -> list[Array]:
-    """The profiles of clips of the generated walker, one for each speed."""
+def manner(skeleton: Skeleton, positions: Array, rotations: Array) -> list[float]:
+    """The numbers of MANNER. positions: (F, J, 3). rotations: (F, J, 4), both in the world."""
+    at = {role: positions[:, skeleton.role(role)].astype(float) for role in skeleton.roles}
+    steps, head = np.diff(at["hips"][:, ::2], axis=0), rotations[:, skeleton.role("head")].astype(float)
+    nod = np.degrees(np.arcsin(quat.rotate(head, np.array([0.0, 0.0, 1.0]))[:, 1]))
+    elbow = bend(*(at[f"right_{joint}"] for joint in ("shoulder", "elbow", "wrist")))
+    of_cycles = []
+    for cycle in measure_cycles(skeleton, positions).right:
+        s = slice(cycle.start, cycle.end)
+        travel = steps[s].sum(axis=0) / np.linalg.norm(steps[s].sum(axis=0))
+        speed, toe = steps[s] @ travel, at["right_toe"][s, 1]
+        of_cycles.append((np.ptp(speed) / speed.mean(), np.ptp(nod[s]), np.ptp(elbow[s]), np.ptp(toe)))
+    feet = positions[:, joints_with(skeleton, FOOT_POINTS)].astype(float)
+    slid = skating(feet, standing_heights(feet))[:, 1::2].mean()
+    turn = np.degrees(quat.angle(rotations[:-1].astype(float), rotations[1:].astype(float))).mean()
+    return [*np.median(of_cycles, axis=0).tolist(), float(turn), float(slid)]
+
+
+def generated() -> list[Clip]:
+    """Clips of the generated walker, one for each speed."""
     skeleton, frames = load_skeleton(SKELETON).skeleton, SECONDS * 60
     plans = [[Segment("walk", 60 * speed, seconds=SECONDS)] for speed in SPEEDS]
-    clips = [walk_from_plan(f"w{i}", skeleton, p, frames, "flat", 60, i).clip for i, p in enumerate(plans)]
-    return [profiles([parts(clip)]) for clip in clips]
+    return [walk_from_plan(f"w{i}", skeleton, p, frames, "flat", 60, i).clip for i, p in enumerate(plans)]
 
 
-def figures(weights: Path) -> list[Array]:
-    """The profiles of a network's healthy character, one for each speed."""
+def figures(weights: Path) -> tuple[Skeleton, Array, Array]:
+    """The skeleton of a network's healthy character, its positions (F, C, J, 3) and rotations (F, C, J, 4) in
+    the world, at C speeds.
+    """
     network = load_network(weights)
     character = ProceduralAnimation(network, characters=len(SPEEDS), variation=1.0)
     targets = np.column_stack([np.zeros(len(SPEEDS)), SPEEDS])
     poses = [character.next_pose(targets, gait="walk") for _ in range((5 + SECONDS) * 60)][300:]
-    positions = np.array([pose.positions for pose in poses])
     assert network.skeleton is not None
-    walks = [measure_cycles(network.skeleton, positions[:, i]) for i in range(len(SPEEDS))]
-    return [profiles([[p for _, p in windows_with_cycles(walk, len(poses))]]) for walk in walks]
+    positions, rotations = (
+        np.array([getattr(p, name) for p in poses]) for name in ("positions", "rotations")
+    )
+    return network.skeleton, positions, rotations
 
 
 def told_apart(name: str, real: list[Array], made: list[Array], shown: int = 12) -> None:
@@ -85,13 +112,28 @@ def main() -> None:
     parser.add_argument("folder", type=Path, metavar="CMU_FOLDER", help="folder of the CMU clips, as .bvh")
     parser.add_argument("--network", type=Path, metavar="WEIGHTS.npz")
     options = parser.parse_args()
-    clips = captured(options.folder)
+    of_people, walker = captured(options.folder), generated()
+    clips = [[profiles([parts(clip)]) for clip in of_person] for of_person in of_people]
     people = [np.concatenate(of_person) for of_person in clips]
-    told_apart("generated clips", people, generated())
+    told_apart("generated clips", people, [profiles([parts(clip)]) for clip in walker])
     for i, person in enumerate(REFERENCE):
         told_apart(f"the person {person}", [*people[:i], *people[i + 1 :]], clips[i], shown=0)
+    moves = {
+        f"the person {person}": [manner(c.skeleton, c.positions, c.global_rotations) for c in of_person]
+        for person, of_person in zip(REFERENCE, of_people, strict=True)
+    }
+    moves["walker"] = [manner(c.skeleton, c.positions, c.global_rotations) for c in walker]
     if options.network:
-        told_apart("the healthy character", people, figures(options.network))
+        skeleton, positions, rotations = figures(options.network)
+        each = range(positions.shape[1])
+        walks = [measure_cycles(skeleton, positions[:, i]) for i in each]
+        of_windows = [profiles([[p for _, p in windows_with_cycles(w, len(positions))]]) for w in walks]
+        told_apart("the healthy character", people, of_windows)
+        moves["character"] = [manner(skeleton, positions[:, i], rotations[:, i]) for i in each]
+    print(f"{'':16}" + "".join(f"{name:>16}" for name in MANNER))
+    for name, rows in moves.items():
+        low, high = np.min(rows, axis=0), np.max(rows, axis=0)
+        print(f"{name:16}" + "".join(f"{f'{a:.2f} to {b:.2f}':>16}" for a, b in zip(low, high, strict=True)))
 
 
 if __name__ == "__main__":
