@@ -5,7 +5,7 @@
 A linear classifier has the 52 numbers of a profile (`hobble.gait.profile`) of windows of 4 s, all on the
 skeleton holden31. Each person and each figure is left out of its training in turn. Prints the area under the
 curve (.5: cannot tell), and the numbers in which the two differ most. For comparison, the same of each person
-beside the others. And how people, walker and character move (`MANNER`).
+beside the others. And how people, walker and character move (`MANNER`; the character without variation).
 """
 
 import argparse
@@ -76,12 +76,12 @@ def generated() -> list[Clip]:
     return [walk_from_plan(f"w{i}", skeleton, p, frames, "flat", 60, i).clip for i, p in enumerate(plans)]
 
 
-def figures(weights: Path) -> tuple[Skeleton, Array, Array]:
+def figures(weights: Path, variation: float) -> tuple[Skeleton, Array, Array]:
     """The skeleton of a network's healthy character, its positions (F, C, J, 3) and rotations (F, C, J, 4) in
     the world, at C speeds.
     """
     network = load_network(weights)
-    character = ProceduralAnimation(network, characters=len(SPEEDS), variation=1.0)
+    character = ProceduralAnimation(network, characters=len(SPEEDS), variation=variation)
     targets = np.column_stack([np.zeros(len(SPEEDS)), SPEEDS])
     poses = [character.next_pose(targets, gait="walk") for _ in range((5 + SECONDS) * 60)][300:]
     assert network.skeleton is not None
@@ -122,18 +122,24 @@ def main() -> None:
         f"the person {person}": [manner(c.skeleton, c.positions, c.global_rotations) for c in of_person]
         for person, of_person in zip(REFERENCE, of_people, strict=True)
     }
-    moves["walker"] = [manner(c.skeleton, c.positions, c.global_rotations) for c in walker]
+    for speed, clip in zip(SPEEDS, walker, strict=True):
+        moves[f"walker, {0.6 * speed:.2f} m/s"] = [
+            manner(clip.skeleton, clip.positions, clip.global_rotations)
+        ]
     if options.network:
-        skeleton, positions, rotations = figures(options.network)
-        each = range(positions.shape[1])
-        walks = [measure_cycles(skeleton, positions[:, i]) for i in each]
-        of_windows = [profiles([[p for _, p in windows_with_cycles(w, len(positions))]]) for w in walks]
-        told_apart("the healthy character", people, of_windows)
-        moves["character"] = [manner(skeleton, positions[:, i], rotations[:, i]) for i in each]
-    print(f"{'':16}" + "".join(f"{name:>16}" for name in MANNER))
+        skeleton, positions, _ = figures(options.network, 1.0)
+        walks = [measure_cycles(skeleton, positions[:, i]) for i in range(len(SPEEDS))]
+        windows = [[p for _, p in windows_with_cycles(walk, len(positions))] for walk in walks]
+        told_apart("the healthy character", people, [profiles([each]) for each in windows])
+        _, positions, rotations = figures(options.network, 0.0)
+        for i, speed in enumerate(SPEEDS):
+            of_figure = manner(skeleton, positions[:, i], rotations[:, i])
+            moves[f"character, {0.6 * speed:.2f} m/s"] = [of_figure]
+    print(f"{'':24}" + "".join(f"{name:>15}" for name in MANNER))
     for name, rows in moves.items():
-        low, high = np.min(rows, axis=0), np.max(rows, axis=0)
-        print(f"{name:16}" + "".join(f"{f'{a:.2f} to {b:.2f}':>16}" for a, b in zip(low, high, strict=True)))
+        ends = zip(np.min(rows, axis=0), np.max(rows, axis=0), strict=True)
+        cells = (f"{low:.2f} to {high:.2f}" if len(rows) > 1 else f"{low:.2f}" for low, high in ends)
+        print(f"{name:24}" + "".join(f"{cell:>15}" for cell in cells))
 
 
 if __name__ == "__main__":
