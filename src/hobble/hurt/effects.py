@@ -108,9 +108,9 @@ ADDED_CHANGES: dict[str, dict[str, float]] = {
     },
     "foot": {
         "speed": 0.62, "stride": 1.05, "turn": 0.42, "push": 0.63, "lift": 0.61, "lift_sound": 0.16,
-        "push_sound": 0.27, "strike": 0.58, "crouch": 2.5, "side": 4.8, "list": -3.6, "toe_out": 14.0, "off": -0.104,
-        "off_sound": 0.044, "land_sound": -0.071,
-        "width": -0.02, "vault_sound": 0.96, "arm": 0.65, "arm_sound": 0.85, "forward": -7.1,
+        "push_sound": 0.27, "strike": 0.58, "crouch": 2.5, "side": 4.8, "list": -3.6, "toe_out": 14.0,
+        "off": -0.104, "off_sound": 0.044, "land_sound": -0.071, "width": -0.02, "vault_sound": 0.96,
+        "arm": 0.65, "arm_sound": 0.85, "forward": -7.1,
     },
     "back": {
         "speed": 0.68, "push": 0.6, "push_sound": 0.6, "stride": 1.12, "forward": 17.0, "crouch": 9.0,
