@@ -23,9 +23,10 @@ from hobble.core.skeleton import Skeleton
 from hobble.gait.cycles import WalkCycles, measure_cycles
 from hobble.gait.profile import PROFILE_NAMES, mirror_profile, profile_of_walk
 from hobble.gait.recognise import SHRINKAGE, learn, windows_with_cycles
-from hobble.measures.motion_quality import FOOT_POINTS, joints_with, skating, standing_heights
+from hobble.measures.motion_quality import cleanness, joint_update
 from hobble.measures.walks import bend
 from hobble.models.load import load_network
+from hobble.models.network import Network
 from hobble.motion.skeleton_file import load_skeleton
 from hobble.runtime.animation import ProceduralAnimation
 from hobble.synthetic.generate_clip import walk_from_plan
@@ -63,10 +64,22 @@ def manner(skeleton: Skeleton, positions: Array, rotations: Array) -> list[float
         travel = steps[s].sum(axis=0) / np.linalg.norm(steps[s].sum(axis=0))
         speed, toe = steps[s] @ travel, at["right_toe"][s, 1]
         of_cycles.append((np.ptp(speed) / speed.mean(), np.ptp(nod[s]), np.ptp(elbow[s]), np.ptp(toe)))
-    feet = positions[:, joints_with(skeleton, FOOT_POINTS)].astype(float)
-    slid = skating(feet, standing_heights(feet))[:, 1::2].mean()
-    turn = np.degrees(quat.angle(rotations[:-1].astype(float), rotations[1:].astype(float))).mean()
-    return [*np.median(of_cycles, axis=0).tolist(), float(turn), float(slid)]
+    slid = cleanness(skeleton, positions, rotations)["skating_toes"]
+    return [*np.median(of_cycles, axis=0).tolist(), joint_update(rotations.astype(float)), slid]
+
+
+def manner_of(clip: Clip) -> list[float]:
+    """The numbers of MANNER of a clip."""
+    return manner(clip.skeleton, clip.positions, clip.global_rotations)
+
+
+def print_manners(moves: dict[str, list[list[float]]]) -> None:
+    """Print a line for each name: the lowest and the highest of each number of MANNER."""
+    print(f"{'':24}" + "".join(f"{name:>15}" for name in MANNER))
+    for name, rows in moves.items():
+        ends = zip(np.min(rows, axis=0), np.max(rows, axis=0), strict=True)
+        cells = (f"{low:.2f} to {high:.2f}" if len(rows) > 1 else f"{low:.2f}" for low, high in ends)
+        print(f"{name:24}" + "".join(f"{cell:>15}" for cell in cells))
 
 
 def generated() -> list[Clip]:
@@ -76,19 +89,12 @@ def generated() -> list[Clip]:
     return [walk_from_plan(f"w{i}", skeleton, p, frames, "flat", 60, i).clip for i, p in enumerate(plans)]
 
 
-def figures(weights: Path, variation: float) -> tuple[Skeleton, Array, Array]:
-    """The skeleton of a network's healthy character, its positions (F, C, J, 3) and rotations (F, C, J, 4) in
-    the world, at C speeds.
-    """
-    network = load_network(weights)
+def figures(network: Network, variation: float) -> tuple[Array, Array]:
+    """Positions (F, C, J, 3) and rotations (F, C, J, 4) in the world of healthy characters at C speeds."""
     character = ProceduralAnimation(network, characters=len(SPEEDS), variation=variation)
     targets = np.column_stack([np.zeros(len(SPEEDS)), SPEEDS])
     poses = [character.next_pose(targets, gait="walk") for _ in range((5 + SECONDS) * 60)][300:]
-    assert network.skeleton is not None
-    positions, rotations = (
-        np.array([getattr(p, name) for p in poses]) for name in ("positions", "rotations")
-    )
-    return network.skeleton, positions, rotations
+    return np.array([pose.positions for pose in poses]), np.array([pose.rotations for pose in poses])
 
 
 def told_apart(name: str, real: list[Array], made: list[Array], shown: int = 12) -> None:
@@ -118,28 +124,21 @@ def main() -> None:
     told_apart("generated clips", people, [profiles([parts(clip)]) for clip in walker])
     for i, person in enumerate(REFERENCE):
         told_apart(f"the person {person}", [*people[:i], *people[i + 1 :]], clips[i], shown=0)
-    moves = {
-        f"the person {person}": [manner(c.skeleton, c.positions, c.global_rotations) for c in of_person]
-        for person, of_person in zip(REFERENCE, of_people, strict=True)
-    }
-    for speed, clip in zip(SPEEDS, walker, strict=True):
-        moves[f"walker, {0.6 * speed:.2f} m/s"] = [
-            manner(clip.skeleton, clip.positions, clip.global_rotations)
-        ]
+    persons = zip(REFERENCE, of_people, strict=True)
+    moves = {f"the person {person}": [manner_of(c) for c in of_person] for person, of_person in persons}
+    moves |= {f"walker, {0.6 * v:.2f} m/s": [manner_of(c)] for v, c in zip(SPEEDS, walker, strict=True)}
     if options.network:
-        skeleton, positions, _ = figures(options.network, 1.0)
+        network = load_network(options.network)
+        skeleton = network.skeleton
+        assert skeleton is not None
+        positions, _ = figures(network, 1.0)
         walks = [measure_cycles(skeleton, positions[:, i]) for i in range(len(SPEEDS))]
         windows = [[p for _, p in windows_with_cycles(walk, len(positions))] for walk in walks]
         told_apart("the healthy character", people, [profiles([each]) for each in windows])
-        _, positions, rotations = figures(options.network, 0.0)
-        for i, speed in enumerate(SPEEDS):
-            of_figure = manner(skeleton, positions[:, i], rotations[:, i])
-            moves[f"character, {0.6 * speed:.2f} m/s"] = [of_figure]
-    print(f"{'':24}" + "".join(f"{name:>15}" for name in MANNER))
-    for name, rows in moves.items():
-        ends = zip(np.min(rows, axis=0), np.max(rows, axis=0), strict=True)
-        cells = (f"{low:.2f} to {high:.2f}" if len(rows) > 1 else f"{low:.2f}" for low, high in ends)
-        print(f"{name:24}" + "".join(f"{cell:>15}" for cell in cells))
+        positions, rotations = figures(network, 0.0)
+        for i, v in enumerate(SPEEDS):
+            moves[f"character, {0.6 * v:.2f} m/s"] = [manner(skeleton, positions[:, i], rotations[:, i])]
+    print_manners(moves)
 
 
 if __name__ == "__main__":
